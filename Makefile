@@ -1,0 +1,92 @@
+# Sets up .venv and runs the project in it. Every step leaves a stamp, so that a second call has nothing to do.
+
+PYTHON ?=
+VENV := .venv
+BIN := $(VENV)/bin
+COLCON := .colcon
+
+INTERFACES := $(shell find interfaces -type f -not -name '*.pyc')
+PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees -name '*.y*ml' 2>/dev/null)
+
+# A ROS installation or another environment in the caller's shell must not leak into these.
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
+unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: help setup dev demo test docs chaos soak benchmark lint types format colcon clean python colcon-python
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+
+setup: $(VENV)/runtime.stamp ## make .venv with ROS 2, the interfaces and bt_actions
+
+dev: $(VENV)/dev.stamp ## setup, and the tools for tests and checks
+
+demo: setup ## pick and place against simulated servers, ten times as fast as real
+	$(BIN)/bt-actions run trees/pick_and_place.yaml --sim --speed 10 --check-part 5.0
+
+test: lint types ## check the code and run every test
+	$(BIN)/python -m pytest
+
+docs: dev ## remake the pages and pictures that come from the code; `make test` fails when one is stale
+	$(BIN)/python scripts/goal_doc.py
+	$(BIN)/python scripts/yaml_doc.py
+	$(BIN)/python scripts/pictures.py
+
+lint: dev ## ruff: rules and formatting; bandit: security
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/bandit --quiet --recursive --configfile pyproject.toml bt_actions
+
+chaos: dev ## every scenario with killed processes and cut networks; writes docs/reliability.md
+	$(BIN)/python -m pytest tests/scenarios -m "" --reliability docs/reliability.md
+
+soak: dev ## 20,000 goals with every fault; an hour or two
+	$(BIN)/python scripts/soak.py
+
+benchmark: dev ## is checking a large tree as fast as promised? fails where it is not
+	$(BIN)/python benchmarks/check.py
+
+types: dev ## mypy --strict
+	$(BIN)/mypy --strict
+	$(BIN)/mypy --strict tests/typing/usage.py
+
+format: dev ## put the code into ruff's format
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+
+colcon: $(COLCON)/venv.stamp ## build both packages with colcon and run the demo from what it installed
+	scripts/colcon.sh $(COLCON)
+
+clean: ## remove what the other targets made
+	rm -rf $(VENV) $(COLCON) *.egg-info build
+
+# .venv
+
+python:
+	@scripts/venv.sh $(VENV) $(PYTHON)
+
+$(VENV)/interfaces.stamp: $(INTERFACES) | python
+	@scripts/compiler.sh
+	@rm -rf $(VENV)/wheels
+	@scripts/pip.sh $(VENV) "Building the ROS interfaces" wheel --no-deps --wheel-dir $(VENV)/wheels ./interfaces
+	@scripts/pip.sh $(VENV) "Installing the ROS interfaces" install --no-deps --force-reinstall $(VENV)/wheels/*.whl
+	@touch $@
+
+$(VENV)/runtime.stamp: $(VENV)/interfaces.stamp constraints.txt $(PROJECT) | python
+	@scripts/pip.sh $(VENV) "Installing ROS 2 Jazzy and bt_actions" install --editable .
+	@touch $@
+
+$(VENV)/dev.stamp: setup.cfg constraints.txt | $(VENV)/runtime.stamp
+	@scripts/pip.sh $(VENV) "Installing the tools for tests and checks" install --editable '.[dev]'
+	@touch $@
+
+# An environment of its own: colcon builds robot_control_interfaces, so its wheel must not be installed.
+
+colcon-python:
+	@scripts/venv.sh $(COLCON)/venv $(PYTHON)
+
+$(COLCON)/venv.stamp: setup.cfg interfaces/pyproject.toml constraints.txt scripts/colcon_requirements.py | colcon-python
+	@scripts/compiler.sh
+	@$(COLCON)/venv/bin/python scripts/colcon_requirements.py >$(COLCON)/requirements.txt
+	@scripts/pip.sh $(COLCON)/venv "Installing ROS 2 Jazzy and colcon" install --requirement $(COLCON)/requirements.txt
+	@touch $@

@@ -1,0 +1,37 @@
+"""A behaviour-tree task orchestrator for ROS 2 actions. These names are the public ones."""
+
+from bt_actions.streams import open_closed_streams as _open_closed_streams
+
+_open_closed_streams()  # before py_trees is imported, which asks for sys.stdout's encoding
+
+# ruff: noqa: E402 - see above
+from bt_actions.attempts import AttemptRecord
+from bt_actions.behaviours.action import ActionBehaviour, Progress
+from bt_actions.behaviours.gripper import Gripper
+from bt_actions.behaviours.move_robot import MoveRobot
+from bt_actions.behaviours.variables import Var
+from bt_actions.document import load_tree
+from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.runner import GoalReport, TreeError, TreeRunner
+
+__all__ = [  # noqa: RUF022 - grouped by use
+    # leaves
+    "ActionBehaviour",
+    "MoveRobot",
+    "Gripper",
+    "Var",
+    # policies
+    "Timeouts",
+    "Retry",
+    "Busy",
+    # what became of a goal
+    "Outcome",
+    "End",
+    "AttemptRecord",
+    "Progress",
+    # running
+    "load_tree",
+    "TreeRunner",
+    "TreeError",
+    "GoalReport",
+]

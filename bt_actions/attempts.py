@@ -1,0 +1,104 @@
+"""How one action is tried until an outcome stands: which attempt this is, and when the next may be.
+
+Told of every outcome, it keeps the history and answers "again?". No ROS, no thread, no clock of
+its own; it never sends anything and knows nothing of a goal's states (goal.py).
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import Now
+from bt_actions.policy import End, Outcome, Retry
+
+
+@dataclass(slots=True)
+class AttemptRecord:
+    """One attempt, as `ActionBehaviour.history` shows it.
+
+    Times are seconds on the node's clock. `end` is read from the goal each time, because an end
+    that is UNKNOWN when the leaf stops may still become known.
+    """
+
+    attempt: int
+    outcome: Outcome
+    reason: str
+    started: float
+    ended: float
+    result: Any
+    goal: Goal
+
+    @property
+    def goal_id(self) -> str:
+        """The goal's UUID in hexadecimal."""
+        return self.goal.id.hex()
+
+    @property
+    def end(self) -> End:
+        """How the goal stands on its server, as far as is known by now."""
+        return self.goal.end
+
+    @property
+    def late(self) -> bool:
+        """Whether the result came after a deadline, while the goal was being canceled."""
+        return self.goal.late
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the wish to the outcome."""
+        return self.ended - self.started
+
+
+class Attempts:
+    """The tries of one visit to a leaf."""
+
+    def __init__(
+        self, retry: Retry, when: Callable[[Any], bool] | None, chance: random.Random
+    ) -> None:
+        """`when` is `retry.when` made callable; if it raises, that counts as no."""
+        self.retry = retry
+        self.history: list[AttemptRecord] = []
+        self._when = when
+        self._chance = chance
+        self._resume_at: float | None = None
+        self._ros_seen = 0.0
+
+    @property
+    def attempt(self) -> int:
+        """The number of the attempt that is under way or comes next, from 1."""
+        return len(self.history) + 1
+
+    def again(self, record: AttemptRecord, now: Now) -> bool:
+        """File `record`; return whether there will be another attempt after a pause."""
+        self.history.append(record)
+        if len(self.history) >= self.retry.attempts or not self._worth_it(record):
+            return False
+        self._resume_at = now.ros + self.retry.pause(len(self.history), self._chance)
+        self._ros_seen = now.ros
+        return True
+
+    def pause_left(self, now: Now) -> float:
+        """Return the seconds until the next attempt may begin; a clock that jumps back waits on."""
+        if self._resume_at is None:
+            return 0.0
+        if now.ros < self._ros_seen:
+            self._resume_at -= self._ros_seen - now.ros
+        self._ros_seen = now.ros
+        return max(0.0, self._resume_at - now.ros)
+
+    def _worth_it(self, record: AttemptRecord) -> bool:
+        if record.end is End.UNKNOWN:
+            return False  # it may still be running: a second one beside it is what must not be
+        if record.outcome not in self.retry.outcomes:
+            return False
+        if self._when is not None and record.result is not None:
+            try:
+                return bool(self._when(record.result))
+            except Exception as error:  # noqa: BLE001 - the user's: any
+                record.reason += f" (not tried again: retry.when raised {error!r})"
+                return False
+        return True

@@ -1,0 +1,405 @@
+"""A py_trees leaf that sends a goal to a ROS action and stays RUNNING until it stands.
+
+It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
+shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
+What happens to the goal is decided in goal.py and carried out in ros/traffic.py; here stand only
+the visit to the leaf, its attempts, and what the tree sees of them.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Access, Status
+
+from bt_actions.attempts import AttemptRecord, Attempts
+from bt_actions.behaviours.conditions import condition_of, expression_of
+from bt_actions.behaviours.node import node_in
+from bt_actions.behaviours.variables import key, read, resolve, variables_in, write
+from bt_actions.expression import ExpressionError
+from bt_actions.goal_terms import Event
+from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.ticking import root_of
+
+if TYPE_CHECKING:
+    from bt_actions.ros.shared import Ticket
+    from bt_actions.ros.traffic import Traffic
+
+RESULT_SHOWN = 300
+"""Characters of a result in a reason."""
+DEADLINES = {
+    Event.QUEUE_DUE: "queue",
+    Event.SERVER_DUE: "server",
+    Event.ACCEPT_DUE: "accept",
+    Event.RESULT_DUE: "result",
+    Event.FEEDBACK_DUE: "feedback",
+    Event.CANCEL_DUE: "cancel",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """What an action is doing at this moment."""
+
+    state: str
+    """A goal's state, or IDLE before the first visit, BACKOFF between two attempts."""
+    attempt: int
+    attempts: int
+    feedback: Any
+    """The latest feedback message, or None."""
+    seconds_left: float | None
+    deadline: str
+    """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
+
+
+class ActionBehaviour(Behaviour):
+    """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
+
+    Args:
+        name: as in py_trees; the tree language wants it without a colon.
+        action_type: the action's class, or its type name (``"pkg/action/Name"``).
+        action_name: of the server; a relative name is expanded with the node's namespace.
+        goal: a goal message, a mapping of its fields, or a callable without arguments that returns
+            either. In a mapping, `Var` stands for a value on the blackboard. All of this is
+            evaluated when a goal is sent, for each attempt anew.
+        timeout: deadlines in seconds; a bare number is the result's, None means the defaults.
+        retry: how often and when to try again; a bare number is the attempts in all.
+        expect: what a result must be, beyond the server's word: a callable on the result message,
+            or an expression over ``result`` and blackboard variables (``result.stalled``).
+        save: blackboard keys, and the place in the result that each is set from on success
+            (``{"final_pose": "result.final_pose"}``).
+        busy: what to do when the resources are taken: wait, replace, fail or share.
+        resources: what the goal occupies; the action server's own name where not given.
+        on_feedback: called with each feedback message, on the ticking thread.
+
+    Raises ValueError for a policy, an expression or a place that makes no sense.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        action_type: type | str,
+        action_name: str,
+        goal: Any,
+        *,
+        timeout: Timeouts | float | None = None,
+        retry: Retry | int = 1,
+        expect: Callable[[Any], bool] | str | None = None,
+        save: Mapping[str, str] | None = None,
+        busy: Busy | str = "wait",
+        resources: Iterable[str] | None = None,
+        on_feedback: Callable[[Any], None] | None = None,
+    ) -> None:
+        super().__init__(name)
+        if isinstance(resources, str):
+            raise ValueError("resources must be a collection of names, not one text")
+        self.action_type: type | str = action_type
+        self.action_name = action_name
+        self.goal = goal
+        self.timeouts = Timeouts.of(timeout)
+        self.retry = Retry.of(retry)
+        self.busy = Busy(busy)
+        self.resources = frozenset(resources or ())
+        self.on_feedback = on_feedback
+        self.expect = expect
+        self.save = dict(save or {})
+        self._expect = condition_of(expect, "expect")
+        self._expect_text = expect if isinstance(expect, str) else getattr(expect, "text", "")
+        self._when = condition_of(self.retry.when, "retry.when")
+        self._save = {
+            target: expression_of(place, "save") for target, place in (save or {}).items()
+        }
+        self._to_save: dict[str, Any] = {}
+        self._chance = random.Random()
+        self._traffic: Traffic | None = None
+        self._line: Any = None
+        self._ticket: Ticket | None = None
+        self._left_behind: list[Ticket] = []
+        self._attempts = Attempts(self.retry, self._when, self._chance)
+        self._tree_closed = False
+        self._started = 0.0
+        self._outcome: Outcome | None = None
+        self.blackboard = self.attach_blackboard_client()
+        for variable in variables_in(goal):
+            self.blackboard.register_key(variable, Access.READ)
+        for target in self._save:
+            self.blackboard.register_key(key(target), Access.WRITE)
+
+    # What a caller may read after a tick
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """Why the last visit ended, or None while it lasts and before the first."""
+        return self._outcome
+
+    @property
+    def end(self) -> End | None:
+        """How the last goal stands on its server, as far as is known by now."""
+        return self._ticket.goal.end if self._ticket is not None else None
+
+    @property
+    def result(self) -> Any:
+        """The last result message, also of a goal that failed; None where there was none."""
+        return self._ticket.goal.result if self._ticket is not None else None
+
+    @property
+    def attempt(self) -> int:
+        """The number of the attempt of this visit, from 1; 0 before the first."""
+        under_way = self._ticket is not None and not self._filed(self._ticket)
+        return len(self._attempts.history) + under_way
+
+    @property
+    def history(self) -> list[AttemptRecord]:
+        """One record for each attempt of this visit that is over."""
+        return self._attempts.history
+
+    @property
+    def reason(self) -> str:
+        """The outcome in words, or an empty text."""
+        history = self.history  # a new visit begins a new one
+        return history[-1].reason if history else ""
+
+    @property
+    def server(self) -> str:
+        """The action's fully qualified name once set up, and until then as it was given."""
+        return self._line.name if self._line is not None else self.action_name
+
+    def progress(self) -> Progress:
+        """Return what the action is doing at this moment; safe to call from any thread."""
+        ticket, traffic = self._ticket, self._traffic
+        attempts = self.retry.attempts
+        if traffic is None or ticket is None:
+            return Progress("IDLE", self.attempt, attempts, None, None, "")
+        now = traffic.clocks.now()
+        if self.status is Status.RUNNING and self._filed(ticket):
+            left = self._attempts.pause_left(now)
+            return Progress("BACKOFF", self.attempt, attempts, None, left, "backoff")
+        from bt_actions.ros.shared import lock
+
+        goal = ticket.goal
+        with lock:  # its deadlines change with what arrives, on other threads
+            deadline = goal.deadline(now)
+        what, left_or_none = (
+            ("", None) if deadline is None else (DEADLINES[deadline[0]], deadline[1])
+        )
+        return Progress(goal.state.value, self.attempt, attempts, goal.feedback, left_or_none, what)
+
+    @property
+    def drained(self) -> bool:
+        """Whether every goal this leaf has sent so far is accounted for."""
+        return not self.open_tickets()
+
+    def due_in(self) -> float | None:
+        """Return the seconds until this leaf needs a tick though nothing has happened."""
+        if self._traffic is None or self._ticket is None or not self._filed(self._ticket):
+            return None  # while a goal is open, ros/traffic.py minds its deadlines
+        return self._attempts.pause_left(self._traffic.clocks.now())
+
+    # py_trees' contract
+
+    def setup(self, **kwargs: Any) -> None:
+        """Connect to the action, on the node given as ``node=``; again for the same node: fine.
+
+        Raises TypeError without a node, or when the name is in use with another type;
+        UnknownInterface (a LookupError) when the action type is not installed.
+        """
+        node = node_in(kwargs, self)
+        from bt_actions.ros.messages import interface
+        from bt_actions.ros.traffic import Traffic
+
+        if isinstance(self.action_type, str):
+            self.action_type = interface(self.action_type, "action")
+        traffic = Traffic.of(node)
+        if traffic is self._traffic:
+            return
+        self._leave_line()
+        self._line = traffic.line(self.action_type, self.action_name)
+        self._traffic = traffic
+
+    def initialise(self) -> None:
+        """Begin a visit. What an earlier one left behind is drained beside it."""
+        self._require_setup()
+        self._attempts = Attempts(self.retry, self._when, self._chance)
+        self._outcome = None
+        self._left_behind, self._ticket = self.open_tickets(), None
+        self._begin()
+
+    def update(self) -> Status:
+        """Take the goal as far as it goes at this moment."""
+        self._require_setup()
+        if self._outcome is not None:
+            self.initialise()  # shut down while RUNNING, and set up again: another visit
+        traffic, ticket = self._traffic, self._ticket
+        assert traffic is not None
+        assert ticket is not None
+        while True:
+            if self._filed(ticket):
+                left = self._attempts.pause_left(traffic.clocks.now())
+                if left > 0.0:
+                    self.feedback_message = f"{self.reason}; again in {left:.1f} s"
+                    return Status.RUNNING
+                ticket = self._begin()
+            traffic.advance(ticket, self._make_message)
+            for _ in range(len(ticket.feedback)):  # not what comes meanwhile: a tick must end
+                message = ticket.feedback.popleft()
+                if self.on_feedback is not None:
+                    self.on_feedback(message)
+            if ticket.goal.outcome is None:
+                self.feedback_message = self._in_words(ticket)
+                return Status.RUNNING
+            record = self._judge(ticket)
+            if not self._attempts.again(record, traffic.clocks.now()):
+                return self._finish(record)
+
+    def terminate(self, new_status: Status) -> None:
+        """Let go at once of a goal that is still open; it is canceled and drained."""
+        ticket = self._ticket
+        if self._traffic is None or ticket is None:
+            return
+        if self._filed(ticket):
+            if self._outcome is None and self.history:
+                self._outcome = self.history[-1].outcome  # stopped in the pause before a retry
+            return
+        if new_status is Status.INVALID or ticket.goal.outcome is None:
+            self._traffic.interrupt(ticket)
+            self.file_interrupted()
+
+    def shutdown(self) -> None:
+        """Cancel all live goals of the whole tree, wait for their ends, and let go of the client.
+
+        py_trees calls this leaf by leaf, and calls no terminate before; users destroy the node on
+        the next line. So the first leaf closes for all, under one deadline.
+        """
+        if self._traffic is None:
+            return
+        if not self._tree_closed:
+            from bt_actions.ros.traffic import drain
+
+            leaves = list(_leaves_of_tree(self))
+            drain([ticket for leaf in leaves for ticket in leaf.open_tickets()])
+            for leaf in leaves:
+                leaf.file_interrupted()
+                leaf._tree_closed = True  # noqa: SLF001 - of our own kind
+        self._leave_line()
+
+    def open_tickets(self) -> list[Ticket]:
+        """Return the goals of this leaf that nobody can account for yet, left behind ones too."""
+        tickets = [*self._left_behind, *([self._ticket] if self._ticket is not None else [])]
+        return [ticket for ticket in tickets if not ticket.accounted_for]
+
+    def file_interrupted(self) -> None:
+        """Record that the visit ended before its outcome: its goal was canceled, or is drained."""
+        ticket = self._ticket
+        if self._traffic is None or ticket is None or self._filed(ticket):
+            return
+        goal = ticket.goal
+        outcome, reason = goal.outcome, goal.reason
+        if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
+            outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
+        now = self._traffic.clocks.now().ros
+        self.history.append(
+            AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
+        )
+        self._outcome = outcome
+        self.feedback_message = f"{outcome}: {reason}"
+
+    # Within
+
+    def _require_setup(self) -> None:
+        if self._traffic is None:
+            raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
+
+    def _begin(self) -> Ticket:
+        assert self._traffic is not None
+        self._tree_closed = False
+        self._left_behind = self.open_tickets()
+        self._started = self._traffic.clocks.now().ros
+        self._ticket = self._traffic.begin(
+            self._line,
+            self,
+            self.timeouts,
+            self.resources,
+            self.busy,
+            attempt=self._attempts.attempt,
+            keeps_feedback=self.on_feedback is not None,
+        )
+        return self._ticket
+
+    def _filed(self, ticket: Ticket) -> bool:
+        """Whether this attempt is over and in the history."""
+        history = self.history  # a new visit begins a new one
+        return bool(history) and history[-1].goal is ticket.goal
+
+    def _make_message(self) -> Any:
+        from bt_actions.ros.messages import fill
+
+        assert self._traffic is not None
+        assert not isinstance(self.action_type, str)
+        data = self.goal() if callable(self.goal) else self.goal
+        clock = self._traffic.node.get_clock()
+        goal_type: type[Any] = self.action_type.Goal  # type: ignore[attr-defined]
+        return fill(goal_type, resolve(data), now=lambda: int(clock.now().nanoseconds))
+
+    def _judge(self, ticket: Ticket) -> AttemptRecord:
+        assert self._traffic is not None
+        goal = ticket.goal
+        outcome, reason = goal.outcome, goal.reason
+        assert outcome is not None
+        if outcome is Outcome.SUCCEEDED:
+            why = self._read_result(goal.result)
+            if why:
+                outcome, reason = Outcome.UNEXPECTED_RESULT, why
+        now = self._traffic.clocks.now().ros
+        return AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
+
+    def _finish(self, record: AttemptRecord) -> Status:
+        self._outcome = record.outcome
+        tries = (
+            f" (attempt {record.attempt} of {self.retry.attempts})" if record.attempt > 1 else ""
+        )
+        told = f": {record.reason}" if record.reason else ""
+        self.feedback_message = f"{record.outcome}{tries}{told}"
+        if record.outcome is not Outcome.SUCCEEDED:
+            return Status.FAILURE
+        for target, value in self._to_save.items():
+            write(target, value)
+        return Status.SUCCESS
+
+    def _read_result(self, result: Any) -> str:
+        """Check the result and read from it what is to be saved; return what is wrong with it."""
+        try:
+            if self._expect is not None and not self._expect(result):
+                return self._unexpected(result)
+            roots = {"result": result}
+            self._to_save = {
+                target: place.evaluate(roots, read) for target, place in self._save.items()
+            }
+        except ExpressionError as error:
+            return str(error)
+        return ""
+
+    def _unexpected(self, result: Any) -> str:
+        from bt_actions.ros.messages import to_plain
+
+        wanted = f"{self._expect_text} was expected" if self._expect_text else "not as expected"
+        fields = ", ".join(f"{name} {value}" for name, value in to_plain(result).items())
+        return f"{wanted}, but the result is: {fields[:RESULT_SHOWN] or 'empty'}"
+
+    def _in_words(self, ticket: Ticket) -> str:
+        tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
+        return f"{ticket.goal.state.value.lower().replace('_', ' ')}{tries}"
+
+    def _leave_line(self) -> None:
+        if self._traffic is not None:
+            self._traffic.leave(self._line)
+        self._traffic = self._line = None
+
+
+def _leaves_of_tree(leaf: Behaviour) -> Iterator[ActionBehaviour]:
+    for behaviour in root_of(leaf).iterate():
+        if isinstance(behaviour, ActionBehaviour):
+            yield behaviour

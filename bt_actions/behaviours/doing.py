@@ -1,0 +1,84 @@
+"""Leaves that do something small and are done: set variables, write to the log."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+__all__ = ["LEVELS", "Log", "SetValues"]
+
+LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
+
+
+class SetValues(Behaviour):
+    """Computes values and writes them, all or none; fails when one cannot be computed.
+
+    Args:
+        name: as in py_trees.
+        values: gives the values by name; may raise ValueError.
+        write: puts them where the tree reads them; may raise ValueError.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        values: Callable[[], Mapping[str, object]],
+        write: Callable[[Mapping[str, object]], None],
+    ) -> None:
+        super().__init__(name)
+        self._values = values
+        self._write = write
+
+    def update(self) -> Status:
+        try:
+            self._write(self._values())
+        except ValueError as error:
+            self.feedback_message = str(error)
+            return Status.FAILURE
+        self.feedback_message = ""
+        return Status.SUCCESS
+
+
+class Log(Behaviour):
+    """Writes a line to the node's log (Python's where there is no node), and succeeds.
+
+    Args:
+        name: as in py_trees.
+        text: gives the line; may raise ValueError, which is logged instead and fails.
+        level: one of `LEVELS`.
+    """
+
+    def __init__(self, name: str, text: Callable[[], object], level: str = "info") -> None:
+        super().__init__(name)
+        self._text = text
+        self._level = level
+        self._logger: Any = None
+
+    def setup(self, **kwargs: Any) -> None:
+        node = kwargs.get("node")
+        self._logger = node.get_logger() if node is not None else None
+
+    def update(self) -> Status:
+        try:
+            line = str(self._text())
+        except ValueError as error:
+            self.feedback_message = str(error)
+            return Status.FAILURE
+        self.feedback_message = line
+        if self._logger is None:
+            logging.getLogger("bt_actions").log(LEVELS[self._level], "%s", line)
+        else:
+            # rclpy remembers the severity of each calling line, so each level has its own.
+            write = {
+                "debug": lambda: self._logger.debug(line),
+                "info": lambda: self._logger.info(line),
+                "warn": lambda: self._logger.warning(line),
+                "error": lambda: self._logger.error(line),
+                "fatal": lambda: self._logger.fatal(line),
+            }
+            write[self._level]()
+        return Status.SUCCESS

@@ -1,0 +1,35 @@
+"""A decorator that decides before each tick whether its child is ticked at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.decorators import Decorator
+
+__all__ = ["Gate"]
+
+
+class Gate(Decorator):
+    """Like py_trees' Decorator, with a question asked first.
+
+    A subclass says in `gate` what to do: None ticks the child, RUNNING waits without ticking it,
+    SUCCESS and FAILURE end the node. `update` then reads the child's status as usual.
+    """
+
+    def gate(self) -> Status | None:
+        """What to do this time; called after `initialise`."""
+        return None
+
+    def tick(self) -> Iterator[Behaviour]:
+        if self.status is not Status.RUNNING:
+            self.initialise()
+        decided = self.gate()
+        if decided is None:
+            yield from self.decorated.tick()
+            decided = self.update()
+        if decided is not Status.RUNNING:
+            self.stop(decided)
+        self.status = decided
+        yield self

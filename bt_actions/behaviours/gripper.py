@@ -1,0 +1,34 @@
+"""The leaf that opens and closes a gripper. All of its life is ActionBehaviour's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.variables import Var
+
+
+class Gripper(ActionBehaviour):
+    """Moves the gripper to `position`, from 0 (closed) to 100 (open).
+
+    `max_effort` is in N, 0 for the gripper's own. Both may be a Var. Whether something is held
+    shows in the result: ``expect="result.stalled"``. Keyword arguments are those of
+    ActionBehaviour.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        position: float | Var,
+        *,
+        max_effort: float | Var = 0.0,
+        action_name: str = "gripper_control",
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(
+            name,
+            "robot_control_interfaces/action/Gripper",
+            action_name,
+            {"position": position, "max_effort": max_effort},
+            **kwargs,
+        )

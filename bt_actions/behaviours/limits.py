@@ -1,0 +1,112 @@
+"""Decorators that stop their child: a deadline, and a guard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_actions.behaviours.clock import Countdown, NodeTime
+from bt_actions.behaviours.gate import Gate
+from bt_actions.expression import ExpressionError
+
+__all__ = ["Deadline", "While"]
+
+
+class Deadline(Gate):
+    """Stops its child after some seconds, and fails when what it stopped has ended.
+
+    py_trees' Timeout fails at once, so that whatever comes next runs beside a goal that is still
+    being canceled.
+
+    Args:
+        name: as in py_trees.
+        child: what may take only so long.
+        after: seconds on the node's clock; may raise ValueError, which fails.
+    """
+
+    def __init__(self, name: str, child: Behaviour, after: Callable[[], object]) -> None:
+        super().__init__(name, child)
+        self._after = after
+        self._clock = NodeTime()
+        self._countdown = Countdown(self._clock)
+        self._expired = False
+        self._limit: float | None = None
+
+    def setup(self, **kwargs: Any) -> None:
+        self._clock.setup(kwargs.get("node"))
+
+    def initialise(self) -> None:
+        self._expired = False
+        self.feedback_message = ""
+        try:
+            self._limit = seconds(self._after())
+        except ValueError as error:
+            self._limit = None
+            self.feedback_message = str(error)
+            return
+        self._countdown.start(self._limit)
+
+    def gate(self) -> Status | None:
+        if self._limit is None:
+            return Status.FAILURE
+        if not self._expired and self._countdown.left() <= 0.0:
+            self._expired = True
+            self.decorated.stop(Status.INVALID)
+        if not self._expired:
+            return None
+        stopping = [node.name for node in self.decorated.iterate() if not drained(node)]
+        if stopping:
+            self.feedback_message = f"{self._limit:g} s are over; waiting for {stopping[0]} to end"
+            return Status.RUNNING
+        self.feedback_message = f"not done within {self._limit:g} s"
+        return Status.FAILURE
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+    def due_in(self) -> float | None:
+        """Seconds until the deadline."""
+        return None if self._expired else self._countdown.left()
+
+
+class While(Gate):
+    """Ticks its child as long as a condition holds; stops it and fails when it does not.
+
+    Args:
+        name: as in py_trees.
+        child: what to do meanwhile.
+        condition: asked before each tick; raising ExpressionError counts as no.
+    """
+
+    def __init__(self, name: str, child: Behaviour, condition: Callable[[], bool]) -> None:
+        super().__init__(name, child)
+        self._condition = condition
+
+    def gate(self) -> Status | None:
+        try:
+            holds, why = self._condition(), "the condition does not hold"
+        except ExpressionError as error:
+            holds, why = False, error.message
+        if holds:
+            self.feedback_message = ""
+            return None
+        self.feedback_message = why
+        return Status.FAILURE
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+def drained(node: Behaviour) -> bool:
+    """Whether nothing of a behaviour goes on outside of the tree."""
+    return bool(getattr(node, "drained", True))
+
+
+def seconds(value: object) -> float:
+    """A duration that was computed. Raises ValueError."""
+    from bt_actions.units import parse_duration
+
+    return parse_duration(value)

@@ -1,0 +1,209 @@
+"""Decorators that run their child more than once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_actions.behaviours.clock import Countdown, NodeTime
+from bt_actions.behaviours.gate import Gate
+
+__all__ = ["ForEach", "Repeat", "RetryChild"]
+
+Number = Callable[[], object]
+
+
+class RetryChild(Gate):
+    """Ticks its child again when it has failed, after a pause.
+
+    Args:
+        name: as in py_trees.
+        child: what to try.
+        attempts: all tries; without limit where not given. May raise ValueError, which fails.
+        backoff: seconds before the second try, on the node's clock.
+        factor: each pause is this much longer than the one before.
+        max_backoff: the longest pause in seconds.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        child: Behaviour,
+        attempts: Number | int | None = None,
+        *,
+        backoff: float = 0.0,
+        factor: float = 2.0,
+        max_backoff: float = 60.0,
+    ) -> None:
+        super().__init__(name, child)
+        self._attempts = attempts
+        self._backoff = (backoff, factor, max_backoff)
+        self._clock = NodeTime()
+        self._pause = Countdown(self._clock)
+        self.failures = 0
+        self.limit: int | None = None
+
+    def setup(self, **kwargs: Any) -> None:
+        self._clock.setup(kwargs.get("node"))
+
+    def initialise(self) -> None:
+        self.failures = 0
+        self._pause.start(0.0)
+        self.limit = None
+        self.feedback_message = ""
+
+    def gate(self) -> Status | None:
+        if self.limit is None and self._attempts is not None:
+            self.limit, self.feedback_message = _whole(self._attempts, "attempts", 1)
+            if self.limit is None:
+                return Status.FAILURE
+        return None if self._pause.left() <= 0.0 else Status.RUNNING
+
+    def update(self) -> Status:
+        if self.decorated.status is not Status.FAILURE:
+            return self.decorated.status
+        self.failures += 1
+        of = "" if self.limit is None else f" of {self.limit}"
+        self.feedback_message = f"attempt {self.failures}{of} failed"
+        if self.limit is not None and self.failures >= self.limit:
+            return Status.FAILURE
+        first, factor, longest = self._backoff
+        try:
+            self._pause.start(min(first * factor ** (self.failures - 1), longest))
+        except OverflowError:
+            self._pause.start(longest)
+        return Status.RUNNING
+
+    def due_in(self) -> float | None:
+        """Seconds until the next try; None while one is under way."""
+        return None if self.decorated.status is Status.RUNNING else self._pause.left()
+
+
+class Repeat(Gate):
+    """Ticks its child again when it has succeeded; fails as soon as it fails.
+
+    Args:
+        name: as in py_trees.
+        child: what to repeat.
+        times: how often in all; for ever where not given. May raise ValueError, which fails.
+    """
+
+    def __init__(self, name: str, child: Behaviour, times: Number | int | None = None) -> None:
+        super().__init__(name, child)
+        self._times = times
+        self.successes = 0
+        self.limit: int | None = None
+
+    def initialise(self) -> None:
+        self.successes = 0
+        self.limit = None
+        self.feedback_message = ""
+
+    def gate(self) -> Status | None:
+        if self.limit is None and self._times is not None:
+            self.limit, self.feedback_message = _whole(self._times, "times", 0)
+            if self.limit is None:
+                return Status.FAILURE
+        return Status.SUCCESS if self.limit == 0 else None
+
+    def update(self) -> Status:
+        if self.decorated.status is not Status.SUCCESS:
+            return self.decorated.status
+        self.successes += 1
+        of = "" if self.limit is None else f" of {self.limit}"
+        self.feedback_message = f"{self.successes}{of} done"
+        done = self.limit is not None and self.successes >= self.limit
+        return Status.SUCCESS if done else Status.RUNNING
+
+    def due_in(self) -> float | None:
+        """Zero when the next round can begin at once."""
+        return None if self.decorated.status is Status.RUNNING else 0.0
+
+
+class ForEach(Gate):
+    """Ticks its child once for each item of a list.
+
+    Args:
+        name: as in py_trees.
+        child: what to do for each item.
+        items: gives the list, when the node starts; may raise ValueError, which fails the node.
+        begin: called with item and index before each round, to write them where the child reads.
+        keep_going: whether an item that failed is left behind; the node then succeeds if any item
+            did, or the list was empty.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        child: Behaviour,
+        items: Callable[[], object],
+        begin: Callable[[object, int], None],
+        *,
+        keep_going: bool = False,
+    ) -> None:
+        super().__init__(name, child)
+        self._get_items = items
+        self._begin = begin
+        self._keep_going = keep_going
+        self._items: list[object] | None = None
+        self.index = 0
+        self.failures = 0
+
+    def initialise(self) -> None:
+        self.index = self.failures = 0
+        self._items = None
+        self.feedback_message = ""
+        try:
+            items = self._get_items()
+            to_list = getattr(items, "tolist", None)  # array.array and numpy alike
+            items = to_list() if to_list is not None else items
+            if not isinstance(items, (list, tuple)):
+                raise ValueError(f"a list is needed, not {type(items).__name__}")
+        except ValueError as error:
+            self.feedback_message = str(error)
+            return
+        self._items = list(items)
+        if self._items:
+            self._begin(self._items[0], 0)
+
+    def gate(self) -> Status | None:
+        if self._items is None:
+            return Status.FAILURE
+        return None if self._items else Status.SUCCESS
+
+    def update(self) -> Status:
+        status = self.decorated.status
+        assert self._items is not None
+        if status not in (Status.SUCCESS, Status.FAILURE):
+            return status
+        if status is Status.FAILURE:
+            self.failures += 1
+            if not self._keep_going:
+                self.feedback_message = f"item {self.index} failed"
+                return status
+        self.index += 1
+        self.feedback_message = f"{self.index} of {len(self._items)} done"
+        if self.failures:
+            self.feedback_message += f", {self.failures} failed"
+        if self.index >= len(self._items):
+            return Status.FAILURE if self.failures == len(self._items) else Status.SUCCESS
+        self._begin(self._items[self.index], self.index)
+        return Status.RUNNING
+
+    def due_in(self) -> float | None:
+        """Zero when the next item can begin at once."""
+        return None if self.decorated.status is Status.RUNNING else 0.0
+
+
+def _whole(given: Number | int, what: str, least: int) -> tuple[int | None, str]:
+    """A whole number, or None and what is wrong with it."""
+    try:
+        value = given() if callable(given) else given
+    except ValueError as error:
+        return None, f"{what}: {error}"
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        return None, f"{what}: a whole number of at least {least} is needed, not {value!r}"
+    return value, ""

@@ -1,0 +1,60 @@
+"""A composite that ticks its children beside each other; a finished one is not started again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import ParallelPolicy, Status
+from py_trees.composites import Parallel as PyTreesParallel
+
+__all__ = ["Parallel"]
+
+
+class Parallel(PyTreesParallel):
+    """Succeeds when enough children have; fails as soon as that cannot happen any more.
+
+    What is still running then is stopped. py_trees' own Parallel fails with the first child that
+    does, whatever the policy, and starts finished children again unless told otherwise.
+
+    Args:
+        name: as in py_trees.
+        at_least: how many children must succeed; all of them where not given.
+    """
+
+    def __init__(
+        self, name: str, children: Sequence[Behaviour], *, at_least: int | None = None
+    ) -> None:
+        super().__init__(name, ParallelPolicy.SuccessOnAll(synchronise=True), list(children))
+        self.at_least = at_least
+
+    def tick(self) -> Iterator[Behaviour]:
+        if self.status is not Status.RUNNING:
+            for child in self.children:
+                if child.status is not Status.INVALID:
+                    child.stop(Status.INVALID)
+            self.current_child = None
+            self.initialise()
+        for child in self.children:
+            if child.status not in (Status.SUCCESS, Status.FAILURE):
+                yield from child.tick()
+        new_status = self._judge()
+        if new_status is not Status.RUNNING:
+            self.stop(new_status)
+        self.status = new_status
+        yield self
+
+    def _judge(self) -> Status:
+        needed = len(self.children) if self.at_least is None else self.at_least
+        done = [child for child in self.children if child.status is Status.SUCCESS]
+        failed = [child for child in self.children if child.status is Status.FAILURE]
+        open_ones = len(self.children) - len(done) - len(failed)
+        self.feedback_message = f"{len(done)} of {needed} succeeded, {len(failed)} failed"
+        if len(done) >= needed:
+            self.current_child = done[-1] if done else None
+            return Status.SUCCESS
+        if len(done) + open_ones < needed:
+            self.current_child = failed[-1]
+            return Status.FAILURE
+        self.current_child = self.children[-1]
+        return Status.RUNNING

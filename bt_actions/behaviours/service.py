@@ -1,0 +1,164 @@
+"""A leaf that calls a ROS service and stays RUNNING until it is answered. A tick never blocks."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_actions.behaviours.clock import Countdown, NodeTime
+from bt_actions.behaviours.conditions import condition_of
+from bt_actions.behaviours.node import node_in
+from bt_actions.expression import ExpressionError
+from bt_actions.policy import Retry
+
+if TYPE_CHECKING:
+    from bt_actions.ros.service_client import ServiceClient
+
+__all__ = ["CallService"]
+
+
+class CallService(Behaviour):
+    """Calls a service once, and again as `retry` says.
+
+    A call that was not answered in time may have been carried out all the same: it is tried again
+    only where `retry` asks for it.
+
+    Args:
+        name: as in py_trees.
+        service_type: the service's class or type name.
+        service_name: a relative name is expanded with the node's namespace.
+        request: gives the fields of the request; may raise ValueError, which fails.
+        server: seconds to wait for the service to be there; None waits for ever.
+        response: seconds to wait for the answer; None waits for ever.
+        retry: how often; its outcomes are not looked at, a service knows only one failure.
+        expect: what the answer must be; raising ExpressionError counts as no.
+        save: called with the answer; raising ExpressionError fails.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_type: type | str,
+        service_name: str,
+        request: Callable[[], object],
+        *,
+        server: float | None = 5.0,
+        response: float | None = 5.0,
+        retry: Retry | int = 1,
+        expect: Callable[[Any], bool] | None = None,
+        save: Callable[[Any], None] | None = None,
+    ) -> None:
+        super().__init__(name)
+        self.service_type = service_type
+        self.service_name = service_name
+        self.retry = Retry.of(retry)
+        self.response: Any = None
+        self.attempt = 0
+        self._request = request
+        self._limits = (server, response)
+        self._expect = expect
+        self._when = condition_of(self.retry.when, "retry.when")
+        self._save = save
+        self._clock = NodeTime()
+        self._countdown = Countdown(self._clock)
+        self._pause = Countdown(self._clock)
+        self._chance = random.Random()
+        self._node: Any = None
+        self._client: ServiceClient | None = None
+
+    def setup(self, **kwargs: Any) -> None:
+        node = node_in(kwargs, self)
+        if node is self._node:
+            return
+        from bt_actions.ros.service_client import ServiceClient
+
+        self.shutdown()
+        self._clock.setup(node)
+        self._client = ServiceClient(node, self.service_type, self.service_name)
+        self._node = node
+
+    def initialise(self) -> None:
+        assert self._client is not None, "not set up"
+        self._client.drop()
+        self.attempt = 1
+        self.response = None
+        self._pause.start(0.0)
+        self._countdown.start(self._limits[0] or 0.0)
+
+    def update(self) -> Status:
+        assert self._client is not None, "not set up"
+        if self._pause.left() > 0.0:
+            return Status.RUNNING
+        if not self._client.calling:
+            return self._try_to_call(self._client)
+        if not self._client.answered:
+            self.feedback_message = f"waiting for an answer of {self.service_name}"
+            if self._limits[1] is not None and self._countdown.left() <= 0.0:
+                self._client.drop()
+                return self._failed(f"no answer within {self._limits[1]:g} s")
+            return Status.RUNNING
+        try:
+            self.response = self._client.answer()
+            if self._expect is not None and not self._expect(self.response):
+                return self._failed("the answer is not what was expected")
+            if self._save is not None:
+                self._save(self.response)
+        except ExpressionError as error:
+            return self._failed(error.message)
+        self.feedback_message = ""
+        return Status.SUCCESS
+
+    def terminate(self, new_status: Status) -> None:
+        if self._client is not None:
+            self._client.drop()
+
+    def shutdown(self) -> None:
+        if self._client is not None:
+            self._client.close()
+        self._client = self._node = None
+
+    def due_in(self) -> float | None:
+        """Seconds until the next deadline or try."""
+        if self._pause.left() > 0.0:
+            return self._pause.left()
+        if self._client is None or not self._client.calling:
+            return 0.05  # nothing announces that a service has come up
+        return None if self._limits[1] is None else self._countdown.left()
+
+    def _try_to_call(self, client: ServiceClient) -> Status:
+        if not client.ready:
+            self.feedback_message = f"waiting for the service {self.service_name}"
+            if self._limits[0] is not None and self._countdown.left() <= 0.0:
+                return self._failed(f"no service {self.service_name} within {self._limits[0]:g} s")
+            return Status.RUNNING
+        try:
+            client.call(self._request())
+        except ValueError as error:
+            self.feedback_message = str(error)
+            return Status.FAILURE
+        self._countdown.start(self._limits[1] or 0.0)
+        self.feedback_message = f"called {self.service_name}"
+        return Status.RUNNING
+
+    def _failed(self, reason: str) -> Status:
+        self.feedback_message = reason
+        if self.attempt >= self.retry.attempts or not self._worth_it():
+            return Status.FAILURE
+        self._pause.start(self.retry.pause(self.attempt, self._chance))
+        self.attempt += 1
+        self.response = None
+        self._countdown.start((self._limits[0] or 0.0) + self._pause.left())
+        return Status.RUNNING
+
+    def _worth_it(self) -> bool:
+        if self._when is None or self.response is None:
+            return True
+        try:
+            return self._when(self.response)
+        except ExpressionError as error:  # counts as no, as in attempts.py
+            self.feedback_message += f"; retry.when: {error.message}"
+            return False

@@ -1,0 +1,57 @@
+"""A tree inside a tree: its values are its own.
+
+When it starts it writes the inputs, when it ends it gives back the outputs. It never looks into
+the tree it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_actions.behaviours.gate import Gate
+
+__all__ = ["Subtree"]
+
+
+class Subtree(Gate):
+    """Ticks another tree with inputs of its own.
+
+    Args:
+        name: as in py_trees.
+        child: the root of the tree.
+        begin: writes the inputs, each time the tree starts; raises ValueError for one that has no
+            value or does not fit, which fails the subtree before its first tick.
+        end: gives back the outputs, when the tree has succeeded or failed.
+    """
+
+    def __init__(
+        self, name: str, child: Behaviour, begin: Callable[[], None], end: Callable[[], None]
+    ) -> None:
+        super().__init__(name, child)
+        self._begin = begin
+        self._end = end
+        self._refused = ""
+
+    def initialise(self) -> None:
+        self._refused = ""
+        try:
+            self._begin()
+        except ValueError as error:
+            self._refused = str(error)
+            self.decorated.stop(Status.INVALID)
+
+    def gate(self) -> Status | None:
+        if not self._refused:
+            return None
+        self.feedback_message = self._refused
+        return Status.FAILURE
+
+    def update(self) -> Status:
+        status = self.decorated.status
+        self.feedback_message = self.decorated.feedback_message
+        if status in (Status.SUCCESS, Status.FAILURE):
+            self._end()
+        return status

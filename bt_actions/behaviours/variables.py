@@ -1,0 +1,93 @@
+"""Values that live on py_trees' blackboard, and how goals and results refer to them. No ROS.
+
+Everything here reads and writes at the moment it is called, so call it on the ticking thread:
+the blackboard is process-global and has no lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from py_trees.blackboard import Blackboard
+
+
+class MissingVariable(KeyError):
+    """A variable was read that nobody has written, or that has no such field."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Var:
+    """A place for a value that is read from the blackboard when the goal is sent.
+
+    `name` is a blackboard key, with or without the leading slash; ``pick_at.position.0`` reads on
+    into fields, keys and indices.
+    """
+
+    name: str
+
+    def read(self) -> Any:
+        """Return the value; raises MissingVariable."""
+        return read(self.name)
+
+
+def key(name: str) -> str:
+    """Return the absolute blackboard key of a variable, without the way into its fields."""
+    return "/" + name.lstrip("/").split(".", 1)[0]
+
+
+def read(name: str) -> Any:
+    """Return the value of a variable, or of a field of it; raises MissingVariable."""
+    base = key(name)
+    try:
+        value = Blackboard.storage[base]
+    except KeyError:
+        raise MissingVariable(f"variable {name!r} has no value") from None
+    for step in name.lstrip("/").split(".")[1:]:
+        value = _step(value, step, name)
+    return value
+
+
+def _step(value: Any, step: str, name: str) -> Any:
+    if not step or step.startswith("_"):
+        raise MissingVariable(f"variable {name!r}: {step!r} is no field")
+    try:
+        if isinstance(value, Mapping):
+            return value[step]
+        if step.isdigit():
+            return value[int(step)]
+        return getattr(value, step)
+    except (LookupError, TypeError, AttributeError):
+        kind = type(value).__name__
+        raise MissingVariable(f"variable {name!r}: {step!r} is no field of a {kind}") from None
+
+
+def write(name: str, value: Any) -> None:
+    """Set a variable, as the blackboard's own clients see it."""
+    Blackboard.set(key(name), value)
+
+
+def resolve(data: Any) -> Any:
+    """Return plain data with every Var in it replaced by its value; raises MissingVariable."""
+    if isinstance(data, Var):
+        return data.read()
+    if isinstance(data, Mapping):
+        return {name: resolve(value) for name, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [resolve(value) for value in data]
+    return data
+
+
+def variables_in(data: Any) -> set[str]:
+    """Return the blackboard keys that `resolve` would read."""
+    if isinstance(data, Var):
+        return {key(data.name)}
+    if isinstance(data, Mapping):
+        return set().union(*(variables_in(value) for value in data.values()))
+    if isinstance(data, list | tuple):
+        return set().union(*(variables_in(value) for value in data))
+    return set()

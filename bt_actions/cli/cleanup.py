@@ -1,0 +1,73 @@
+"""`bt-actions cleanup`: cancel the goals that a killed orchestrator of this machine left."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.common import Exit, note, seconds, write
+
+if TYPE_CHECKING:
+    from bt_actions.cli.parser import Subparsers
+    from bt_actions.ros.cleanup import LeftBehind
+
+_EPILOG = """\
+A process that is killed (kill -9, out of memory) cannot cancel its goals; the robot goes on. This
+finds them by their ids in the status of every action in sight. Goals of other clients are never
+touched, nor those of an orchestrator that is alive or on another machine.
+
+examples:
+  bt-actions cleanup
+  bt-actions cleanup --look 10
+  bt-actions run pick_and_place --cleanup-first
+
+exit codes:
+  0 nothing is left   3 the end of a goal is unknown
+"""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "cleanup",
+        help="cancel what a killed orchestrator left",
+        description="Cancel the goals that killed bt_actions processes of this machine left.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument(
+        "--look", metavar="S", type=seconds, default=5.0, help="look for servers so long [5 s]"
+    )
+    parser.add_argument(
+        "--patience",
+        metavar="S",
+        type=seconds,
+        default=5.0,
+        help="wait so long for the goals to end [5 s]",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    return sweep(args.look, args.patience)
+
+
+def sweep(look: float, patience: float) -> Exit:
+    """Clean up, saying what is found and how it ended."""
+    from bt_actions.policy import End
+    from bt_actions.ros.cleanup import cleanup
+
+    def found(left: LeftBehind) -> None:
+        note(f"canceling a goal of dead process {left.pid} on {left.action}: {left.goal_id.hex()}")
+
+    actions: list[str] = []
+    goals = cleanup(look=look, patience=patience, found=found, sighted=actions.append)
+    for goal in goals:
+        write(f"{goal.action}  {goal.goal_id.hex()}  {goal.end}\n")
+    if any(goal.end is End.UNKNOWN for goal in goals):
+        note("not all of them have ended; they may still be running")
+        return Exit.UNKNOWN
+    if not goals:
+        count = "1 action" if len(actions) == 1 else f"{len(actions)} actions"
+        where = f" on the {count} in sight" if actions else ": no action server is in sight"
+        write(f"nothing was left behind{where}\n")
+    return Exit.SUCCESS

@@ -1,0 +1,218 @@
+"""What several commands share: exit codes, the error for bad input, and reading arguments.
+
+Imports nothing slow: every call of `bt-actions` loads this file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import os
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from enum import IntEnum
+from types import MappingProxyType
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from py_trees.behaviour import Behaviour
+
+    from bt_actions.document import DocumentError
+
+
+class Exit(IntEnum):
+    """The exit codes of every command that runs goals; the others use the first three."""
+
+    SUCCESS = 0
+    FAILURE = 1
+    BAD_INPUT = 2
+    UNKNOWN = 3
+    """The end of a goal is not known: it may still be running. Wins over all others."""
+    TIMEOUT = 124
+    SIGHUP = 129
+    SIGINT = 130
+    SIGPIPE = 141
+    """Nobody reads standard output any more."""
+    SIGTERM = 143
+
+
+class BadInput(Exception):
+    """What the user gave cannot be used; the text says what, where and what to do. Exit code 2."""
+
+    def __init__(self, message: str, *, prefixed: bool = True) -> None:
+        """`prefixed` is False for messages that begin with their own file:line:column."""
+        super().__init__(message)
+        self.prefixed = prefixed
+
+
+class OutputLost(Exception):
+    """Standard output cannot be written, for another reason than that nobody reads it."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(f"standard output cannot be written: {error.strerror or error}")
+
+
+def write(text: str) -> None:
+    """Write `text` to standard output, at once.
+
+    Raises OutputLost, or BrokenPipeError when nobody reads any more.
+    """
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutputLost(error) from error
+
+
+def discard_stdout() -> None:
+    """Write to nowhere from now on, what is left in the buffer too."""
+    _discard(sys.stdout)
+
+
+def _discard(stream: TextIO) -> None:
+    """Without this, Python fails to flush the stream at exit, and makes the exit code 120."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+def note(message: str, end: str = "\n") -> None:
+    """Write one message for the user to standard error, whoever may still be reading it."""
+    try:
+        print(message, file=sys.stderr, flush=True, end=end)
+    except (OSError, ValueError):
+        _discard(sys.stderr)
+
+
+def seconds(text: str) -> float:
+    """Read a positive number of seconds from the command line."""
+    return positive(text, "number of seconds")
+
+
+def speed(text: str) -> float:
+    """Read a positive factor from the command line."""
+    return positive(text, "factor")
+
+
+def positive(text: str, what: str) -> float:
+    """Read a positive, finite number; argparse reports the error."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or value <= 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no positive {what}")
+    return value
+
+
+def metres(text: str) -> float:
+    """Read a finite number of metres from the command line."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of metres")
+    return value
+
+
+def namespace(text: str) -> str:
+    """Read a ROS namespace; return it with a leading slash, or "" for the root."""
+    name = text.strip("/")
+    if name and not re.fullmatch(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", name, flags=re.ASCII):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no ROS namespace: letters, digits and _ between slashes, as in /r1"
+        )
+    return f"/{name}" if name else ""
+
+
+def load(
+    tree: str,
+    settings: Iterable[str],
+    *,
+    python: bool = True,
+    parameters: Mapping[str, object] = MappingProxyType({}),
+) -> Behaviour:
+    """Load a tree by path or by the name of an installed one, with `--set` words for its inputs.
+
+    Where they say nothing, ROS parameters by the names of inputs do. With `python=False` a tree
+    with a `python:` node is refused, and nothing it names is imported.
+
+    Raises BadInput with all findings, or about the first input that does not fit.
+    """
+    from bt_actions.cli.ros_arguments import as_inputs
+    from bt_actions.document import (
+        DocumentError,
+        InputError,
+        TreeNotFoundError,
+        find_tree,
+        load_tree,
+        parse_input,
+        tree_inputs,
+    )
+
+    texts: dict[str, str] = {}
+    for word in settings:
+        name, text = split(word, "--set")
+        if name in texts:
+            raise BadInput(f"--set {name} is given twice: {texts[name]!r} and {text!r}")
+        texts[name] = text
+    try:
+        find_tree(tree)
+        declared = tree_inputs(tree) if texts or parameters else {}
+        inputs = as_inputs(parameters, declared, tree)
+        for name, text in texts.items():
+            kind = declared[name].type if name in declared else "string"
+            try:
+                inputs[name] = parse_input(text, kind)
+            except ValueError as error:
+                raise BadInput(f"--set {name}={text}: {error}") from error
+        return load_tree(tree, inputs, python=python)
+    except DocumentError as error:
+        raise BadInput(findings_text(error), prefixed=False) from error
+    except (InputError, TreeNotFoundError) as error:
+        raise BadInput(str(error)) from error
+
+
+def findings_text(error: DocumentError) -> str:
+    """What is wrong with a document, for standard error."""
+    return "\n".join(finding.text(columns(sys.stderr)) for finding in error.findings)
+
+
+def columns(stream: TextIO) -> int:
+    """Return the width of the terminal behind `stream`; 200 where there is none."""
+    try:
+        return os.get_terminal_size(stream.fileno()).columns or 200
+    except (OSError, ValueError):
+        return 200
+
+
+def split(word: str, what: str) -> tuple[str, str]:
+    """Split `name=value`; raise BadInput, beginning with `what`, for anything else."""
+    name, equals, text = word.partition("=")
+    if not equals or not name.strip():
+        raise BadInput(f"{what} {word!r}: expected name=value, as in distance=2.0")
+    return name.strip(), text
+
+
+def path_of(node: Behaviour) -> tuple[str, ...]:
+    """Return the names from the root down to `node`."""
+    names = [node.name]
+    above = node.parent
+    while above is not None:
+        names.append(above.name)
+        above = above.parent
+    return tuple(reversed(names))
+
+
+def place_of(node: Behaviour) -> str:
+    """Return file:line:column where a tree file says `node`, or "" for a node made in Python."""
+    place = getattr(node, "place", None)
+    if place is None:
+        return ""
+    return f"{place.file}:{place.line}:{place.column}"

@@ -1,0 +1,85 @@
+"""`bt-actions format`: trees in canonical form, comments kept."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.common import BadInput, Exit, findings_text, note, write
+
+if TYPE_CHECKING:
+    from bt_actions.cli.parser import Subparsers
+
+_EPILOG = """\
+examples:
+  bt-actions format trees/*.yaml
+  bt-actions format --check trees/*.yaml
+  bt-actions format - < tree.yaml
+
+exit codes:
+  0 done, or nothing to do   1 with --check: a file would change   2 a file cannot be formatted
+"""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "format",
+        help="rewrite trees in canonical form",
+        description="Rewrite trees in canonical form: two spaces, the kind of a node first, keys "
+        "in the order of the reference. Comments are kept.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument(
+        "files", metavar="FILE", nargs="+", help="a tree; - reads and writes the standard streams"
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="change nothing; say what would change"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Format the files that `args` name."""
+    changed = False
+    for name in args.files:
+        before, after = _formatted(name)
+        if name == "-" and not args.check:
+            write(after)
+        elif before != after:
+            changed = True
+            note(f"{name}: {'would change' if args.check else 'formatted'}")
+            if not args.check:
+                _replace(Path(name), after)
+    return Exit.FAILURE if args.check and changed else Exit.SUCCESS
+
+
+def _formatted(name: str) -> tuple[str, str]:
+    from bt_actions.document import DocumentError, read_source, source_of
+    from bt_actions.document.formatting import FormatError, format_source
+
+    try:
+        source = source_of(sys.stdin.buffer.read(), "<stdin>") if name == "-" else None
+        if source is None:
+            source = read_source(Path(name), name)
+        return source.text, format_source(source)
+    except DocumentError as error:
+        raise BadInput(findings_text(error), prefixed=False) from None
+    except FormatError as error:
+        raise BadInput(f"{name}: {error}; it was left as it is") from None
+
+
+def _replace(path: Path, text: str) -> None:
+    """Write the new text beside the old one, then put it in its place: never half a file."""
+    path = path.resolve()
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", dir=path.parent, delete=False, newline="\n"
+        ) as stream:
+            stream.write(text)
+        Path(stream.name).chmod(path.stat().st_mode & 0o7777)
+        Path(stream.name).replace(path)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None

@@ -1,0 +1,146 @@
+"""A file that takes text at once and writes it with a thread of its own; a reader takes its time.
+
+Whoever reads may pause (`less`, Ctrl-S, a stuck collector of logs), and what is written waits here,
+in order and bounded. Must not decide what a failed write means: the main thread's next write or
+flush raises it. Must not hold a lock of Python's own streams while it writes: the interpreter could
+not exit then.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import select
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+MOST = 4_000_000
+"""Bytes that may wait for a reader; beyond that the oldest are dropped."""
+_OF_A_PIECE = 64
+"""Bytes that a piece of text costs besides its own."""
+
+
+def gap_text(lines: int) -> str:
+    """Say in a line that some are missing."""
+    return f"... {lines} lines are missing here: they were not read in time\n"
+
+
+class PatientFile(io.RawIOBase):
+    """Takes bytes without ever waiting; a thread writes them to a file descriptor."""
+
+    def __init__(self, descriptor: int, name: str) -> None:
+        self._descriptor = descriptor
+        self._pid = os.getpid()
+        self._changed = threading.Condition()
+        self._waiting: deque[bytes] = deque()
+        self._size = 0
+        self._missing = 0
+        self._writing = False
+        self._ended = False
+        self._error: OSError | None = None
+        self.gap: Callable[[int], str] = gap_text
+        self._thread = threading.Thread(target=self._write_all, name=name, daemon=True)
+        self._thread.start()
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
+
+    def fileno(self) -> int:
+        """Return the descriptor that is written to in the end."""
+        return self._descriptor
+
+    def isatty(self) -> bool:
+        """Whether that is a terminal."""
+        return os.isatty(self._descriptor)
+
+    def write(self, data: ReadableBuffer, /) -> int:
+        """Let `data` be written; raises as `flush` does."""
+        self.flush()
+        if not (piece := bytes(data)):
+            return 0
+        if self._forked:
+            return os.write(self._descriptor, piece)
+        with self._changed:
+            self._waiting.append(piece)
+            self._size += len(piece) + _OF_A_PIECE
+            while self._size > MOST and len(self._waiting) > 1:
+                oldest = self._waiting.popleft()
+                self._size -= len(oldest) + _OF_A_PIECE
+                self._missing += oldest.count(b"\n")
+            self._changed.notify_all()
+        return len(piece)
+
+    def flush(self) -> None:
+        """Wait for nothing; raise, once, what became of an earlier write.
+
+        In the main thread only: a leaf that prints must not fail for it.
+        """
+        if self._forked or threading.current_thread() is not threading.main_thread():
+            return
+        with self._changed:
+            error, self._error = self._error, None
+        if error is not None:
+            raise error
+
+    @property
+    def _forked(self) -> bool:
+        """Whether this is a copy in a child process, without the thread that writes."""
+        return os.getpid() != self._pid
+
+    def written(self, within: float) -> bool:
+        """Whether all is written, now or in so many seconds; raises as `flush` does."""
+        with self._changed:
+            done = self._changed.wait_for(
+                lambda: self._error or not (self._waiting or self._writing), within
+            )
+        self.flush()
+        return bool(done)
+
+    def end(self) -> None:
+        """Let the thread end when all is written; what is never read is lost with the process."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
+        self._thread.join(0.1)
+
+    def _write_all(self) -> None:
+        while piece := self._next():
+            try:
+                self._put(piece)
+            except OSError as error:
+                with self._changed:
+                    self._error = error
+                    self._waiting.clear()
+                    self._size = self._missing = 0
+            with self._changed:
+                self._writing = False
+                self._changed.notify_all()
+
+    def _next(self) -> bytes:
+        """Wait for a piece, and take it; empty at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._ended)
+            if not self._waiting:
+                return b""
+            self._writing = True
+            if self._missing:
+                missing, self._missing = self._missing, 0
+                return self.gap(missing).encode("ascii", "backslashreplace")
+            piece = self._waiting.popleft()
+            self._size -= len(piece) + _OF_A_PIECE
+            return piece
+
+    def _put(self, piece: bytes) -> None:
+        while piece:
+            try:
+                piece = piece[os.write(self._descriptor, piece) :]
+            except BlockingIOError:  # whoever shares it has made it so
+                poll = select.poll()
+                poll.register(self._descriptor, select.POLLOUT)
+                poll.poll()

@@ -1,0 +1,72 @@
+"""`bt-actions render`: a tree as text on the terminal, or as a file in one of render's formats.
+
+Never needs a ROS graph, and never imports rclpy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.common import BadInput, Exit, load, write
+
+if TYPE_CHECKING:
+    from bt_actions.cli.parser import Subparsers
+
+_EPILOG = """\
+examples:
+  bt-actions render trees/pick_and_place.yaml
+  bt-actions render pick_and_place -o tree.svg
+  bt-actions render pick_and_place -o tree.html    # to open in a browser
+"""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "render",
+        help="draw a tree",
+        description="Draw a tree: text to the terminal, or a file in the format of its suffix. "
+        "Graphviz need not be installed. An .html file folds, shows each node's YAML, policies and "
+        "types, and needs no network.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("tree", metavar="TREE", help="path or name of a tree")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=Path,
+        help="file to write: .txt, .dot, .svg, .png or .html; without it, text to standard output",
+    )
+    parser.add_argument(
+        "--direction",
+        choices=("down", "right"),
+        help="where a picture grows to (default: down, or right where the tree is wide)",
+    )
+    parser.add_argument(
+        "--set",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="give an input of the tree a value; repeatable",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw the tree that `args` name."""
+    from bt_actions import render
+
+    try:
+        if args.output is not None:
+            render.form_of(args.output)  # before the tree: the cheaper mistake first
+        root = load(args.tree, args.set)
+        if args.output is not None:
+            render.write(root, args.output, direction=args.direction)
+        else:
+            write(render.text(root, encoding=sys.stdout.encoding or "ascii"))
+    except render.RenderError as error:
+        raise BadInput(str(error)) from error
+    return Exit.SUCCESS

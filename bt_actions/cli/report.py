@@ -1,0 +1,313 @@
+"""What happened to a tree's actions, collected from the one stream of events.
+
+Every view and the exit code read from here. Draws nothing, waits for nothing, and looks at no
+behaviour's state that an event has not told (the tree ticks on another thread meanwhile).
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+from uuid import UUID
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite
+
+from bt_actions.cli.common import path_of, place_of
+from bt_actions.policy import End, Outcome
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from bt_actions.events import Event, GoalChanged
+
+DONE = "DONE"
+UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
+"""States of a goal before its request goes out."""
+STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
+"""Outcomes that say how the goal ended on its server."""
+REMEMBERED = 64
+"""Goals of a leaf that are known again when their last news come late."""
+
+
+@dataclass(slots=True)
+class Row:
+    """All that one action leaf did in this run, over all its visits."""
+
+    behaviour: Behaviour
+    name: str
+    path: tuple[str, ...]
+    place: str
+    """file:line:column, or ""."""
+    server: str
+    attempts: int = 0
+    """Goals wished for in all visits."""
+    attempt: int = 0
+    """The number of the latest within its visit."""
+    visits: int = 0
+    outcome: Outcome | None = None
+    """Of the latest attempt; None while it is under way."""
+    end: End | None = None
+    reason: str = ""
+    state: str = ""
+    begun: float = 0.0
+    """When the latest visit began."""
+    counted: float = 0.0
+    """Seconds of the visits before the latest."""
+    duration: float = 0.0
+    """Seconds from the first wish to the last outcome of each visit, summed up."""
+    _open: dict[str, str] = field(default_factory=dict)  # goals without a known end: states
+    _recent: deque[str] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
+
+    @property
+    def live(self) -> bool:
+        """Whether a goal of this leaf may be running, be it one that the leaf has left."""
+        return any(state not in UNSENT for state in self._open.values())
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a goal of this leaf has no known end, be it that it was not sent yet."""
+        return bool(self._open)
+
+    def observe(self, event: GoalChanged) -> None:
+        """Take in one event of a goal of this leaf."""
+        told = event.outcome is not None and event.end not in (None, End.UNKNOWN)
+        if event.state == DONE or told:
+            self._open.pop(event.goal_id, None)
+        else:
+            self._open[event.goal_id] = event.state
+        if event.goal_id not in self._recent:
+            self._begin(event)
+        elif event.goal_id != self._recent[-1]:
+            return  # an older goal, on its way to its end
+        elif event.outcome is not None and self.outcome is None:
+            self._count(event)
+        self.state, self.outcome, self.end = event.state, event.outcome, event.end
+        self.reason = event.reason
+
+    def settle(self) -> None:
+        """Take over the leaf's own judgement: it may have expected more than the server did."""
+        outcome = getattr(self.behaviour, "outcome", None)
+        if outcome is not None and outcome is not self.outcome:  # None: it is visited anew already
+            self.outcome = outcome
+            self.reason = str(getattr(self.behaviour, "reason", ""))
+
+    def leave(self, now: float) -> None:
+        """Its goals are waited for no longer: how they end is not known."""
+        if self.outcome is None:
+            self.outcome = Outcome.CANCELED
+            self.duration = self.counted + max(0.0, now - self.begun)
+        self.end = End.UNKNOWN
+
+    @property
+    def verdict(self) -> str:
+        """The outcome for the table: where the goal stands while there is none.
+
+        The end is told where it is not known, and where the robot did what nobody waited for.
+        """
+        if self.outcome is None:
+            return self.state
+        surprise = self.outcome not in STOOD and self.end in (End.SUCCEEDED, End.ABORTED)
+        told = f", end {self.end}" if surprise or self.end is End.UNKNOWN else ""
+        return f"{self.outcome}{told}"
+
+    @property
+    def tries(self) -> str:
+        """The attempts for the table, with the visits where there were several."""
+        return f"{self.attempts}" if self.visits <= 1 else f"{self.attempts} in {self.visits}"
+
+    def _begin(self, event: GoalChanged) -> None:
+        self._recent.append(event.goal_id)
+        self.attempts += 1
+        self.attempt = event.attempt
+        if event.attempt <= 1:
+            self.visits += 1
+            self.begun, self.counted = event.time, self.duration
+        if event.outcome is not None:
+            self._count(event)
+
+    def _count(self, event: GoalChanged) -> None:
+        self.duration = self.counted + max(0.0, event.time - self.begun)
+
+
+@dataclass(frozen=True, slots=True)
+class Culprit:
+    """One leaf that made the tree fail."""
+
+    path: tuple[str, ...]
+    message: str
+    place: str
+    row: Row | None
+    """What the action did; None for a leaf that is no action."""
+
+
+@dataclass(slots=True)
+class Report:
+    """Collects events; answers what a view, the table, the summary and the exit code need."""
+
+    root: Behaviour
+    status: Status = Status.INVALID
+    started: float = 0.0
+    finished: bool = False
+    now: float = 0.0
+    """The time of the latest event."""
+    _clock: Callable[[], float] = time.monotonic
+    _begun: float | None = None
+    _rows: dict[UUID, Row] = field(default_factory=dict)
+    _statuses: dict[UUID, tuple[Status, str]] = field(default_factory=dict)
+    _unaccounted: list[str] = field(default_factory=list)
+
+    def observe(self, event: Event) -> None:
+        """Take in one event, in the order of their coming."""
+        from bt_actions.events import GoalChanged, NodeChanged, TreeFinished, TreeStarted
+
+        self.now = event.time
+        if isinstance(event, TreeStarted):
+            self.started = event.time
+            self._begun = self._clock()
+        elif isinstance(event, NodeChanged):
+            self._statuses[event.node.id] = (event.status, event.message)
+            row = self._rows.get(event.node.id)
+            if row is not None and event.status in (Status.SUCCESS, Status.FAILURE):
+                row.settle()
+        elif isinstance(event, GoalChanged):
+            self.row(event.behaviour).observe(event)
+        elif isinstance(event, TreeFinished):
+            self.status = event.status
+            self.finished = True
+
+    def row(self, behaviour: Behaviour) -> Row:
+        """Return the row of an action leaf, a new one at its first event."""
+        row = self._rows.get(behaviour.id)
+        if row is None:
+            row = Row(
+                behaviour,
+                behaviour.name,
+                path_of(behaviour),
+                place_of(behaviour),
+                str(getattr(behaviour, "server", "")),
+            )
+            self._rows[behaviour.id] = row
+        return row
+
+    def elapsed(self) -> float:
+        """Return the seconds since the tree started, between events too."""
+        return 0.0 if self._begun is None else self._clock() - self._begun
+
+    @property
+    def rows(self) -> list[Row]:
+        """The actions that were tried, in the order of their first goal."""
+        return list(self._rows.values())
+
+    @property
+    def live(self) -> list[Row]:
+        """The actions whose goal may be running now."""
+        return [row for row in self._rows.values() if row.live]
+
+    @property
+    def unaccounted(self) -> list[str]:
+        """One line for each goal whose end is not known."""
+        return list(self._unaccounted)
+
+    def not_accounted_for(self, lines: list[str]) -> None:
+        """Say which goals have no known end, now that the run is over."""
+        self._unaccounted = lines
+
+    def seconds(self, row: Row) -> float:
+        """Return how long `row` took so far, a visit that is not over included."""
+        if row.outcome is not None or not row.under_way:
+            return row.duration
+        return row.counted + max(0.0, self.now - row.begun)
+
+    def status_of(self, node: Behaviour) -> Status:
+        """Return the status that `node` was last seen with."""
+        return self._statuses.get(node.id, (Status.INVALID, ""))[0]
+
+    def message_of(self, node: Behaviour) -> str:
+        """Return the feedback message that `node` last changed with."""
+        return self._statuses.get(node.id, (Status.INVALID, ""))[1]
+
+    def culprits(self) -> list[Culprit]:
+        """Return the leaves by whose failure the root has failed, in tree order."""
+        if self.status is not Status.FAILURE:
+            return []
+        return [
+            Culprit(path_of(leaf), self.message_of(leaf), place_of(leaf), self._rows.get(leaf.id))
+            for leaf in self._failed_leaves()
+        ]
+
+    def _failed_leaves(self) -> Iterator[Behaviour]:
+        """Go down from the root along what failed; through a decorator whatever its child says.
+
+        A failed composite whose children all say otherwise speaks for itself, as a leaf does.
+        """
+        waiting = [self.root]
+        while waiting:
+            node = waiting.pop()
+            if isinstance(node, Composite):
+                below = [c for c in node.children if self.status_of(c) is Status.FAILURE]
+            else:
+                below = list(node.children)
+            if below:
+                waiting.extend(reversed(below))
+            else:
+                yield node
+
+
+def table(report: Report, width: int | None = None) -> list[str]:
+    """Return the table of actions as lines; names are cut so that lines fit into `width`."""
+    rows = report.rows
+    if not rows:
+        return []
+    head = ("action", "server", "attempts", "outcome", "duration")
+    body = [
+        (
+            row.name,
+            row.server,
+            row.tries,
+            row.verdict,
+            f"{report.seconds(row):.2f} s",
+        )
+        for row in rows
+    ]
+    widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
+    if width is not None:
+        for column in (1, 0):  # the server first: it is often a long name
+            excess = sum(widths) + 2 * (len(widths) - 1) - width
+            widths[column] -= max(0, min(excess, widths[column] - 8))
+    right = {2, 4}
+    return [
+        "  ".join(
+            _cut(cell, size).rjust(size) if column in right else _cut(cell, size).ljust(size)
+            for column, (cell, size) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in (head, *body)
+    ]
+
+
+def _cut(cell: str, size: int) -> str:
+    return cell if len(cell) <= size else cell[: size - 2] + ".."
+
+
+def summary(report: Report) -> list[str]:
+    """Return why the tree failed: for each leaf its path, attempts, outcome, reason and place."""
+    lines: list[str] = []
+    for culprit in report.culprits():
+        lines.append(" / ".join(culprit.path))
+        row = culprit.row
+        if row is None or row.outcome is None:
+            lines.append(f"  failed{_because(culprit.message)}")
+        else:
+            tries = "1 attempt" if row.attempts == 1 else f"{row.attempts} attempts"
+            lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
+        if culprit.place:
+            lines.append(f"  {culprit.place}")
+    return lines
+
+
+def _because(reason: str) -> str:
+    return f": {reason}" if reason else ""

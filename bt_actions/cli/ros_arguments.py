@@ -1,0 +1,62 @@
+"""`--ros-args` of a run: the ROS parameters among them, as inputs of its tree.
+
+The node of the run is told of all of them by rclpy, which reads `sys.argv` itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.common import BadInput
+from bt_actions.suggest import listing
+
+if TYPE_CHECKING:
+    from bt_actions.document import TreeInput
+
+
+def parameters(words: Sequence[str], namespace: str = "") -> dict[str, object]:
+    """Return the parameters that `words` give to the node of a run, without rclpy's own.
+
+    Raises BadInput for what rcl does not understand.
+    """
+    if not words:
+        return {}
+    if "--" in words:
+        raise BadInput("--ros-args: all that follows is for ROS; give --ros-args last, without --")
+    try:
+        from bt_actions.ros.parameters import parameters_in
+    except ImportError as error:
+        raise BadInput(f"--ros-args: ROS 2 cannot be imported ({error})") from error
+
+    try:
+        return parameters_in(words, namespace)
+    except ValueError as error:
+        raise BadInput(f"--ros-args: {error}") from error
+
+
+def as_inputs(
+    given: Mapping[str, object], declared: Mapping[str, TreeInput], tree: str
+) -> dict[str, object]:
+    """Return parameters as the inputs that `declared` says `tree` has.
+
+    A text for an input that is a message is read as YAML. Raises BadInput about the first
+    parameter that is no input, or does not fit.
+    """
+    from bt_actions.document import parse_input
+    from bt_actions.document.inputs import convert
+
+    inputs: dict[str, object] = {}
+    for name, value in given.items():
+        if name not in declared:
+            there = f"its inputs are {listing(declared)}" if declared else "it has no inputs"
+            text = f"the parameter {name!r} is no input of the tree {tree!r}; {there}"
+            raise BadInput(f"--ros-args: {text}")
+        kind = declared[name].type
+        try:
+            is_yaml = isinstance(value, str) and "/" in kind
+            inputs[name] = parse_input(str(value), kind) if is_yaml else convert(value, kind)
+        except ValueError as error:
+            text = f"the parameter {name!r} is {value!r}, and the input is {kind}: {error}"
+            raise BadInput(f"--ros-args: {text}") from error
+    return inputs

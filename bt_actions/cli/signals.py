@@ -1,0 +1,84 @@
+"""SIGINT, SIGTERM and SIGHUP as bytes in a pipe that the main thread reads when it is ready.
+
+A handler that did more than write a byte could run in the middle of anything, with any lock held.
+Nothing here decides what a signal means.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import threading
+from types import FrameType
+from typing import Any, Self
+
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Signals:
+    """Catches the signals that end a program, from `__enter__` to `__exit__`; main thread only.
+
+    SIGHUP stays ignored where the program was started so (nohup).
+    """
+
+    def __init__(self) -> None:
+        self._read, self._write = os.pipe()
+        for end in (self._read, self._write):
+            os.set_blocking(end, False)
+        self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
+        self._wakeup_before = -1
+        self._closing = threading.Lock()
+        self._closed = False
+
+    def __enter__(self) -> Self:
+        self._wakeup_before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+        for number in _ENDING:
+            if number is signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
+                continue
+            self._before[number] = signal.signal(number, _only_the_byte)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(self._wakeup_before)
+        with self._closing:
+            self._closed = True
+            os.close(self._read)
+            os.close(self._write)
+
+    def poke(self) -> None:
+        """Wake the thread that waits; callable from any thread."""
+        with self._closing, contextlib.suppress(BlockingIOError):  # full: it will wake anyway
+            if not self._closed:
+                os.write(self._write, b"\0")
+
+    def wait(
+        self, timeout: float | None, *, readable: int = -1, writable: int = -1
+    ) -> tuple[list[signal.Signals], set[int]]:
+        """Wait for a signal, for a poke, until `readable` has data or `writable` lost its reader.
+
+        Return the signals since the last call, and which of the two descriptors have something to
+        tell; -1 is none. `timeout` is in seconds; None waits without limit.
+        """
+        poll = select.poll()
+        poll.register(self._read, select.POLLIN)
+        if readable >= 0:
+            poll.register(readable, select.POLLIN)
+        if writable >= 0:
+            poll.register(writable, 0)  # errors and hang-ups are always reported
+        ready = {fd for fd, _ in poll.poll(None if timeout is None else max(0.0, timeout) * 1000)}
+        return self._take(), ready - {self._read}
+
+    def _take(self) -> list[signal.Signals]:
+        try:
+            numbers = os.read(self._read, 65536)
+        except BlockingIOError:
+            return []
+        return [signal.Signals(number) for number in numbers if number in _ENDING]
+
+
+def _only_the_byte(_number: int, _frame: FrameType | None) -> None:
+    """Python's C handler has written the byte to the pipe by now."""

@@ -1,0 +1,64 @@
+"""Which simulated robots a tree needs: the namespaces of its own MoveRobot and Gripper leaves.
+
+Reads a tree that is not set up yet; starts nothing and imports no ROS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+
+from bt_actions import render
+
+SERVED = {"MoveRobot": "move_robot", "Gripper": "gripper_control"}
+"""What a simulated robot serves: names by types."""
+_PACKAGE = "robot_control_interfaces"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a tree wants of a simulation."""
+
+    namespaces: Sequence[str]
+    """Of the robots; "/" is the root. Never empty."""
+    others: Sequence[str]
+    """The servers that no simulated robot has, as `name (type)`."""
+
+
+def wanted(root: Behaviour, namespace: str = "") -> Wanted:
+    """Return what `root` wants when it runs on a node in `namespace` ("" or with a slash)."""
+    namespaces: dict[str, None] = {}
+    others: dict[str, None] = {}
+    for row in render.rows(root):
+        node = row.node
+        for sort in ("action", "service"):
+            name, kind = getattr(node, f"{sort}_name", None), getattr(node, f"{sort}_type", None)
+            if not isinstance(name, str) or kind is None:
+                continue
+            full = name if name.startswith("/") else f"{namespace}/{name}"
+            above, _, last = full.rpartition("/")
+            package, word = _type_words(kind)
+            if package == _PACKAGE and SERVED.get(word) == last:
+                namespaces[above or "/"] = None
+            else:
+                others[f"{full} ({word})"] = None
+    return Wanted(tuple(namespaces) or (namespace or "/",), tuple(others))
+
+
+def remark(found: Wanted) -> str:
+    """Say in one line which servers must come from elsewhere; empty when none."""
+    if not found.others:
+        return ""
+    names = " and ".join(SERVED.values())
+    return f"--sim serves only {names}; it has no server for {', '.join(found.others)}"
+
+
+def _type_words(kind: object) -> tuple[str, str]:
+    """Package and name of an interface, given by its name or as a class."""
+    if isinstance(kind, str):
+        words = kind.split("/")
+    else:
+        words = [*str(getattr(kind, "__module__", "")).split("."), getattr(kind, "__name__", "")]
+    return words[0], words[-1]

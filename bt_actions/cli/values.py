@@ -1,0 +1,78 @@
+"""The `field=value` words of `bt-actions send`, read as the tree language reads values.
+
+A value that begins with a bracket, a brace or a quote is YAML; any other is one scalar, whatever
+else it holds, so that `message=hello: world # 1` is a text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from bt_actions.cli.common import BadInput, split
+
+
+def goal_fields(words: Iterable[str]) -> dict[str, object]:
+    """Read `field=value` words, dotted names as nested fields; of two for one name the last counts.
+
+    Raises BadInput that names the word.
+    """
+    values: dict[str, object] = {}
+    for word in words:
+        name, text = split(word, "field")
+        values[name] = value(text, f"field {word!r}")
+    return nested(values)
+
+
+def value(text: str, where: str) -> object:
+    """Read one value; `where` begins the message when it cannot be read.
+
+    Raises BadInput.
+    """
+    from bt_actions.document.nodes import Scalar, compose
+    from bt_actions.document.source import Source
+
+    stripped = text.strip()
+    if not stripped:
+        return text
+    if stripped[0] in "[{\"'":
+        source = Source(where, text)
+        node = compose(source)
+        if source.findings or node is None:
+            why = source.findings[0].message if source.findings else "not a value"
+            raise BadInput(f"{where}: {why}")
+        return _plain(node)
+    scalar = Scalar()
+    scalar.text, scalar.plain = stripped, True
+    return scalar.value
+
+
+def nested(values: dict[str, object]) -> dict[str, object]:
+    """Turn dotted names into mappings: {"a.b": 1} into {"a": {"b": 1}}.
+
+    Raises BadInput where one name is both a value and the beginning of another name.
+    """
+    tree: dict[str, object] = {}
+    for name, given in values.items():
+        *above, last = name.split(".")
+        at = tree
+        for step in above:
+            below = at.setdefault(step, {})
+            if not isinstance(below, dict):
+                raise BadInput(f"field {name!r}: {step} has a value of its own already")
+            at = below
+        if last in at:
+            raise BadInput(f"field {name!r}: parts of it have values already")
+        at[last] = given
+    return tree
+
+
+def _plain(node: object) -> object:
+    """Plain data from YAML nodes; their nesting is bounded by `compose`."""
+    from bt_actions.document.nodes import Listing, Mapping, Scalar
+
+    if isinstance(node, Mapping):
+        return {key.text: _plain(item) for key, item in node.pairs}
+    if isinstance(node, Listing):
+        return [_plain(item) for item in node.items]
+    assert isinstance(node, Scalar)
+    return node.value

@@ -1,0 +1,56 @@
+"""Trees written in YAML: read, checked and built. A library for editors and services, too.
+
+Importing this imports neither rclpy nor any message package.
+"""
+
+from bt_actions.document.find import TreeNotFoundError, find_tree, installed_trees
+from bt_actions.document.findings import (
+    DocumentError,
+    Finding,
+    Place,
+    Related,
+    Severity,
+    Span,
+)
+from bt_actions.document.inputs import InputError, TreeInput, parse_input
+from bt_actions.document.load import (
+    check_file,
+    check_source,
+    load_tree,
+    tree_inputs,
+    tree_outputs,
+)
+from bt_actions.document.rules import RULES, Rule
+from bt_actions.document.source import Source, read_source, source_of
+
+__all__ = [
+    "RULES",
+    "DocumentError",
+    "Finding",
+    "InputError",
+    "Place",
+    "Related",
+    "Rule",
+    "Severity",
+    "Source",
+    "Span",
+    "TreeInput",
+    "TreeNotFoundError",
+    "check_file",
+    "check_source",
+    "find_tree",
+    "installed_trees",
+    "load_tree",
+    "parse_input",
+    "place_of",
+    "read_source",
+    "source_of",
+    "tree_inputs",
+    "tree_outputs",
+]
+
+
+def place_of(behaviour: object) -> Place | None:
+    """Where a behaviour was written, or None for one that no document made."""
+    place = getattr(behaviour, "place", None)
+    return place if isinstance(place, Place) else None

@@ -1,0 +1,209 @@
+"""From a checked document to py_trees behaviours. Needs no ROS graph and starts nothing.
+
+`BUILDERS` has an entry for each kind of the model. Only documents without errors come here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import OneShotPolicy
+from py_trees.composites import Selector, Sequence
+from py_trees.decorators import FailureIsSuccess, Inverter, OneShot, SuccessIsFailure
+
+from bt_actions.behaviours.limits import Deadline, While
+from bt_actions.behaviours.loops import ForEach, Repeat, RetryChild
+from bt_actions.behaviours.parallel import Parallel
+from bt_actions.behaviours.subtree import Subtree
+from bt_actions.behaviours.topics import TopicValue
+from bt_actions.document.build_leaves import LEAVES, build_action
+from bt_actions.document.build_names import join_names, text_of
+from bt_actions.document.context import Context, plain_name, table_of, written_text
+from bt_actions.document.inputs import check_inputs
+from bt_actions.document.scope import Scope
+from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.values import resolve
+from bt_actions.expression import ExpressionError
+
+__all__ = ["BUILDERS", "build"]
+
+
+def build(
+    document: Document, scope: Scope, *, namespace: str = "", types: bool = True
+) -> Behaviour:
+    """The behaviours of a document; each has the place it was written at in `place`."""
+    assert document.root is not None
+    inner = join_names(namespace, document.namespace)
+    topics = {declared.name: _topic(declared, inner) for declared in document.topics.values()}
+    context = Context(document, scope, inner, types, topics)
+    root = _node(document.root, context)
+    if topics:
+        _connect(root, list(topics.values()))
+    return root
+
+
+def _topic(declared: Declared, namespace: str) -> TopicValue:
+    values: dict[str, Any] = declared.values
+    name = join_names(namespace, text_of(values, "namespace"), text_of(values, "topic"))
+    qos = text_of(values, "qos") or "default"
+    return TopicValue(declared.name, values["type"], name, qos, values.get("max_age"))
+
+
+def _connect(root: Behaviour, topics: list[TopicValue]) -> None:
+    """Subscribe when the tree is set up, and unsubscribe when it is shut down.
+
+    Any node may read a topic, foreign ones' children too; so the root of the document does it for
+    all, and no node is added to the tree.
+    """
+    set_up, shut_down = root.setup, root.shutdown
+
+    def setup(**kwargs: Any) -> None:
+        for topic in topics:
+            topic.connect(kwargs.get("node"))
+        set_up(**kwargs)
+
+    def shutdown() -> None:
+        shut_down()
+        for topic in topics:
+            topic.close()
+
+    root.setup = setup  # type: ignore[method-assign]
+    root.shutdown = shutdown  # type: ignore[method-assign]
+
+
+def _node(node: TreeNode, context: Context) -> Behaviour:
+    if node.alias is not None:
+        behaviour = build_action(node, context)
+    else:
+        assert node.kind is not None
+        behaviour = BUILDERS[node.kind.name](node, context)
+    behaviour.place = node.place  # type: ignore[attr-defined]
+    return behaviour
+
+
+def _children(node: TreeNode, context: Context) -> list[Behaviour]:
+    return [_node(child, context) for child in node.children]
+
+
+def _sequence(node: TreeNode, context: Context) -> Behaviour:
+    memory = node.values.get("memory", True) is True
+    return Sequence(node.name, memory, children=_children(node, context))
+
+
+def _fallback(node: TreeNode, context: Context) -> Behaviour:
+    memory = node.values.get("memory", True) is True
+    return Selector(node.name, memory, children=_children(node, context))
+
+
+def _parallel(node: TreeNode, context: Context) -> Behaviour:
+    policy = node.values.get("policy", "all")
+    needed = policy.get("at_least") if isinstance(policy, dict) else {"one": 1}.get(str(policy))
+    return Parallel(node.name, _children(node, context), at_least=needed)
+
+
+def _child(node: TreeNode, context: Context) -> Behaviour:
+    (child,) = node.children
+    return _node(child, context)
+
+
+def _retry(node: TreeNode, context: Context) -> Behaviour:
+    values: dict[str, Any] = node.values
+    given = {key: values[key] for key in ("backoff", "factor", "max_backoff") if key in values}
+    attempts = context.value(values["attempts"]) if "attempts" in values else None
+    return RetryChild(node.name, _child(node, context), attempts, **given)
+
+
+def _repeat(node: TreeNode, context: Context) -> Behaviour:
+    times = context.value(node.values["times"]) if "times" in node.values else None
+    return Repeat(node.name, _child(node, context), times)
+
+
+def _timeout(node: TreeNode, context: Context) -> Behaviour:
+    return Deadline(node.name, _child(node, context), context.value(node.values["after"]))
+
+
+def _around(make: Callable[..., Behaviour]) -> Callable[[TreeNode, Context], Behaviour]:
+    return lambda node, context: make(node.name, _child(node, context))
+
+
+def _once(name: str, child: Behaviour) -> Behaviour:
+    return OneShot(name, child, OneShotPolicy.ON_COMPLETION)
+
+
+def _for_each(node: TreeNode, context: Context) -> Behaviour:
+    values = node.values
+    item_name, index_name = text_of(values, "as") or "item", text_of(values, "index")
+
+    def begin(item: object, index: int) -> None:
+        context.scope.write(item_name, item)
+        if index_name:
+            context.scope.write(index_name, index)
+
+    keep_going = values.get("on_failure") == "continue"
+    items = context.value(values["in"])
+    return ForEach(node.name, _child(node, context), items, begin, keep_going=keep_going)
+
+
+def _while(node: TreeNode, context: Context) -> Behaviour:
+    name = node.name or plain_name(f"while {written_text(node)}")
+    return While(name, _child(node, context), context.holds(node.values["while"]))
+
+
+def _subtree(node: TreeNode, context: Context) -> Behaviour:
+    included = node.included
+    assert included is not None
+    scope = context.scope.inner(included.name)
+    namespace = join_names(context.namespace, text_of(node.values, "namespace"))
+    child = build(included, scope, namespace=namespace, types=context.types)
+    given = node.values.get("with", {})
+    saved = table_of(node.values.get("save"))
+    written = [declared.name for declared in included.outputs.values()]
+
+    def begin() -> None:
+        values = table_of(_resolved(given, context))
+        inputs = check_inputs(included, values, types=context.types)
+        for name in written:
+            if name not in inputs:
+                scope.clear(name)
+        scope.write_all(inputs)
+
+    def end() -> None:
+        for name, output in saved.items():
+            try:
+                value = scope.read(output)
+            except KeyError:
+                continue  # a tree that failed may have nothing to give
+            context.scope.write(name, value)
+
+    return Subtree(node.name or included.name, child, begin, end)
+
+
+def _resolved(written: object, context: Context) -> object:
+    try:
+        return resolve(written, context.read)
+    except ExpressionError as error:
+        raise ValueError(error.message) from None
+
+
+BUILDERS: Mapping[str, Callable[[TreeNode, Context], Behaviour]] = MappingProxyType(
+    {
+        **LEAVES,
+        "sequence": _sequence,
+        "fallback": _fallback,
+        "parallel": _parallel,
+        "retry": _retry,
+        "repeat": _repeat,
+        "timeout": _timeout,
+        "invert": _around(Inverter),
+        "force_success": _around(FailureIsSuccess),
+        "force_failure": _around(SuccessIsFailure),
+        "run_once": _around(_once),
+        "for_each": _for_each,
+        "while": _while,
+        "subtree": _subtree,
+    }
+)
+"""What makes a behaviour of each kind of node."""

@@ -1,0 +1,184 @@
+"""The leaves of a tree as py_trees behaviours, by the names of their kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Failure, Running, Success
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.check import Check
+from bt_actions.behaviours.doing import Log, SetValues
+from bt_actions.behaviours.service import CallService
+from bt_actions.behaviours.topics import Publish, WaitForMessage
+from bt_actions.behaviours.waiting import Wait, WaitUntil
+from bt_actions.document.build_names import settings_of, text_of
+from bt_actions.document.classes import find_behaviour
+from bt_actions.document.context import Context, plain_name, table_of, written_text
+from bt_actions.document.tree import TreeNode
+from bt_actions.document.values import Computed, computed_in
+from bt_actions.policy import Retry, Timeouts
+
+__all__ = ["LEAVES", "build_action"]
+
+
+def build_action(node: TreeNode, context: Context) -> Behaviour:
+    """The behaviour of an action, by its name in the document or in place."""
+    settings = settings_of(node, context.document)
+    retry = dict(table_of(settings.get("retry")))
+    retry["when"] = context.condition(retry.get("when"), "result")
+    if "outcomes" in retry:
+        retry["outcomes"] = frozenset(retry["outcomes"])
+    goal = settings.get("goal", {})
+    dynamic = any(True for _ in computed_in(goal))
+    save = {
+        context.scope.key(name): place.expression.text
+        for name, place in table_of(settings.get("save")).items()
+    }
+    resources: Any = settings.get("resources")
+    return ActionBehaviour(
+        node.name,
+        _interface(settings["type"], "action", context),
+        context.name(settings, "server"),
+        context.value(goal) if dynamic else goal,
+        timeout=Timeouts(**table_of(settings.get("timeout"))),
+        retry=Retry(**retry),
+        expect=context.condition(settings.get("expect"), "result"),
+        save=save,
+        busy=text_of(settings, "busy") or "wait",
+        resources=resources,
+    )
+
+
+def _interface(name: object, kind: str, context: Context) -> Any:
+    if not context.types:
+        return name
+    from bt_actions.ros.interfaces import interface
+
+    return interface(str(name), kind)  # type: ignore[arg-type]
+
+
+def _check(node: TreeNode, context: Context) -> Behaviour:
+    written = node.values["check"]
+    assert isinstance(written, Computed)
+    name = node.name or plain_name(written.expression.text)
+    return Check(name, written.expression, variable=context.read)
+
+
+def _saver(node: TreeNode, context: Context, root: str) -> Callable[[Any], None] | None:
+    """What keeps parts of an answer or a message, as `save` says."""
+    saved = table_of(node.values.get("save"))
+    if not saved:
+        return None
+
+    def save(given: Any) -> None:
+        context.write(
+            {
+                name: place.expression.evaluate({root: given}, context.read)
+                for name, place in saved.items()
+            }
+        )
+
+    return save
+
+
+def _service(node: TreeNode, context: Context) -> Behaviour:
+    values = node.values
+    timeout = table_of(values.get("timeout"))
+    retry = dict(table_of(values.get("retry")))
+    retry["when"] = context.condition(retry.get("when"), "result")
+    return CallService(
+        node.name,
+        _interface(values["type"], "srv", context),
+        context.name(values, "server"),
+        context.value(values.get("request", {})),
+        server=timeout.get("server", 5.0),
+        response=timeout.get("response", 5.0),
+        retry=Retry(**retry),
+        expect=context.condition(values.get("expect"), "result"),
+        save=_saver(node, context, "result"),
+    )
+
+
+def _publish(node: TreeNode, context: Context) -> Behaviour:
+    values = node.values
+    return Publish(
+        node.name or plain_name(f"publish {text_of(values, 'publish')}"),
+        _interface(values["type"], "msg", context),
+        context.name(values, "publish"),
+        context.value(values.get("message", {})),
+        qos=text_of(values, "qos") or "default",
+    )
+
+
+def _wait_for_message(node: TreeNode, context: Context) -> Behaviour:
+    values = node.values
+    timeout: Any = values.get("timeout")
+    return WaitForMessage(
+        node.name,
+        _interface(values["type"], "msg", context),
+        context.name(values, "topic"),
+        qos=text_of(values, "qos") or "default",
+        until=context.condition(values.get("until"), "message"),
+        timeout=timeout,
+        save=_saver(node, context, "message"),
+    )
+
+
+def _wait(node: TreeNode, context: Context) -> Behaviour:
+    name = node.name or plain_name(f"wait {written_text(node)}")
+    return Wait(name, context.value(node.values["wait"]))
+
+
+def _wait_until(node: TreeNode, context: Context) -> Behaviour:
+    name = node.name or plain_name(f"wait until {written_text(node)}")
+    timeout: Any = node.values.get("timeout")
+    return WaitUntil(name, context.holds(node.values["wait_until"]), timeout)
+
+
+def _set(node: TreeNode, context: Context) -> Behaviour:
+    written = table_of(node.values["set"])
+    name = node.name or plain_name(f"set {', '.join(written)}")
+    compute = context.value(written)
+    return SetValues(name, lambda: table_of(compute()), context.write)
+
+
+def _log(node: TreeNode, context: Context) -> Behaviour:
+    name = node.name or plain_name(f"log {written_text(node)}")
+    level = text_of(node.values, "level") or "info"
+    return Log(name, context.value(node.values["log"]), level)
+
+
+def _python(node: TreeNode, _context: Context) -> Behaviour:
+    path = text_of(node.values, "python")
+    arguments = table_of(node.values.get("arguments"))
+    return find_behaviour(path)(name=node.name or path.rpartition(".")[2], **arguments)
+
+
+def _plain(
+    make: Callable[..., Behaviour], default: str
+) -> Callable[[TreeNode, Context], Behaviour]:
+    return lambda node, _context: make(name=node.name or default)
+
+
+LEAVES: Mapping[str, Callable[[TreeNode, Context], Behaviour]] = MappingProxyType(
+    {
+        "action": build_action,
+        "service": _service,
+        "publish": _publish,
+        "wait_for_message": _wait_for_message,
+        "wait": _wait,
+        "wait_until": _wait_until,
+        "check": _check,
+        "set": _set,
+        "log": _log,
+        "python": _python,
+        "success": _plain(Success, "success"),
+        "failure": _plain(Failure, "failure"),
+        "running": _plain(Running, "running"),
+    }
+)
+"""What makes a behaviour of each kind of leaf but `subtree`."""

@@ -1,0 +1,55 @@
+"""Settings and ROS names as they come out for a node, for building and for looking ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bt_actions.document.tree import Document, TreeNode
+from bt_actions.document.workspace import merged
+
+__all__ = ["join_names", "resources_below", "settings_of", "text_of"]
+
+
+def text_of(values: Mapping[str, object], key: str) -> str:
+    """A text as it is, and anything else as an empty one."""
+    value = values.get(key)
+    return value if isinstance(value, str) else ""
+
+
+def join_names(*parts: str) -> str:
+    """ROS names put together; an absolute one begins anew."""
+    joined = ""
+    for part in parts:
+        trimmed = part if part == "/" else part.rstrip("/")
+        if trimmed.startswith("/") or not joined:
+            joined = trimmed
+        elif trimmed:
+            joined = f"{joined.rstrip('/')}/{trimmed}"
+    return joined
+
+
+def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
+    """A node's settings over its alias's over the document's defaults, key by key."""
+    declared = document.actions.get(node.alias) if node.alias is not None else None
+    shared = declared.values if declared is not None else {}
+    return merged(merged(document.defaults, shared), node.values)
+
+
+def resources_below(root: TreeNode, document: Document, namespace: str = "") -> dict[str, TreeNode]:
+    """What the actions of a subtree hold while they run, with the first node that does."""
+    found: dict[str, TreeNode] = {}
+    inner = join_names(namespace, document.namespace)
+    for node in root.walk():
+        if node.included is not None and node.included.root is not None:
+            below = join_names(inner, text_of(node.values, "namespace"))
+            for name in resources_below(node.included.root, node.included, below):
+                found.setdefault(name, node)
+        elif node.alias is not None or (node.kind is not None and node.kind.name == "action"):
+            settings = settings_of(node, document)
+            if settings.get("busy") == "share":
+                continue
+            given = settings.get("resources")
+            server = join_names(inner, text_of(settings, "namespace"), text_of(settings, "server"))
+            for name in given if isinstance(given, list) and given else [server]:
+                found.setdefault(str(name), node)
+    return found

@@ -1,0 +1,353 @@
+"""The checker of names and types: what the form alone cannot tell.
+
+`check_document` reports to the documents' own sources. With `types=False` nothing of ROS is
+imported, and what would need it is taken for granted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+from typing import NamedTuple
+
+from bt_actions.document.findings import Related
+from bt_actions.document.infer import BOOL, TEXT, infer, named
+from bt_actions.document.inputs import refuse_infinite
+from bt_actions.document.nodes import Mapping, Node, Scalar, span_of
+from bt_actions.document.shape import report_braces
+from bt_actions.document.source import Source
+from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.types import TypeNameError, fits, interface_of, parse_type
+from bt_actions.document.values import (
+    BAD,
+    Computed,
+    Interpolated,
+    computed_in,
+    inner_span,
+    locate,
+    names_file,
+)
+from bt_actions.document.writes import Write, writes_of
+from bt_actions.ros.fields import FieldType, Message
+from bt_actions.suggest import did_you_mean, listing
+
+__all__ = ["Checker", "Read"]
+
+
+class Read(NamedTuple):
+    """A variable that an expression reads, and where."""
+
+    name: str
+    computed: Computed
+    start: int
+    end: int
+
+
+Types = MappingType[str, FieldType | None]
+
+
+class Checker:
+    """Checks one document; the trees that it includes are checked by their own."""
+
+    def __init__(self, document: Document, *, types: bool, python: bool = True) -> None:
+        """With `python=False` a ``python:`` node is an error, and its module is not imported."""
+        self.document = document
+        self.source = document.source
+        self.types = types
+        self.python = python
+        self.variables: dict[str, FieldType | None] = {}
+        self.declared_at: dict[str, Declared] = {}
+        self.reads: dict[int, list[Read]] = {}
+        """What each node reads, by the node's id; an alias's own reads under the alias's."""
+        self._reader: object = document
+        self._writes: dict[int, tuple[Write, ...]] = {}
+        self._interfaces: dict[str, type | None] = {}
+
+    def check(self) -> None:
+        """Report everything that is wrong with names and types."""
+        self._declarations()
+        self._collect()
+        for declared in self.document.actions.values():
+            self._reader = declared
+            if declared.source is self.source:
+                self._alias(declared)
+            else:
+                self._imported(declared)
+        for node in self.document.nodes():
+            self._reader = node
+            self._node(node)
+
+    # What is declared
+
+    def _declarations(self) -> None:
+        document = self.document
+        for table in (document.inputs, document.outputs, document.topics):
+            for name, declared in table.items():
+                kind = self._declared_type(declared, topic=table is document.topics)
+                earlier = self.declared_at.get(name)
+                if earlier is not None:
+                    own, other = declared, earlier
+                    if declared.source is not self.source:
+                        own, other = earlier, declared
+                    self.source.report(
+                        "BT216", span_of(own.key), f"{name!r} is declared twice",
+                        related=Related(other.place, "first here"),
+                    )  # fmt: skip
+                    self.variables[name] = None
+                    continue
+                self.declared_at[name] = declared
+                self.variables[name] = kind
+        for declared in document.inputs.values():
+            default = declared.values.get("default")
+            if "default" in declared.values and default is not BAD:
+                self._default(declared, default)
+
+    def _declared_type(self, declared: Declared, *, topic: bool) -> FieldType | None:
+        text = declared.values.get("type")
+        if not isinstance(text, str):
+            return None
+        if topic:
+            cls = self.interface(text, "msg", declared.written("type"), declared.source)
+            return Message(cls) if cls is not None else None
+        try:
+            return parse_type(text, types=self.types)
+        except TypeNameError as error:
+            code = "BT205" if error.missing else "BT207"
+            self.source.report(code, span_of(declared.written("type")), str(error))
+            return None
+
+    def _default(self, declared: Declared, default: object) -> None:
+        node = declared.written("default")
+        for computed in computed_in(default):
+            self.source.report(
+                "BT204", span_of(computed.node), "a default is a plain value: it can read nothing"
+            )
+            return
+        kind = self.variables.get(declared.name)
+        if kind is not None:
+            self.value(kind, default, node)
+        try:
+            refuse_infinite(default)
+        except ValueError as error:
+            self.source.report("BT110", span_of(node), str(error))
+
+    def interface(
+        self, name: str, kind: str, node: Node, source: Source | None = None
+    ) -> type | None:
+        """The class of a type name, or None after reporting (or when types are not checked).
+
+        What is written in another source is reported by the checker of that one.
+        """
+        if not self.types:
+            return None
+        known = f"{kind}:{name}"
+        if known not in self._interfaces:
+            try:
+                self._interfaces[known] = interface_of(name, kind)  # type: ignore[arg-type]
+            except TypeNameError as error:
+                self._interfaces[known] = None
+                if source is None or source is self.source:
+                    self.source.report("BT205", span_of(node), str(error))
+        return self._interfaces[known]
+
+    def writes_of(self, node: TreeNode) -> tuple[Write, ...]:
+        """The variables that a node writes."""
+        return self._writes.get(id(node), ())
+
+    def _collect(self) -> None:
+        """The variables that nodes write, with their types as far as they are known."""
+        written: list[Write] = []
+        for node in self.document.nodes():
+            writes = tuple(writes_of(node, self.document))
+            if writes:
+                self._writes[id(node)] = writes
+                written += writes
+        for write in written:
+            self.variables.setdefault(write.name, None)
+        # Twice, since a value may be computed from one that is written further down.
+        for _ in range(2):
+            open_ones = [write for write in written if self.variables[write.name] is None]
+            for write in open_ones:
+                self.variables[write.name] = write.type_in(self)
+
+    # Nodes
+
+    def _alias(self, declared: Declared) -> None:
+        if not isinstance(declared.node, Mapping):
+            return
+        self._action(declared.values, declared.node, declared)
+
+    def _imported(self, declared: Declared) -> None:
+        """What an imported action reads must be there in this document, too."""
+        node = self.document.node.get("import")
+        for computed in computed_in(declared.values.get("goal")):
+            for name, (start, end) in computed.expression.variable_spans:
+                read = Read(name, computed, start, end)
+                self.reads.setdefault(id(declared), []).append(read)
+                if name not in self.variables and node is not None:
+                    text = f"the imported action {declared.name!r} reads ${name}, which is not here"
+                    related = Related(declared.place, "declared here")
+                    self.source.report("BT202", span_of(node), text, related=related)
+
+    def _node(self, node: TreeNode) -> None:
+        if node.alias is not None:
+            declared = self.document.actions.get(node.alias)
+            if declared is not None:
+                self._action(node.values, node.node, declared)
+            return
+        if node.kind is None:
+            return
+        from bt_actions.document.check_kinds import CHECKS
+
+        check = CHECKS.get(node.kind.name)
+        if check is not None:
+            check(self, node)
+
+    def action_class(self, declared: Declared) -> type | None:
+        """The class of the action that a name stands for."""
+        text = declared.values.get("type")
+        if not isinstance(text, str):
+            return None
+        return self.interface(text, "action", declared.written("type"), declared.source)
+
+    def _action(self, values: dict[str, object], node: Mapping, declared: Declared) -> None:
+        cls = self.action_class(declared)
+        self.call(
+            values, node,
+            request=None if cls is None else Message(cls.Goal),  # type: ignore[attr-defined]
+            result=None if cls is None else Message(cls.Result),  # type: ignore[attr-defined]
+            request_key="goal",
+        )  # fmt: skip
+
+    def call(
+        self,
+        values: dict[str, object],
+        node: Mapping,
+        *,
+        request: FieldType | None,
+        result: FieldType | None,
+        request_key: str,
+    ) -> None:
+        """Check what an action and a service have in common."""
+        written = node.get(request_key)
+        if request_key in values and written is not None:
+            self.value(request, values[request_key], written)
+        roots = {"result": result}
+        retry = values.get("retry")
+        conditions = [values.get("expect"), retry.get("when") if isinstance(retry, dict) else None]
+        for condition in conditions:
+            self.condition(condition, roots)
+        self.save(values.get("save"), roots)
+
+    def save(self, saved: object, roots: Types) -> None:
+        """Check the places that names are kept from, and that they fit what is declared."""
+        if not isinstance(saved, dict):
+            return
+        for name, place in saved.items():
+            if not isinstance(place, Computed):
+                continue
+            kind = self.expression(place, roots)
+            self.assigns(name, kind, place.node)
+
+    def assigns(self, name: str, kind: FieldType | None, node: Node) -> None:
+        """Check that a value of a type may be written to a variable."""
+        declared = self.declared_at.get(name)
+        if declared is None:
+            return
+        if name in self.document.topics:
+            message = f"{name!r} is a topic: nothing can be written to it"
+            related = Related(declared.place, "declared here")
+            self.source.report("BT204", span_of(node), message, related=related)
+            return
+        wanted = self.variables.get(name)
+        if not fits(kind, wanted):
+            self.source.report(
+                "BT204", span_of(node), f"{name!r} is {named(wanted)}, and this is {named(kind)}",
+                related=Related(declared.place, "declared here"),
+            )  # fmt: skip
+
+    # Values
+
+    def value(self, kind: FieldType | None, value: object, node: Node) -> None:
+        """Check a value against the type it must have; without one, only what it reads."""
+        if value is BAD:
+            return
+        if kind is None:
+            for computed in computed_in(value):
+                self.expression(computed, {})
+            return
+
+        from bt_actions.ros.messages import examine
+
+        def hole(item: object, wanted: FieldType, _path: tuple[str | int, ...]) -> bool:
+            if isinstance(item, Computed):
+                given = self.expression(item, {})
+                if not fits(given, wanted):
+                    said = item.expression.text.strip()
+                    text = f"{named(wanted)} is needed, and {said} is {named(given)}"
+                    self.source.report("BT204", span_of(item.node), text)
+                return True
+            if isinstance(item, Interpolated):
+                for part in computed_in(item):
+                    self.expression(part, {})
+                if not fits(TEXT, wanted):
+                    text = f"{named(wanted)} is needed, and this is a text"
+                    self.source.report("BT204", span_of(item.node), text)
+                return True
+            return item is BAD
+
+        for problem in examine(kind, value, hole):
+            at = locate(node, problem.path, at_key=problem.at_key)
+            if report_braces(at, self.source):
+                continue
+            code = "BT203" if problem.at_key else "BT204"
+            text = problem.text
+            if isinstance(at, Scalar) and names_file(at.text):
+                text = f"{at.text}: {problem}"
+            self.source.report(code, span_of(at), text, hint=_trap(at))
+
+    def condition(self, value: object, roots: Types) -> None:
+        """Check an expression that must be true or false."""
+        if not isinstance(value, Computed):
+            return
+        kind = self.expression(value, roots)
+        if kind is not None and kind != BOOL:
+            text = f"a condition is true or false, and this is {named(kind)}"
+            self.source.report("BT206", span_of(value.node), text)
+
+    def expression(self, computed: Computed, roots: Types) -> FieldType | None:
+        """Check what an expression reads and does; return its type, or None."""
+        expression = computed.expression
+        for name, (start, end) in expression.variable_spans:
+            self.reads.setdefault(id(self._reader), []).append(Read(name, computed, start, end))
+            if name not in self.variables:
+                self._unknown(name, computed, start, end)
+        if not self.types and not roots and not expression.names:
+            return None
+
+        def report(code: str, message: str, start: int, end: int) -> None:
+            span = inner_span(
+                computed.node, self.source, computed.start + start, computed.start + end
+            )
+            self.source.report(code, span, message)
+
+        return infer(expression, roots, self.variables.get, report)
+
+    def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
+        if self.document.node.get("root") is None:
+            return  # a library's words are read with the names of whoever imports it
+        span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
+        near = did_you_mean(name, self.variables).replace("mean '", "mean '$")
+        hint = None
+        if not near:
+            known = listing(f"${known}" for known in self.variables)
+            hint = (
+                f"this tree has {known}" if known else "this tree has no inputs and saves nothing"
+            )
+        self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
+
+
+def _trap(node: Node) -> str | None:
+    """What YAML may have made of what was meant."""
+    if isinstance(node, Scalar) and node.text in ("on", "off", "yes", "no"):
+        return "YAML 1.2 reads this as a text: write true or false"
+    return None

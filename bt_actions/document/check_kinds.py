@@ -1,0 +1,239 @@
+"""What there is to check about each kind of node, beyond its form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from bt_actions.document.findings import Related
+from bt_actions.document.infer import FLOAT, INTEGER, named
+from bt_actions.document.nodes import Mapping as YamlMapping
+from bt_actions.document.nodes import span_of
+from bt_actions.document.tree import TreeNode
+from bt_actions.document.types import TypeNameError, fits, parse_type
+from bt_actions.document.values import BAD, Computed, computed_in, locate
+from bt_actions.ros.fields import FieldType, Listing, Message
+from bt_actions.suggest import did_you_mean, listing
+
+if TYPE_CHECKING:
+    from bt_actions.document.check import Checker
+
+__all__ = ["CHECKS"]
+
+
+def _subtree(checker: Checker, node: TreeNode) -> None:
+    included = node.included
+    given = node.values.get("with")
+    written = node.written.get("with")
+    if included is None:
+        if isinstance(given, dict) and written is not None:
+            checker.value(None, given, written)
+        return
+    if isinstance(given, dict) and isinstance(written, YamlMapping):
+        for key, inner in written.pairs:
+            declared = included.inputs.get(key.text)
+            if declared is None:
+                near = did_you_mean(key.text, included.inputs)
+                known = listing(included.inputs)
+                hint = (
+                    None if near else (f"its inputs are {known}" if known else "it has no inputs")
+                )
+                checker.source.report(
+                    "BT212", span_of(key),
+                    f"the tree {included.name!r} has no input {key.text!r}{near}", hint=hint,
+                )  # fmt: skip
+                checker.value(None, given.get(key.text), inner)
+                continue
+            text = declared.values.get("type")
+            kind = None
+            if isinstance(text, str):
+                try:
+                    kind = parse_type(text, types=checker.types)
+                except TypeNameError:
+                    kind = None  # reported where it is declared
+            checker.value(kind, given.get(key.text), inner)
+    if given is not BAD and (given is None or isinstance(given, dict)):
+        for name, declared in included.inputs.items():
+            if "default" not in declared.values and name not in (given or {}):
+                checker.source.report(
+                    "BT211", span_of(node.key),
+                    f"the tree {included.name!r} needs the input {name!r}",
+                    hint=f"with: {{{name}: ...}}",
+                    related=Related(declared.place, "declared here"),
+                )  # fmt: skip
+    _outputs(checker, node)
+
+
+def _outputs(checker: Checker, node: TreeNode) -> None:
+    included, saved = node.included, node.values.get("save")
+    written = node.written.get("save")
+    if included is None or not isinstance(saved, dict) or not isinstance(written, YamlMapping):
+        return
+    for key, inner in written.pairs:
+        output = saved.get(key.text)
+        if not isinstance(output, str):
+            continue
+        declared = included.outputs.get(output)
+        if declared is None:
+            near = did_you_mean(output, included.outputs)
+            known = listing(included.outputs)
+            hint = None if near else (f"its outputs are {known}" if known else "it has no outputs")
+            checker.source.report(
+                "BT213", span_of(inner),
+                f"the tree {included.name!r} has no output {output!r}{near}", hint=hint,
+            )  # fmt: skip
+            continue
+        text = declared.values.get("type")
+        if isinstance(text, str):
+            try:
+                checker.assigns(key.text, parse_type(text, types=checker.types), inner)
+            except TypeNameError:
+                continue  # reported where it is declared
+
+
+def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
+    return lambda checker, node: checker.condition(node.values.get(key), {})
+
+
+def _number_of(key: str, wanted: FieldType) -> Callable[[Checker, TreeNode], None]:
+    def check(checker: Checker, node: TreeNode) -> None:
+        value = node.values.get(key)
+        if not isinstance(value, Computed):
+            return
+        given = checker.expression(value, {})
+        if not fits(given, wanted):
+            text = f"{named(wanted)} is needed, and this is {named(given)}"
+            checker.source.report("BT204", span_of(value.node), text)
+
+    return check
+
+
+def _for_each(checker: Checker, node: TreeNode) -> None:
+    items = node.values.get("in")
+    if isinstance(items, Computed):
+        kind = checker.expression(items, {})
+        if kind is not None and not isinstance(kind, Listing):
+            text = f"a list is needed, and this is {named(kind)}"
+            checker.source.report("BT204", span_of(items.node), text)
+    elif "in" in node.written:
+        checker.value(None, items, node.written["in"])
+
+
+def _action(checker: Checker, node: TreeNode) -> None:
+    name = node.values.get("type")
+    cls = checker.interface(name, "action", node.written["type"]) if isinstance(name, str) else None
+    checker.call(
+        node.values, node.node,
+        request=None if cls is None else Message(cls.Goal),  # type: ignore[attr-defined]
+        result=None if cls is None else Message(cls.Result),  # type: ignore[attr-defined]
+        request_key="goal",
+    )  # fmt: skip
+
+
+def _service(checker: Checker, node: TreeNode) -> None:
+    name = node.values.get("type")
+    cls = checker.interface(name, "srv", node.written["type"]) if isinstance(name, str) else None
+    checker.call(
+        node.values, node.node,
+        request=None if cls is None else Message(cls.Request),  # type: ignore[attr-defined]
+        result=None if cls is None else Message(cls.Response),  # type: ignore[attr-defined]
+        request_key="request",
+    )  # fmt: skip
+
+
+def _publish(checker: Checker, node: TreeNode) -> None:
+    name = node.values.get("type")
+    cls = checker.interface(name, "msg", node.written["type"]) if isinstance(name, str) else None
+    if "message" in node.values:
+        kind = None if cls is None else Message(cls)
+        checker.value(kind, node.values["message"], node.written["message"])
+
+
+def _wait_for_message(checker: Checker, node: TreeNode) -> None:
+    name = node.values.get("type")
+    cls = checker.interface(name, "msg", node.written["type"]) if isinstance(name, str) else None
+    roots = {"message": None if cls is None else Message(cls)}
+    checker.condition(node.values.get("until"), roots)
+    checker.save(node.values.get("save"), roots)
+
+
+def _set(checker: Checker, node: TreeNode) -> None:
+    values, written = node.values.get("set"), node.written.get("set")
+    if not isinstance(values, dict) or not isinstance(written, YamlMapping):
+        return
+    for key, inner in written.pairs:
+        if key.text not in values:
+            continue
+        value = values[key.text]
+        declared = checker.declared_at.get(key.text)
+        if declared is not None and key.text in checker.document.topics:
+            checker.assigns(key.text, None, key)
+            continue
+        kind = checker.variables.get(key.text) if declared is not None else None
+        checker.value(kind, value, inner)
+
+
+def _parallel(checker: Checker, node: TreeNode) -> None:
+    policy = node.values.get("policy")
+    least = policy.get("at_least") if isinstance(policy, dict) else None
+    if isinstance(least, int) and least > len(node.children) > 0:
+        at = locate(node.written["policy"], ("at_least",))
+        text = f"{least} children can never succeed: there are {len(node.children)}"
+        checker.source.report("BT110", span_of(at), text)
+
+
+def _log(checker: Checker, node: TreeNode) -> None:
+    checker.value(None, node.values.get("log"), node.written["log"])
+
+
+def _python(checker: Checker, node: TreeNode) -> None:
+    path, arguments = node.values.get("python"), node.values.get("arguments", {})
+    if not checker.python:
+        text = "python: is not allowed here, because it runs code that the tree names"
+        checker.source.report("BT214", span_of(node.key), text)
+        return
+    for computed in computed_in(arguments):
+        text = "an argument is a plain value: the class is made before the tree runs"
+        checker.source.report("BT204", span_of(computed.node), text)
+        return
+    if not isinstance(path, str) or not checker.types:
+        return
+    from bt_actions.document.classes import ClassError, find_behaviour, wrong_arguments
+
+    try:
+        cls = find_behaviour(path)
+    except ClassError as error:
+        checker.source.report("BT214", span_of(node.written["python"]), str(error))
+        return
+    if not isinstance(arguments, dict):
+        return
+    wrong = wrong_arguments(cls, arguments)
+    if wrong is not None:
+        name, text = wrong
+        at = node.key if not name else locate(node.written["arguments"], (name,), at_key=True)
+        checker.source.report("BT215", span_of(at), text)
+
+
+CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
+    {
+        "action": _action,
+        "check": _condition_of("check"),
+        "for_each": _for_each,
+        "log": _log,
+        "parallel": _parallel,
+        "publish": _publish,
+        "python": _python,
+        "repeat": _number_of("times", INTEGER),
+        "retry": _number_of("attempts", INTEGER),
+        "service": _service,
+        "set": _set,
+        "subtree": _subtree,
+        "timeout": _number_of("after", FLOAT),
+        "wait": _number_of("wait", FLOAT),
+        "wait_for_message": _wait_for_message,
+        "wait_until": _condition_of("wait_until"),
+        "while": _condition_of("while"),
+    }
+)
+"""The checks by the name of the kind."""

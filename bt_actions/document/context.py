@@ -1,0 +1,104 @@
+"""What a node is built in: its document, its variables, its namespace. Builds nothing itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bt_actions.behaviours.topics import TopicValue
+from bt_actions.document.build_names import join_names, text_of
+from bt_actions.document.inputs import convert
+from bt_actions.document.nodes import Scalar
+from bt_actions.document.scope import Scope
+from bt_actions.document.tree import Document, TreeNode
+from bt_actions.document.values import Computed, resolve
+from bt_actions.expression import Expression
+
+__all__ = ["Condition", "Context", "plain_name", "table_of", "written_text"]
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a node is built in: its document, its variables, its namespace."""
+
+    document: Document
+    scope: Scope
+    namespace: str
+    types: bool
+    topics: Mapping[str, TopicValue]
+
+    def read(self, name: str) -> object:
+        """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.
+
+        A topic's name is a variable, too: the latest message.
+        """
+        topic = self.topics.get(name)
+        return self.scope.read(name) if topic is None else topic.read()
+
+    def write(self, values: Mapping[str, object]) -> None:
+        """Give variables their values, as the declared ones' types want them; all or none."""
+        declared = {**self.document.inputs, **self.document.outputs}
+        converted = {}
+        for name, value in values.items():
+            kind = declared[name].values.get("type") if name in declared else None
+            try:
+                fitting = convert(value, kind, types=self.types) if isinstance(kind, str) else value
+            except ValueError as error:
+                raise ValueError(f"{name}: {error}") from None
+            converted[name] = fitting
+        self.scope.write_all(converted)
+
+    def name(self, values: Mapping[str, object], key: str) -> str:
+        """A ROS name in the namespaces that hold here."""
+        return join_names(self.namespace, text_of(values, "namespace"), text_of(values, key))
+
+    def value(self, written: object) -> Callable[[], object]:
+        """A function that computes a value as it stands in the document."""
+        return lambda: resolve(written, self.read)
+
+    def condition(self, written: object, root: str | None = None) -> Callable[[Any], bool] | None:
+        """A condition over a bare root as a function of it."""
+        if not isinstance(written, Computed):
+            return None
+        return Condition(written.expression, root, self.read)
+
+    def holds(self, written: object) -> Callable[[], bool]:
+        """A condition over variables alone as a function, which raises ExpressionError."""
+        assert isinstance(written, Computed)
+        return lambda: written.expression.holds({}, self.read)
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """An expression as a function of its bare root; `text` says what was expected."""
+
+    expression: Expression
+    root: str | None
+    read: Callable[[str], object]
+
+    @property
+    def text(self) -> str:
+        """The condition as it was written."""
+        return self.expression.text
+
+    def __call__(self, given: Any) -> bool:
+        """Whether it holds; raises ExpressionError."""
+        return self.expression.holds({} if self.root is None else {self.root: given}, self.read)
+
+
+def table_of(value: object) -> dict[str, Any]:
+    """A mapping as it is, and anything else as an empty one."""
+    return value if isinstance(value, dict) else {}
+
+
+def plain_name(text: str) -> str:
+    """A text as a node's name: one line, no colon."""
+    line = " ".join(text.split()).replace(":", ";")
+    return line if len(line) <= 60 else f"{line[:57]}..."
+
+
+def written_text(node: TreeNode) -> str:
+    """What stands behind the kind's key, in the text's own words."""
+    written = node.written[node.key.text]
+    return written.text if isinstance(written, Scalar) else ""

@@ -1,0 +1,117 @@
+"""What is wrong with a document, and where: values, and the one error that carries them.
+
+A finding is complete when it is made: it holds the source line, so that it can be shown after the
+file has changed or when it came from standard input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+__all__ = ["DocumentError", "Finding", "Place", "Related", "Severity", "Span"]
+
+
+class Place(NamedTuple):
+    """A position in a file; line and column count from 1."""
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+class Span(NamedTuple):
+    """A range in a text; lines and columns count from 1, the end column is one past the last."""
+
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+
+class Severity(StrEnum):
+    """Whether a tree with this finding can run."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+@dataclass(frozen=True, slots=True)
+class Related:
+    """A second place that helps to understand a finding ("declared here")."""
+
+    place: Place
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing wrong. Lines and columns count from 1; `end_column` is one past the last."""
+
+    file: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+    code: str
+    severity: Severity
+    message: str
+    hint: str | None = None
+    related: Related | None = None
+    source_line: str | None = None
+
+    @property
+    def place(self) -> Place:
+        return Place(self.file, self.line, self.column)
+
+    def headline(self) -> str:
+        """``trees/x.yaml:14:17: error[BT203]: MoveRobot.Goal has no field 'distnace'``"""
+        return f"{self.place}: {self.severity}[{self.code}]: {self.message}"
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, width: int = 200) -> str:
+        """As a compiler prints it; the source line is cut to `width` columns."""
+        lines = [self.headline()]
+        if self.source_line is not None:
+            lines += _excerpt(self, width)
+        if self.hint:
+            lines.append(f"  hint: {self.hint}")
+        if self.related is not None:
+            lines.append(f"  {self.related.place}: {self.related.message}")
+        return "\n".join(lines)
+
+
+class DocumentError(ValueError):
+    """A document that cannot be used; `findings` holds everything that is wrong with it.
+
+    The fault is the document's author's. The text reads like a compiler's output.
+    """
+
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self.findings: Sequence[Finding] = tuple(findings)
+        super().__init__("\n".join(str(finding) for finding in self.findings))
+
+
+def _excerpt(finding: Finding, width: int) -> list[str]:
+    """The source line with a caret under the exact range, cut where it is very long."""
+    text = (finding.source_line or "").replace("\t", " ")
+    gutter = " " * len(str(finding.line))
+    room = max(20, width - len(gutter) - len("  | "))
+    start = finding.column - 1
+    end = finding.end_column - 1 if finding.end_line == finding.line else len(text)
+    skipped = 0 if max(start + 1, min(end, len(text))) <= room else max(0, start - room // 2)
+    shown = text[skipped : skipped + room]
+    if skipped:
+        shown = f"…{shown[1:]}"
+    if skipped + room < len(text):
+        shown = f"{shown[:-1]}…"
+    start, end = start - skipped, min(end - skipped, len(shown))
+    carets = "^" * max(1, end - start)
+    return [f" {finding.line} | {shown}".rstrip(), f" {gutter} | {' ' * start}{carets}"]

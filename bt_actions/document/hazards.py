@@ -1,0 +1,252 @@
+"""Hazards: what is allowed, and likely to go wrong on a robot. Each is a warning with a code.
+
+Looks at one checked document (and at what it includes, where a hazard spans both).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+
+from bt_actions.document.build_names import resources_below, settings_of
+from bt_actions.document.check import Checker
+from bt_actions.document.findings import Related, Span
+from bt_actions.document.nodes import Mapping, span_of
+from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.values import inner_span
+from bt_actions.document.verdicts import Verdicts, budget
+
+__all__ = ["find_hazards"]
+
+_LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
+_BUSY = frozenset(
+    {"action", "service", "wait", "wait_until", "wait_for_message", "running", "python"}
+)
+
+
+def find_hazards(checker: Checker) -> None:
+    """Report the hazards of a document that was checked."""
+    document = checker.document
+    if document.root is None:
+        return
+    _Hazards(checker).look(document.root)
+
+
+class _Hazards:
+    def __init__(self, checker: Checker) -> None:
+        self._checker = checker
+        self._document: Document = checker.document
+        self._source = checker.source
+        self._verdicts = Verdicts()
+        self._unbounded: dict[str, TreeNode] = {}
+        self._used: set[str] = set()
+
+    def look(self, root: TreeNode) -> None:
+        self._walk(root, bounded=False)
+        self._result_timeouts()
+        self._order(root)
+        self._unused()
+
+    def _report(self, code: str, span: Span, message: str, **more: object) -> None:
+        self._source.report(code, span, message, **more)  # type: ignore[arg-type]
+
+    def _walk(self, root: TreeNode, *, bounded: bool) -> None:
+        stack = [(root, bounded)]
+        while stack:
+            node, inside = stack.pop()
+            kind = node.kind.name if node.kind is not None else ""
+            if node.alias is not None:
+                self._used.add(node.alias)
+            if node.alias is not None or kind == "action":
+                if not inside:
+                    self._look_at_action(node)
+            elif kind == "parallel":
+                self._parallel(node)
+            elif kind == "retry" and "attempts" not in node.values and not inside:
+                hint = "attempts: N, or a 'timeout' around it"
+                self._report("BT304", span_of(node.key), "this retry never gives up", hint=hint)
+            elif kind in ("sequence", "fallback"):
+                self._unreachable(node, kind)
+                if node.values.get("memory") is False:
+                    self._reactive(node, kind)
+            elif kind == "timeout":
+                self._short(node)
+                inside = True
+            stack.extend((child, inside) for child in reversed(node.children))
+
+    # BT301
+
+    def _look_at_action(self, node: TreeNode) -> None:
+        timeout = settings_of(node, self._document).get("timeout", {})
+        if not isinstance(timeout, dict) or "result" in timeout:
+            return
+        if node.alias is not None:
+            self._unbounded.setdefault(node.alias, node)
+        else:
+            self._no_result_timeout(node.key, f"{node.name or 'this action'} may take for ever")
+
+    def _no_result_timeout(self, at: object, message: str) -> None:
+        hint = "timeout: 30 s, or {result: none} where it is meant"
+        self._report("BT301", span_of(at), message, hint=hint)  # type: ignore[arg-type]
+
+    def _result_timeouts(self) -> None:
+        for name, node in self._unbounded.items():
+            declared = self._document.actions.get(name)
+            own = declared is not None and declared.source is self._source
+            at = declared.key if own and declared is not None else node.key
+            self._no_result_timeout(at, f"{name!r} has no result timeout: it may take for ever")
+
+    # BT303
+
+    def _parallel(self, node: TreeNode) -> None:
+        taken: dict[str, TreeNode] = {}
+        for child in node.children:
+            for resource, user in resources_below(child, self._document).items():
+                first = taken.get(resource)
+                if first is None:
+                    continue
+                place = first.place
+                where = user if user.source is self._source else child
+                self._report(
+                    "BT303", span_of(where.key),
+                    f"this needs {resource!r}, and so does a branch beside it: one waits",
+                    related=Related(place, "the other is here"),
+                    hint="busy: share, where both may run at once",
+                )  # fmt: skip
+                break
+            for resource, user in resources_below(child, self._document).items():
+                taken.setdefault(resource, user)
+
+    # BT305, BT306, BT307
+
+    def _unreachable(self, node: TreeNode, kind: str) -> None:
+        for child, after in zip(node.children, node.children[1:], strict=False):
+            can = self._verdicts.of(child)
+            ends = not can.fail if kind == "fallback" else not can.succeed
+            if ends:
+                how = "fails" if kind == "fallback" else "succeeds"
+                self._report(
+                    "BT305", span_of(after.key), "this child is never reached",
+                    related=Related(child.place, f"this one never {how}"),
+                )  # fmt: skip
+                return
+
+    def _reactive(self, node: TreeNode, kind: str) -> None:
+        for at, child in enumerate(node.children[:-1]):
+            action = next((n for n in child.walk() if _is_action(n)), None)
+            later = any(_takes_time(n) for other in node.children[at + 1 :] for n in other.walk())
+            can = self._verdicts.of(child)
+            if action is not None and later and (can.succeed if kind == "sequence" else can.fail):
+                self._report(
+                    "BT306", span_of(action.key),
+                    f"this starts again at each tick while a later child of {node.name!r} runs",
+                    related=Related(node.place, "because of 'memory: false' here"),
+                )  # fmt: skip
+
+    def _short(self, node: TreeNode) -> None:
+        after = node.values.get("after")
+        if not isinstance(after, float) or not node.children:
+            return
+        needed = budget(node.children[0], self._document)
+        if after < needed:
+            self._report(
+                "BT307", span_of(node.written["after"]),
+                f"{after:g} s are less than the {needed:g} s that what it holds may take",
+                hint="the deadlines and retries inside would never be reached",
+            )  # fmt: skip
+
+    # BT302: in the order of ticks
+
+    def _order(self, root: TreeNode) -> None:
+        document = self._document
+        seen = {*document.inputs, *document.topics}
+        writers = Counter(write.name for n in root.walk() for write in self._checker.writes_of(n))
+
+        def visit(node: TreeNode, around: frozenset[str]) -> None:
+            kind = node.kind.name if node.kind is not None else ""
+            own = {write.name for write in self._checker.writes_of(node)}
+            each = kind == "for_each"
+
+            def known(name: str) -> bool:
+                if name in seen:
+                    return True
+                return name in around and (name not in own or writers[name] > 1)
+
+            self._early(node, known)
+            if each:
+                seen.update(own)
+            if kind in _LOOPS or node.values.get("memory") is False:
+                around |= {write.name for n in node.walk() for write in self._checker.writes_of(n)}
+            for child in node.children:
+                visit(child, around)
+            seen.update(own)
+
+        visit(root, frozenset())
+
+    def _early(self, node: TreeNode, known: Callable[[str], bool]) -> None:
+        checker = self._checker
+        for read in checker.reads.get(id(node), ()):
+            if read.name in checker.variables and not known(read.name):
+                written, start = read.computed.node, read.computed.start
+                span = inner_span(written, self._source, start + read.start, start + read.end)
+                self._report("BT302", span, f"nothing has written ${read.name} when this is read")
+        declared = self._document.actions.get(node.alias) if node.alias is not None else None
+        for read in checker.reads.get(id(declared), ()) if declared is not None else ():
+            if read.name in checker.variables and not known(read.name):
+                text = f"nothing has written ${read.name} when {node.alias!r} reads it here"
+                self._report("BT302", span_of(node.key), text)
+
+    # BT308 to BT311
+
+    def _unused(self) -> None:
+        checker, document = self._checker, self._document
+        read = {one.name for reads in checker.reads.values() for one in reads}
+        written = {w.name for node in document.nodes() for w in self._checker.writes_of(node)}
+        for name, declared in document.inputs.items():
+            if name not in read and name not in document.outputs:
+                self._report("BT308", span_of(declared.key), f"nothing reads the input {name!r}")
+        for name in self._own(document.actions):
+            if name not in self._used:
+                key = document.actions[name].key
+                self._report("BT309", span_of(key), f"no node uses the action {name!r}")
+        for name in self._own(document.topics):
+            if name not in read:
+                key = document.topics[name].key
+                self._report("BT309", span_of(key), f"nothing reads the topic {name!r}")
+        for name, declared in document.outputs.items():
+            if name not in written and name not in document.inputs:
+                text = f"nothing writes the output {name!r}"
+                self._report("BT311", span_of(declared.key), text)
+        known = read | set(document.outputs) | set(document.inputs) | set(document.topics)
+        for node in document.nodes():
+            if node.kind is not None and node.kind.name == "for_each":
+                continue
+            for write in self._checker.writes_of(node):
+                if write.name not in known:
+                    known.add(write.name)
+                    at = _key_of(write.written, node, write.name)
+                    text = f"nothing reads ${write.name}"
+                    self._report("BT310", span_of(at), text)  # type: ignore[arg-type]
+
+    def _own(self, table: dict[str, Declared]) -> Iterator[str]:
+        return (name for name, declared in table.items() if declared.source is self._source)
+
+
+def _key_of(written: object, node: TreeNode, name: str) -> object:
+    for table in ("save", "set"):
+        mapping = node.written.get(table)
+        if isinstance(mapping, Mapping):
+            for key, value in mapping.pairs:
+                if key.text == name and value is written:
+                    return key
+    return written if written is not node.node else node.key
+
+
+def _is_action(node: TreeNode) -> bool:
+    return node.alias is not None or (node.kind is not None and node.kind.name == "action")
+
+
+def _takes_time(node: TreeNode) -> bool:
+    if node.included is not None and node.included.root is not None:
+        return any(_takes_time(inner) for inner in node.included.root.walk())
+    return _is_action(node) or (node.kind is not None and node.kind.name in _BUSY)

@@ -1,0 +1,243 @@
+"""The type of an expression, as far as the types of what it reads are known.
+
+Says what is wrong with it through a callback; an unknown type is None and never wrong.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+
+from bt_actions.expression import Expression
+from bt_actions.ros.fields import (
+    FLOATS,
+    INTEGERS,
+    FieldType,
+    Listing,
+    Message,
+    Scalar,
+    constants,
+    describe,
+)
+from bt_actions.ros.interfaces import short_name
+from bt_actions.suggest import did_you_mean
+
+__all__ = ["BOOL", "FLOAT", "INTEGER", "TEXT", "infer", "named", "type_of_literal"]
+
+BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
+Report = Callable[[str, str, int, int], None]
+"""Called with a rule's code, a message, and the columns in the expression's text."""
+
+
+def infer(
+    expression: Expression,
+    roots: Mapping[str, FieldType | None],
+    variable: Callable[[str], FieldType | None],
+    report: Report,
+) -> FieldType | None:
+    """The type of an expression's value, or None when it is not known."""
+    return _Inference(expression, roots, variable, report).type_of(expression.tree)
+
+
+def type_of_literal(value: object) -> FieldType | None:
+    """The type of plain data, where it has one."""
+    if isinstance(value, bool):
+        return BOOL
+    if isinstance(value, int):
+        return INTEGER
+    if isinstance(value, float):
+        return FLOAT
+    return TEXT if isinstance(value, str) else None
+
+
+def named(kind: FieldType | None) -> str:
+    """A type with its article."""
+    text = str(kind)
+    return f"an {text}" if text[0] in "aeioAEIO" else f"a {text}"
+
+
+def _is_number(kind: FieldType | None) -> bool:
+    return isinstance(kind, Scalar) and (kind.name in INTEGERS or kind.name in FLOATS)
+
+
+def _is_text(kind: FieldType | None) -> bool:
+    return isinstance(kind, Scalar) and kind.name in ("string", "wstring")
+
+
+class _Inference:
+    def __init__(
+        self,
+        expression: Expression,
+        roots: Mapping[str, FieldType | None],
+        variable: Callable[[str], FieldType | None],
+        report: Report,
+    ) -> None:
+        self._expression = expression
+        self._roots = roots
+        self._variable = variable
+        self._report = report
+
+    def type_of(self, node: ast.expr) -> FieldType | None:
+        match node:
+            case ast.Constant(value=value):
+                return type_of_literal(value)
+            case ast.Name(id=name):
+                return self._name(node, name)
+            case ast.Attribute(value=inner, attr=attr):
+                return self._field(node, self.type_of(inner), attr)
+            case ast.Subscript(value=inner, slice=index):
+                return self._item(node, self.type_of(inner), index)
+            case ast.UnaryOp(op=ast.Not(), operand=inner):
+                self._truth(inner)
+                return BOOL
+            case ast.UnaryOp(operand=inner):
+                return self._number(inner)
+            case ast.BinOp(left=left, op=op, right=right):
+                return self._arithmetic(left, op, right)
+            case ast.BoolOp(values=values):
+                for part in values:
+                    self._truth(part)
+                return BOOL
+            case ast.Compare(left=left, ops=ops, comparators=rights):
+                self._compare([left, *rights], ops)
+                return BOOL
+            case ast.List(elts=items) | ast.Tuple(elts=items):
+                kinds = [self.type_of(item) for item in items]
+                same = kinds and kinds[0] is not None and all(kind == kinds[0] for kind in kinds)
+                return Listing(kinds[0]) if same and kinds[0] is not None else None
+            case ast.Call(func=ast.Name(id=name), args=args):
+                return self._call(name, args)
+        return None
+
+    def _wrong(self, node: ast.expr, message: str, code: str = "BT206") -> None:
+        start, end = self._expression.span(node)
+        if code == "BT203" and isinstance(node, ast.Attribute):
+            start = max(start, end - len(node.attr))
+        self._report(code, message, start, end)
+
+    def _name(self, node: ast.expr, name: str) -> FieldType | None:
+        variable = self._expression.variable_of(node)
+        if variable is not None:
+            return self._variable(variable)
+        if name in ("true", "false"):
+            return BOOL
+        return self._roots.get(name)
+
+    def _field(self, node: ast.expr, owner: FieldType | None, name: str) -> FieldType | None:
+        if owner is None:
+            return None
+        if not isinstance(owner, Message):
+            self._wrong(node, f"{named(owner)} has no field {name!r}", "BT203")
+            return None
+        known = describe(owner.cls)
+        if name in known:
+            return known[name]
+        if name in constants(owner.cls):
+            return type_of_literal(constants(owner.cls)[name])
+        near = did_you_mean(name, known) or (
+            f"; it has {', '.join(known)}" if known else ": it has no fields"
+        )
+        self._wrong(node, f"{short_name(owner.cls)} has no field {name!r}{near}", "BT203")
+        return None
+
+    def _item(self, node: ast.expr, owner: FieldType | None, index: ast.expr) -> FieldType | None:
+        kind = self.type_of(index)
+        if owner is None:
+            return None
+        if isinstance(owner, Message) and isinstance(index, ast.Constant) and _is_text(kind):
+            return self._field(node, owner, str(index.value))
+        if isinstance(owner, Scalar) and _is_text(owner):
+            return TEXT
+        if not isinstance(owner, Listing):
+            self._wrong(node, f"{named(owner)} has no items")
+            return None
+        if kind is not None and not (isinstance(kind, Scalar) and kind.name in INTEGERS):
+            self._wrong(index, f"an index is a whole number, not {named(kind)}")
+        size = owner.size
+        at = index.value if isinstance(index, ast.Constant) else None
+        if size is not None and isinstance(at, int) and not -size <= at < size:
+            self._wrong(node, f"index {at} is outside of {size} items")
+        return owner.item
+
+    def _truth(self, node: ast.expr) -> None:
+        kind = self.type_of(node)
+        if kind is not None and kind != BOOL:
+            self._wrong(node, f"true or false is needed, not {named(kind)}")
+
+    def _number(self, node: ast.expr) -> FieldType | None:
+        kind = self.type_of(node)
+        if kind is not None and not _is_number(kind):
+            self._wrong(node, f"a number is needed, not {named(kind)}")
+            return None
+        return kind
+
+    def _arithmetic(self, left: ast.expr, op: ast.operator, right: ast.expr) -> FieldType | None:
+        if isinstance(op, ast.Add):
+            first, second = self.type_of(left), self.type_of(right)
+            if _is_text(first) and (second is None or _is_text(second)):
+                return TEXT
+            if first is None and (second is None or _is_text(second)):
+                return TEXT if second is not None else None
+            for node, kind in ((left, first), (right, second)):
+                if kind is not None and not _is_number(kind):
+                    self._wrong(node, f"a number is needed, not {named(kind)}")
+                    return None
+        else:
+            first, second = self._number(left), self._number(right)
+        if first is None or second is None:
+            return None
+        if isinstance(op, (ast.Div, ast.Pow)):
+            return FLOAT
+        both = {kind.name for kind in (first, second) if isinstance(kind, Scalar)}
+        return FLOAT if both & set(FLOATS) else INTEGER
+
+    def _compare(self, operands: list[ast.expr], ops: list[ast.cmpop]) -> None:
+        kinds = [self.type_of(operand) for operand in operands]
+        for at, op in enumerate(ops):
+            first, second = kinds[at], kinds[at + 1]
+            if first is None or second is None:
+                continue
+            right = operands[at + 1]
+            if isinstance(op, (ast.In, ast.NotIn)):
+                if isinstance(second, Listing):
+                    if not _comparable(first, second.item):
+                        self._wrong(right, f"{named(first)} is never among {second.item}")
+                elif not (_is_text(first) and _is_text(second)):
+                    self._wrong(right, f"{named(second)} holds nothing that 'in' could look for")
+            elif not _comparable(first, second):
+                self._wrong(right, f"{named(first)} is never compared with {named(second)}")
+            elif not isinstance(op, (ast.Eq, ast.NotEq)) and not (
+                _is_number(first) or _is_text(first)
+            ):
+                self._wrong(
+                    operands[at], f"{named(first)} is neither less nor greater than another"
+                )
+
+    def _call(self, name: str, args: list[ast.expr]) -> FieldType | None:
+        if name == "len":
+            kind = self.type_of(args[0])
+            if kind is not None and not isinstance(kind, Listing) and not _is_text(kind):
+                self._wrong(args[0], f"{named(kind)} has no length")
+            return INTEGER
+        if name == "abs":
+            return self._number(args[0])
+        kinds = [self.type_of(arg) for arg in args]
+        if len(kinds) == 1:
+            only = kinds[0]
+            if only is not None and not isinstance(only, Listing):
+                self._wrong(args[0], f"{name} of one value needs a list, not {named(only)}")
+            return only.item if isinstance(only, Listing) else None
+        if all(_is_number(kind) for kind in kinds):
+            floats = any(isinstance(kind, Scalar) and kind.name in FLOATS for kind in kinds)
+            return FLOAT if floats else INTEGER
+        return kinds[0] if all(kind == kinds[0] for kind in kinds) else None
+
+
+def _comparable(first: FieldType, second: FieldType) -> bool:
+    if _is_number(first):
+        return _is_number(second)
+    if _is_text(first):
+        return _is_text(second)
+    if isinstance(first, Listing) and isinstance(second, Listing):
+        return _comparable(first.item, second.item)
+    return first == second

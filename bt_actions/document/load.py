@@ -1,0 +1,173 @@
+"""The library's front door: open, check, and build a tree."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bt_actions.document.check import Checker
+from bt_actions.document.find import TreeNotFoundError, find_tree, installed_trees
+from bt_actions.document.findings import DocumentError, Finding, Severity, Span
+from bt_actions.document.hazards import find_hazards
+from bt_actions.document.ignores import apply_ignores
+from bt_actions.document.inputs import TreeInput, check_inputs, inputs_of
+from bt_actions.document.source import Source, TooManyErrors
+from bt_actions.document.tree import Document
+from bt_actions.document.workspace import Workspace
+
+if TYPE_CHECKING:
+    from py_trees.behaviour import Behaviour
+
+    from bt_actions.document.scope import Scope
+
+__all__ = ["check_file", "check_source", "load_tree", "tree_inputs", "tree_outputs"]
+
+PathLike = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """What the root of a loaded tree remembers of where it came from."""
+
+    document: Document
+    scope: Scope
+
+
+@contextlib.contextmanager
+def _no_collecting() -> Iterator[None]:
+    """Leave the garbage collector out while a document is made: nothing of it becomes garbage.
+
+    For 10,000 nodes it would otherwise take as long as all the rest.
+    """
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+@_no_collecting()
+def load_tree(
+    path: PathLike,
+    inputs: Mapping[str, object] | None = None,
+    *,
+    types: bool = True,
+    python: bool = True,
+) -> Behaviour:
+    """The behaviours of a tree, ready to be run; needs no node and no server.
+
+    `path` is a file, or the name of an installed tree. `inputs` are converted to the types that
+    the tree declares. With `types=False` no ROS interface is looked up. With `python=False` a
+    ``python:`` node is an error, and no module that the tree names is imported: for trees that are
+    not trusted (docs/security.md).
+
+    Raises DocumentError with everything that is wrong with the tree, InputError for inputs that do
+    not fit; both are ValueErrors.
+    """
+    from bt_actions.document.build import build
+    from bt_actions.document.scope import Scope
+
+    document = _open(path, types=types, python=python)
+    values = check_inputs(document, inputs or {}, types=types)
+    scope = Scope.of_load(document.name)
+    scope.write_all(values)
+    root = build(document, scope, types=types)
+    root.loaded = Loaded(document, scope)  # type: ignore[attr-defined]
+    return root
+
+
+def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
+    """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
+    return inputs_of(_open(path, types=False))
+
+
+def tree_outputs(root: Behaviour) -> dict[str, object]:
+    """The outputs of a loaded tree that have a value by now, by name."""
+    loaded = getattr(root, "loaded", None)
+    if not isinstance(loaded, Loaded):
+        return {}
+    found = {}
+    for name in loaded.document.outputs:
+        try:
+            found[name] = loaded.scope.read(name)
+        except KeyError:
+            continue
+    return found
+
+
+@_no_collecting()
+def check_file(path: PathLike, *, types: bool = True) -> list[Finding]:
+    """Everything that is wrong with a tree, and with all that it includes and imports."""
+    workspace = Workspace()
+    try:
+        workspace.open(_found(path), _shown(path))
+    except DocumentError as error:
+        return list(error.findings)
+    except TooManyErrors:
+        return workspace.findings
+    return _checked(workspace, types=types)
+
+
+@_no_collecting()
+def check_source(source: Source, *, types: bool = True) -> list[Finding]:
+    """As `check_file`, for a text that was read already."""
+    workspace = Workspace()
+    try:
+        workspace.open_source(source)
+    except TooManyErrors:
+        return workspace.findings
+    return _checked(workspace, types=types)
+
+
+def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[Finding]:
+    try:
+        for document in workspace.documents:
+            checker = Checker(document, types=types, python=python)
+            checker.check()
+            sound = not document.source.has_errors
+            if sound:  # what is wrong already would be told twice
+                find_hazards(checker)
+            apply_ignores(document.source, complete=sound)
+    except TooManyErrors:
+        return workspace.findings
+    return workspace.findings
+
+
+def _open(path: PathLike, *, types: bool, python: bool = True) -> Document:
+    workspace = Workspace()
+    try:
+        document = workspace.open(_found(path), _shown(path))
+        findings = _checked(workspace, types=types, python=python)
+    except TooManyErrors:
+        document, findings = None, workspace.findings
+    errors = [finding for finding in findings if finding.severity is Severity.ERROR]
+    if errors:
+        raise DocumentError(errors)
+    assert document is not None
+    if document.root is None:
+        message = "this file is for trees to import: it holds no tree itself"
+        document.source.report("BT106", Span(1, 1, 1, 2), message)
+        raise DocumentError(document.source.findings)
+    return document
+
+
+def _found(path: PathLike) -> Path:
+    try:
+        return find_tree(path)
+    except TreeNotFoundError as error:
+        source = Source(os.fspath(path), "")
+        hint = None if "mean" in str(error) else f"installed are {', '.join(installed_trees())}"
+        source.report("BT100", Span(1, 1, 1, 2), str(error), hint=hint)
+        raise DocumentError(source.findings) from None
+
+
+def _shown(path: PathLike) -> str | None:
+    """The name to show: as it was given where that is a file, else where it was found."""
+    return os.fspath(path) if Path(path).exists() else None

@@ -1,0 +1,347 @@
+"""YAML text as a tree of nodes that know their range. Says nothing about behaviour trees.
+
+libyaml's events are put together here rather than by PyYAML's own composer: nesting, aliases and
+memory stay bounded, both ends of every node are kept, duplicate keys are seen, and scalars are read
+as YAML 1.2 has them (`on` and `yes` are texts). PyYAML's parser in Python is not used in its place:
+it is ten times as slow, and says other things about the same mistakes.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+
+from bt_actions.document.findings import Place, Related, Span
+from bt_actions.document.source import Source
+
+__all__ = ["MAX_DEPTH", "MAX_NODES", "Listing", "Mapping", "Node", "Scalar", "compose", "span_of"]
+
+MAX_DEPTH = 200
+"""Levels of YAML nesting; a level of the tree takes two."""
+MAX_NODES = 2_000_000
+"""Nodes of a text, its aliases unfolded; a tree of 100,000 nodes has about a third of it."""
+NO_LIBYAML = (
+    "trees are read with libyaml, and PyYAML is installed without it here; its wheels hold it: "
+    "pip install --force-reinstall --only-binary :all: PyYAML"
+)
+_NUMBER_START = frozenset("0123456789+-.")
+_WORDS: dict[str, object] = {
+    "": None, "~": None, "null": None, "Null": None, "NULL": None,
+    "true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False,
+}  # fmt: skip
+_INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_SPECIAL = re.compile(r"([-+]?)\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+_MAX_DIGITS = 400
+_INDEXED = re.compile(r"(\$[A-Za-z_]\w*(?:\.\w+)*)\[(\d+)\]")
+
+
+class Node:
+    """A range of the text; lines and columns count from 1, the end is one past the last."""
+
+    __slots__ = ("column", "end_column", "end_line", "line")
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+
+class Scalar(Node):
+    """A text; `plain` when it was written without quotes or a block's sign."""
+
+    __slots__ = ("plain", "text")
+    text: str
+    plain: bool
+
+    @property
+    def value(self) -> object:
+        """None, a bool, an int, a float or a text, by the core schema of YAML 1.2."""
+        text = self.text
+        if not self.plain:
+            return text
+        if text in _WORDS:
+            return _WORDS[text]
+        return _number(text) if text[0] in _NUMBER_START else text
+
+
+class Listing(Node):
+    """A sequence of nodes."""
+
+    __slots__ = ("flow", "items")
+    items: list[Node]
+    flow: bool
+
+
+class Mapping(Node):
+    """Pairs in the order they were written; each key is there once."""
+
+    __slots__ = ("flow", "pairs")
+    pairs: list[tuple[Scalar, Node]]
+    flow: bool
+
+    def get(self, key: str) -> Node | None:
+        """The value of a key, or None."""
+        for name, value in self.pairs:
+            if name.text == key:
+                return value
+        return None
+
+
+def span_of(node: Node) -> Span:
+    """The range of a node."""
+    return Span(node.line, node.column, node.end_line, node.end_column)
+
+
+def _number(text: str) -> object:
+    if len(text) > _MAX_DIGITS:
+        return text
+    if _INTEGER.fullmatch(text):
+        return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    special = _SPECIAL.fullmatch(text)
+    if special is not None:
+        return float((special[1] or "") + ("inf" if "i" in text.lower() else "nan"))
+    return text
+
+
+def compose(source: Source) -> Node | None:
+    """The document in a source, or None when it has none or cannot be read.
+
+    What is wrong is reported to the source; after a syntax error nothing can be read on. Raises
+    ImportError, with the name libyaml, where that is missing.
+    """
+    if not yaml.__with_libyaml__:
+        raise ImportError(NO_LIBYAML, name="libyaml")
+    composer = _Composer(source)
+    try:
+        for event in yaml.parse(source.text, Loader=yaml.CSafeLoader):
+            composer.take(event)
+            if composer.gave_up:
+                return None
+    except yaml.YAMLError as error:
+        _report_syntax(source, error)
+        return None
+    return composer.root
+
+
+class _Open:
+    """A collection whose end has not come yet."""
+
+    __slots__ = ("anchor", "key", "keys", "node", "size")
+
+    def __init__(self, node: Any, anchor: str | None) -> None:
+        self.node = node
+        self.anchor = anchor
+        self.key: Scalar | None = None
+        self.keys: dict[str, Scalar] = {}
+        self.size = 1
+
+
+class _Composer:
+    """Puts events together. No recursion: the depth of a text is the text's author's."""
+
+    def __init__(self, source: Source) -> None:
+        self.root: Node | None = None
+        self.gave_up = False
+        self._source = source
+        self._stack: list[_Open] = []
+        self._anchors: dict[str, tuple[Node, int] | None] = {}
+        self._documents = 0
+        self._size = 0
+
+    def take(self, event: Any) -> None:
+        kind = type(event)
+        if kind is yaml.ScalarEvent:
+            self._scalar(event)
+        elif kind is yaml.MappingStartEvent:
+            node = Mapping()
+            node.pairs = []
+            self._begin(node, event)
+        elif kind is yaml.SequenceStartEvent:
+            listing = Listing()
+            listing.items = []
+            self._begin(listing, event)
+        elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
+            self._end(event)
+        elif kind is yaml.AliasEvent:
+            self._alias(event)
+        if self._size > MAX_NODES and not self.gave_up:
+            self._report("BT105", event, f"this is, or unfolds to, more than {MAX_NODES:,} nodes")
+            self.gave_up = True
+        if kind is yaml.DocumentStartEvent:
+            self._documents += 1
+            if self._documents == 2:
+                self._report("BT106", event, "a second document begins here; one file, one tree")
+                self.gave_up = True
+
+    def _report(self, code: str, event: Any, message: str, hint: str | None = None) -> None:
+        self._source.report(code, _event_span(event), message, hint=hint)
+
+    def _scalar(self, event: Any) -> None:
+        node = Scalar()
+        node.text = event.value
+        node.plain = not event.style
+        tag = event.tag
+        if tag is not None:
+            node.plain = False
+            if tag not in ("!", "tag:yaml.org,2002:str"):
+                self._report("BT109", event, f"the tag {tag!r} has no meaning in a tree")
+        _place(node, event)
+        if event.anchor is not None:
+            self._source.anchored = True
+            self._anchors[event.anchor] = (node, 1)
+        self._add(node, 1)
+
+    def _begin(self, node: Any, event: Any) -> None:
+        if len(self._stack) >= MAX_DEPTH:
+            self._report("BT105", event, f"nested deeper than {MAX_DEPTH} levels")
+            self.gave_up = True
+            return
+        if event.tag is not None and event.tag != "!":
+            self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
+        _place(node, event)
+        node.flow = bool(event.flow_style)
+        if event.anchor is not None:
+            self._source.anchored = True
+            self._anchors[event.anchor] = None
+        self._stack.append(_Open(node, event.anchor))
+
+    def _end(self, event: Any) -> None:
+        done = self._stack.pop()
+        node = done.node
+        if node.flow:
+            mark = event.end_mark
+            node.end_line, node.end_column = mark.line + 1, mark.column + 1
+        else:
+            last = None
+            if type(node) is Mapping:
+                last = node.pairs[-1][1] if node.pairs else None
+            elif node.items:
+                last = node.items[-1]
+            if last is not None and (last.end_line, last.end_column) > (node.line, node.column):
+                node.end_line, node.end_column = last.end_line, last.end_column
+        if type(node) is Mapping and "<<" in done.keys:
+            self._merge(node)
+        if done.anchor is not None:
+            self._anchors[done.anchor] = (node, done.size)
+        self._add(node, done.size)
+
+    def _alias(self, event: Any) -> None:
+        if event.anchor not in self._anchors:
+            self._report("BT102", event, f"there is no anchor &{event.anchor} above")
+            self.gave_up = True
+            return
+        found = self._anchors[event.anchor]
+        if found is None:
+            self._report("BT105", event, f"*{event.anchor} holds itself")
+            self.gave_up = True
+            return
+        self._size += found[1] - 1
+        self._add(*found)
+
+    def _add(self, node: Node, size: int) -> None:
+        self._size += 1
+        if not self._stack:
+            if self.root is None:
+                self.root = node
+            return
+        frame = self._stack[-1]
+        frame.size += size
+        owner = frame.node
+        if type(owner) is Listing:
+            owner.items.append(node)
+        elif frame.key is None:
+            frame.key = self._key(frame, node)
+        else:
+            if frame.key is not _REFUSED:
+                owner.pairs.append((frame.key, node))
+            frame.key = None
+
+    def _key(self, frame: _Open, node: Node) -> Scalar:
+        if type(node) is not Scalar:
+            hint = "a text that begins with { or [ needs quotes"
+            message = "a key is a single word, not a list or a mapping"
+            self._source.report("BT109", span_of(node), message, hint=hint)
+            return _REFUSED
+        first = frame.keys.setdefault(node.text, node)
+        if first is not node and node.text != "<<":
+            place = Place(self._source.name, first.line, first.column)
+            self._source.report(
+                "BT104", span_of(node), f"the key {node.text!r} is here twice",
+                related=Related(place, "first here"),
+            )  # fmt: skip
+            return _REFUSED
+        return node
+
+    def _merge(self, node: Mapping) -> None:
+        own = {key.text for key, _ in node.pairs}
+        pairs = []
+        for key, value in node.pairs:
+            if key.text != "<<" or not key.plain:
+                pairs.append((key, value))
+                continue
+            for merged in value.items if isinstance(value, Listing) else [value]:
+                if not isinstance(merged, Mapping):
+                    message = "'<<' merges a mapping, or a list of mappings"
+                    self._source.report("BT109", span_of(merged), message)
+                    continue
+                for inner_key, inner_value in merged.pairs:
+                    if inner_key.text not in own:
+                        own.add(inner_key.text)
+                        pairs.append((inner_key, inner_value))
+                        self._size += 1
+        node.pairs = pairs
+
+
+_REFUSED = Scalar()
+
+
+def _place(node: Node, event: Any) -> None:
+    start, end = event.start_mark, event.end_mark
+    node.line, node.column = start.line + 1, start.column + 1
+    node.end_line, node.end_column = end.line + 1, end.column + 1
+
+
+def _event_span(event: Any) -> Span:
+    start, end = event.start_mark, event.end_mark
+    return Span(start.line + 1, start.column + 1, end.line + 1, end.column + 1)
+
+
+def _report_syntax(source: Source, error: yaml.YAMLError) -> None:
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    problem = getattr(error, "problem", None) or str(error) or "this is not YAML"
+    line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
+    if line > len(source.lines) > 0:
+        line, column = len(source.lines), len(source.lines[-1]) + 1
+    text = source.line(line) or ""
+    code, message, hint = _explain(problem, text, column)
+    if code == "BT103":
+        column = text.find("\t") + 1
+    source.report(code, Span(line, column, line, column + 1), message, hint=hint)
+
+
+def _explain(problem: str, text: str, column: int) -> tuple[str, str, str | None]:
+    indent = text[: len(text) - len(text.lstrip())]
+    if "\t" in indent or text[column - 1 : column] == "\t":
+        return "BT103", "a tab cannot indent YAML", "use spaces"
+    cut = _INDEXED.search(text)
+    if cut is not None and "," in problem:
+        message = f"'[' ends a text inside {{ }} and [ ], so {cut[0]!r} is cut"
+        return "BT118", message, f"write {cut[1]}.{cut[2]}, or put it in quotes"
+    if "mapping values are not allowed" in problem:
+        return "BT102", "a second ':' on this line", "put a text that holds ': ' in quotes"
+    if "could not find expected ':'" in problem:
+        return "BT102", "a key without its ':'", None
+    if "did not find expected key" in problem:
+        return "BT102", "this does not line up with the keys above", "check the indentation"
+    if "did not find expected '-' indicator" in problem:
+        return "BT102", "this does not line up with the list above", "check the indentation"
+    if "unexpected end of stream" in problem:
+        return "BT102", "the quote that was opened is never closed", None
+    if "cannot start any token" in problem:
+        bad = text[column - 1 : column]
+        return "BT102", f"no text begins with {bad!r}", "put it in quotes"
+    return "BT102", problem, None

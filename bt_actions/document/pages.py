@@ -1,0 +1,344 @@
+"""What each rule is about, with a wrong and a right example. The examples are tested.
+
+`bt-actions explain` prints these, and docs/rules.md is made of them.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from bt_actions.document.rules import RULES
+
+__all__ = ["PAGES", "Page", "page"]
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """The text of a rule; an example that no text can show is empty."""
+
+    text: str
+    wrong: str = ""
+    right: str = ""
+
+
+def page(code: str) -> str:
+    """The page of a rule as plain text."""
+    rule, said = RULES[code], PAGES[code]
+    parts = [f"{code}: {rule.title} ({rule.severity})", "", textwrap.fill(said.text, 88), ""]
+    for word, example in (("Wrong", said.wrong), ("Right", said.right)):
+        if example:
+            parts += [f"{word}:", "", textwrap.indent(example.rstrip("\n"), "    "), ""]
+    return "\n".join(parts)
+
+
+_MOVE = """\
+actions:
+  move:
+    type: robot_control_interfaces/action/MoveRobot
+    server: move_robot
+    timeout: 30 s
+"""
+
+
+def _tree(body: str) -> str:
+    return "tree: example\n" + textwrap.dedent(body).lstrip("\n")
+
+
+def _move(body: str) -> str:
+    return "tree: example\n" + _MOVE + textwrap.dedent(body).lstrip("\n")
+
+
+_SUCCESS = "root: {success: Done}\n"
+PAGES: Mapping[str, Page] = MappingProxyType(
+    {
+        "BT100": Page(
+            "The file is not there, is a directory, may not be read, or is larger than a tree can "
+            "be. Trees are found by their path, or by the name of an installed tree."
+        ),
+        "BT101": Page(
+            "Trees are written in UTF-8, without control characters. Save the file as UTF-8; most "
+            "editors can."
+        ),
+        "BT102": Page(
+            "The text is not YAML, so that nothing else in it can be checked. Most often the "
+            "indentation differs from the lines around, or a text with ': ' needs quotes.",
+            _tree("root:\n  log: ready: go\n"),
+            _tree('root:\n  log: "ready: go"\n'),
+        ),
+        "BT103": Page(
+            "YAML is indented with spaces. Set the editor to insert spaces for the tab key.",
+            _tree("root:\n\tsuccess: Done\n"),
+            _tree("root:\n  success: Done\n"),
+        ),
+        "BT104": Page(
+            "A key stands twice in one mapping. YAML tools keep one of the two, and not all the "
+            "same one.",
+            _tree("root:\n  success: Done\n  success: Again\n"),
+            _tree("root:\n  success: Done\n"),
+        ),
+        "BT105": Page(
+            "The document is nested deeper than 200 levels, an anchor holds itself, or aliases and "
+            "subtrees unfold to more nodes than a tree can have.",
+            _tree("root: &loop\n  sequence: Loop\n  children: [*loop]\n"),
+            _tree("root:\n  repeat: Loop\n  times: 3\n  child: {success: Done}\n"),
+        ),
+        "BT106": Page(
+            "A tree is one mapping, with a name under 'tree' and its nodes under 'root'. One file "
+            "holds one tree.",
+            "- success: Done\n",
+            _tree(_SUCCESS),
+        ),
+        "BT107": Page(
+            "No such key can stand here. Nothing is ignored silently: a misspelt key would "
+            "otherwise do nothing, and nobody would know.",
+            _tree("root:\n  sequence: Work\n  memroy: false\n  children: [{success: Done}]\n"),
+            _tree("root:\n  sequence: Work\n  memory: false\n  children: [{success: Done}]\n"),
+        ),
+        "BT108": Page(
+            "A key that must be there is missing.",
+            _tree("root:\n  invert: Not done\n"),
+            _tree("root:\n  invert: Not done\n  child: {success: Done}\n"),
+        ),
+        "BT109": Page(
+            "A value is a list, a mapping or a text where another form is needed. YAML 1.2 reads "
+            "'yes', 'no', 'on' and 'off' as texts: write true and false.",
+            _tree("root:\n  sequence: Work\n  memory: no\n  children: [{success: Done}]\n"),
+            _tree("root:\n  sequence: Work\n  memory: false\n  children: [{success: Done}]\n"),
+        ),
+        "BT110": Page(
+            "The value is of the right form, but cannot be: an unknown word, a duration with an "
+            "unknown unit, a number out of its range. Units of time are ns, us, ms, s, min and h; "
+            "a bare number is seconds.",
+            _tree("root: {wait: 5 sconds}\n"),
+            _tree("root: {wait: 5 s}\n"),
+        ),
+        "BT111": Page(
+            "One key of a node says what it is: a kind, or an action that the tree declares. This "
+            "node has none.",
+            _tree("root: {name: Done}\n"),
+            _tree(_SUCCESS),
+        ),
+        "BT112": Page(
+            "One key of a node says what it is; here are two. Most often the dash that begins the "
+            "next node is missing.",
+            _tree("root:\n  sequence: Work\n  fallback: Else\n  children: [{success: Done}]\n"),
+            _tree(
+                "root:\n  sequence: Work\n  children:\n    - fallback: Else\n"
+                "      children: [{success: Done}]\n"
+            ),
+        ),
+        "BT113": Page(
+            "Names of nodes are one line without a colon, since tools that draw trees take 'a:b' "
+            "for a port of the node 'a'. Names of variables and actions are letters, digits and "
+            "underscores.",
+            _tree('root: {success: "Step 1: done"}\n'),
+            _tree('root: {success: "Step 1, done"}\n'),
+        ),
+        "BT114": Page(
+            "Expressions are Python's comparisons, arithmetic, and/or/not, 'in', fields and "
+            "indices, with len, abs, min and max. A variable is written $name.",
+            _tree("inputs: {level: float64}\nroot: {check: $level = 1}\n"),
+            _tree("inputs: {level: float64}\nroot: {check: $level == 1}\n"),
+        ),
+        "BT115": Page(
+            "Inside a text, $(name) stands for a value, and $$ for a dollar sign. A value that is "
+            "nothing but $name keeps its type.",
+            _tree("inputs: {level: float64}\nroot: {log: The level is $level now}\n"),
+            _tree("inputs: {level: float64}\nroot: {log: The level is $(level) now}\n"),
+        ),
+        "BT116": Page(
+            "A '#' behind a space begins a comment, wherever it stands. Put the text in quotes "
+            "where it belongs to it.",
+            _tree("root: \n  success: Part #3\n"),
+            _tree('root: \n  success: "Part #3"\n'),
+        ),
+        "BT117": Page(
+            "In YAML {x} is a mapping of the key x to nothing. A variable is written $x.",
+            _move("inputs: {far: float64}\nroot:\n  move: Go\n  goal: {distance: {far}}\n"),
+            _move("inputs: {far: float64}\nroot:\n  move: Go\n  goal: {distance: $far}\n"),
+        ),
+        "BT118": Page(
+            "Inside { } and [ ], an unquoted '[' ends the text before it. Write the index with a "
+            "dot, or put the value in quotes.",
+            _move("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d[0]}\n"),
+            _move("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d.0}\n"),
+        ),
+        "BT119": Page(
+            "An ignore names the warnings it silences: # bt: ignore[BT301] and why. An error "
+            "cannot be silenced.",
+            _tree("root: {success: Done}  # bt: ignore\n"),
+            _tree("root:\n  retry: Ever  # bt: ignore[BT304] an operator stops it\n"
+                  "  child: {success: Done}\n"),
+        ),
+        "BT120": Page(
+            "This ignore silences nothing. It may have been of use once; now it would hide what "
+            "comes later.",
+            _tree("root: {success: Done}  # bt: ignore[BT304] no longer a retry\n"),
+            _tree(_SUCCESS),
+        ),
+        "BT201": Page(
+            "No kind of node has this name, and the tree declares no action of this name.",
+            _move("root:\n  sequence: Work\n  children:\n    - mvoe: Go\n    - move: Back\n"),
+            _move("root:\n  sequence: Work\n  children:\n    - move: Go\n    - move: Back\n"),
+        ),
+        "BT202": Page(
+            "A tree sees only its own names: its inputs, outputs and topics, and what its nodes "
+            "save, set or loop over.",
+            _tree("inputs: {level: float64}\nroot: {check: $levle > 0.2}\n"),
+            _tree("inputs: {level: float64}\nroot: {check: $level > 0.2}\n"),
+        ),
+        "BT203": Page(
+            "The ROS message that this is about has no field of this name. `ros2 interface show` "
+            "prints what it has.",
+            _move("root:\n  move: Go\n  goal: {distnace: 2.0}\n"),
+            _move("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
+        ),
+        "BT204": Page(
+            "A value does not fit the type that is needed. A whole number is a fine float; a "
+            "fraction is no whole number, and a number in quotes is a text.",
+            _move('root:\n  move: Go\n  goal: {distance: "2.0"}\n'),
+            _move("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
+        ),
+        "BT205": Page(
+            "The package of this action, service or message is not installed here, or has none of "
+            "this name. Source the workspace that it is built in, or check with --no-types.",
+            "tree: example\n" + _MOVE.replace("MoveRobot", "MoveRobt")
+            + "root: {move: Go, goal: {distance: 1.0}}\n",
+            _move("root: {move: Go, goal: {distance: 1.0}}\n"),
+        ),
+        "BT206": Page(
+            "An expression does something that the types of its parts do not allow.",
+            _tree("inputs: {label: string}\nroot: {check: $label > 1}\n"),
+            _tree("inputs: {label: string}\nroot: {check: len($label) > 1}\n"),
+        ),
+        "BT207": Page(
+            "This names no type. Plain types are bool, string, float32, float64, byte, and int and "
+            "uint with 8 to 64 bits; others are package/msg/Name. Lists are written float64[], "
+            "float64[3] and float64[<=3].",
+            _tree("inputs: {level: float}\nroot: {check: $level > 1}\n"),
+            _tree("inputs: {level: float64}\nroot: {check: $level > 1}\n"),
+        ),
+        "BT208": Page(
+            "An action's name may not be that of a kind: nobody could tell them apart.",
+            "tree: example\n" + _MOVE.replace("  move:", "  wait:") + "root: {wait: 5 s}\n",
+            _move("root:\n  sequence: Work\n  children: [{move: Go}, {wait: 5 s}]\n"),
+        ),
+        "BT209": Page(
+            "A tree that is included, or a file that is imported, cannot be read. It is looked for "
+            "beside this file, then by its name in BT_ACTIONS_TREE_PATH and in the installed "
+            "packages.",
+            _tree("root: {subtree: no_such_tree.yaml}\n"),
+            _tree("root: {subtree: recover}\n"),
+        ),
+        "BT210": Page(
+            "A tree includes itself, directly or by way of others: it would never end. Use "
+            "'repeat' or 'retry'.",
+            _tree("root: {subtree: wrong.yaml}\n"),
+            _tree("root:\n  repeat: Again\n  times: 2\n  child: {success: Done}\n"),
+        ),
+        "BT211": Page(
+            "The tree that is included has an input without a default, and 'with' does not give "
+            "it. (The wrong example includes a tree with such an input, needs_input.yaml.)",
+            _tree("root: {subtree: needs_input.yaml}\n"),
+            _tree("root: {subtree: needs_input.yaml, with: {speed: 1.0}}\n"),
+        ),
+        "BT212": Page(
+            "The tree that is included has no input of this name.",
+            _tree("root: {subtree: recover, with: {hoem: 0.0}}\n"),
+            _tree("root: {subtree: recover, with: {home: 0.0}}\n"),
+        ),
+        "BT213": Page(
+            "The tree that is included has no output of this name.",
+            _tree("outputs: {at: float64}\n"
+                  "root: {subtree: pick_and_place, save: {at: final_pos}}\n"),
+            _tree("outputs: {at: float64}\n"
+                  "root: {subtree: pick_and_place, save: {at: final_pose}}\n"),
+        ),
+        "BT214": Page(
+            "'python' names a class that can be imported here, and that is a py_trees behaviour.",
+            _tree("root: {python: py_trees.behaviours.Succes}\n"),
+            _tree("root: {python: py_trees.behaviours.Success}\n"),
+        ),
+        "BT215": Page(
+            "The arguments do not fit the constructor of the class. Its name is given by the node.",
+            _tree("root: {python: py_trees.timers.Timer, arguments: {duratoin: 1.0}}\n"),
+            _tree("root: {python: py_trees.timers.Timer, arguments: {duration: 1.0}}\n"),
+        ),
+        "BT216": Page(
+            "Two things have one name, so that it is not clear which is meant.",
+            _tree("inputs: {door: bool}\ntopics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
+                  "root: {check: $door}\n"),
+            _tree("topics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
+                  "root: {check: $door.data}\n"),
+        ),
+        "BT301": Page(
+            "An action without a result timeout waits for ever on a server that hangs. Where that "
+            "is meant, say so: {result: none}.",
+            _move("root: {move: Go}\n").replace("    timeout: 30 s\n", ""),
+            _move("root: {move: Go}\n"),
+        ),
+        "BT302": Page(
+            "When this is reached, no path through the tree has written the variable.",
+            _move("root:\n  sequence: Work\n  children:\n    - check: $at > 1.0\n"
+                  "    - move: Go\n      save: {at: result.final_pose}\n"),
+            _move("root:\n  sequence: Work\n  children:\n    - move: Go\n"
+                  "      save: {at: result.final_pose}\n    - check: $at > 1.0\n"),
+        ),
+        "BT303": Page(
+            "Two branches of a 'parallel' use one action server (or one declared resource): one of "
+            "them waits for the other, or fails when its queue timeout passes.",
+            _move("root:\n  parallel: Both\n  children: [{move: Left}, {move: Right}]\n"),
+            _move("root:\n  sequence: One after the other\n  children: [{move: Left},"
+                  " {move: Right}]\n"),
+        ),
+        "BT304": Page(
+            "A retry without 'attempts' never gives up, and a tree around it never gets on.",
+            _tree("inputs: {ready: bool}\nroot:\n  retry: Until ready\n  child: {check: $ready}\n"),
+            _tree("inputs: {ready: bool}\nroot:\n  retry: Until ready\n  attempts: 5\n"
+                  "  child: {check: $ready}\n"),
+        ),
+        "BT305": Page(
+            "The child before this one always ends the composite: a 'fallback' stops at the first "
+            "success, a 'sequence' at the first failure.",
+            _tree("root:\n  sequence: Work\n  children: [{failure: Give up}, {success: Done}]\n"),
+            _tree("root:\n  sequence: Work\n  children: [{success: Done}, {failure: Give up}]\n"),
+        ),
+        "BT306": Page(
+            "A composite with 'memory: false' begins with its first child at each tick. An action "
+            "that has finished is thereby sent again while a later child runs.",
+            _move("root:\n  sequence: Work\n  memory: false\n  children: [{move: Go}, {wait: 5 s}]"
+                  "\n"),
+            _move("inputs: {ready: bool}\nroot:\n  sequence: Work\n  memory: false\n"
+                  "  children: [{check: $ready}, {move: Go}]\n"),
+        ),
+        "BT307": Page(
+            "The node stops what it holds before the deadlines and retries in there can pass.",
+            _move("root:\n  timeout: Short\n  after: 5 s\n  child: {move: Go}\n"),
+            _move("root:\n  timeout: Long enough\n  after: 40 s\n  child: {move: Go}\n"),
+        ),
+        "BT308": Page(
+            "Nothing in the tree reads this input, so giving it does nothing.",
+            _tree("inputs: {speed: float64}\n" + _SUCCESS),
+            _tree("inputs: {speed: float64}\nroot: {check: $speed > 0.0}\n"),
+        ),
+        "BT309": Page(
+            "The tree declares an action or a topic that no node uses.",
+            _move(_SUCCESS),
+            _move("root: {move: Go}\n"),
+        ),
+        "BT310": Page(
+            "A node writes a variable that nothing reads, and that is no output.",
+            _tree("root: {set: {count: 1}}\n"),
+            _tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
+        ),
+        "BT311": Page(
+            "The tree promises an output that none of its nodes writes.",
+            _tree("outputs: {count: int32}\n" + _SUCCESS),
+            _tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
+        ),
+    }
+)  # fmt: skip
+"""The page of each rule by its code."""

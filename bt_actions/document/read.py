@@ -1,0 +1,263 @@
+"""From YAML nodes to a document, by the model: forms, keys and kinds.
+
+Reports everything that is wrong with the form and goes on; names and types are the checker's. A
+part that was reported stands as BAD, so that nothing is said about it twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+
+from bt_actions.document.findings import Place, Related, Span
+from bt_actions.document.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS, Kind
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
+from bt_actions.document.shape import words_for
+from bt_actions.document.shapes import Key, read_keys, report_unknown_key
+from bt_actions.document.source import Source
+from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.values import BAD
+from bt_actions.suggest import closest, did_you_mean, listing
+
+__all__ = ["read_document", "read_root"]
+
+_CHILDREN = ("child", "children")
+_BESIDE_CHILD = frozenset({"timeout", "retry"})
+"""Kinds only beside `child:`; settings of an action elsewhere."""
+
+
+def read_document(source: Source, *, library: bool = False) -> Document | None:
+    """The document in a source, without its nodes (see `read_root`); None when there is none.
+
+    `library` is a file that another imports: it needs no tree, and may hold none.
+    """
+    errors = len(source.findings)
+    node = compose(source)
+    if node is None:
+        if len(source.findings) == errors:
+            source.report("BT106", Span(1, 1, 1, 2), "the file is empty")
+        return None
+    if not isinstance(node, Mapping):
+        message = f"a tree is a mapping with the keys 'tree' and 'root', not {words_for(node)}"
+        source.report("BT106", span_of(node), message)
+        return None
+    document = Document(source, node)
+    if not library and node.get("root") is None and node.get("tree") is None:
+        library = any(node.get(name) is not None for name in ("actions", "topics", "defaults"))
+    keys = LIBRARY_KEYS if library else TOP_KEYS
+    if library and node.get("root") is not None:
+        keys = TOP_KEYS
+    if not library and node.get("root") is None and node.get("tree") is None:
+        source.report(
+            "BT106", Span(node.line, node.column, node.line, node.column + 1),
+            "this is not a tree: the keys 'tree' and 'root' are missing",
+        )  # fmt: skip
+        return None
+    values = read_keys(_without(node, "root"), _but_root(keys), source, keys)
+    misspelt = any(closest(key.text, keys) == "root" for key, _ in node.pairs)
+    if "root" in keys and not library and node.get("root") is None and not misspelt:
+        source.report("BT108", _first(node), "the key 'root' is missing: it holds the tree's nodes")
+    document.values = values
+    name = values.get("tree")
+    document.name = name if isinstance(name, str) else ""
+    for table in ("inputs", "outputs", "actions", "topics"):
+        _declare(document, table, getattr(document, table))
+    defaults = values.get("defaults")
+    document.defaults = dict(defaults) if isinstance(defaults, dict) else {}
+    return document
+
+
+def _first(node: Node) -> Span:
+    return Span(node.line, node.column, node.line, node.column + 1)
+
+
+def _without(node: Mapping, name: str) -> Mapping:
+    copy = Mapping()
+    copy.line, copy.column = node.line, node.column
+    copy.end_line, copy.end_column = node.line, node.column + 1
+    copy.flow = node.flow
+    copy.pairs = [pair for pair in node.pairs if pair[0].text != name]
+    return copy
+
+
+def _but_root(keys: MappingType[str, Key]) -> MappingType[str, Key]:
+    return {name: key for name, key in keys.items() if name != "root"}
+
+
+def _declare(document: Document, table: str, into: dict[str, Declared]) -> None:
+    written = document.node.get(table)
+    values = document.values.get(table)
+    if not isinstance(written, Mapping) or not isinstance(values, dict):
+        return
+    for key, node in written.pairs:
+        if key.text not in values:
+            continue
+        read = values[key.text]
+        own = read if isinstance(read, dict) else {}
+        if read is BAD:
+            own = {"type": BAD}
+        into[key.text] = Declared(key.text, own, key, node, document.source)
+        if table == "actions" and key.text in KINDS:
+            document.source.report(
+                "BT208", span_of(key), f"{key.text!r} is a kind of node and cannot name an action"
+            )
+            del into[key.text]
+
+
+def read_root(document: Document) -> None:
+    """Read the nodes of a document whose actions are all known (its imports' among them)."""
+    written = document.node.get("root")
+    if written is not None:
+        document.root = _Reader(document).node(written)
+
+
+class _Reader:
+    """Reads nodes; recursion is bounded by the depth that `compose` allows."""
+
+    def __init__(self, document: Document) -> None:
+        self._source = document.source
+        self._actions = document.actions
+        self._topics = document.topics
+
+    def node(self, written: Node) -> TreeNode | None:
+        source = self._source
+        if not isinstance(written, Mapping):
+            hint = None
+            if isinstance(written, Scalar) and written.text in KINDS:
+                hint = f"write '{written.text}: name'"
+            message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
+            source.report("BT111", span_of(written), message, hint=hint)
+            return None
+        key = self._kind_key(written)
+        if key is None:
+            self._only_children(written)
+            return None
+        kind = KINDS.get(key.text)
+        node = TreeNode(kind, key, written, source)
+        if kind is None:
+            node.alias = key.text
+            self._fill(node, ACTION_KEYS, _ACTION_NAME)
+        else:
+            self._fill(node, kind.keys, kind)
+        return node
+
+    def _kind_key(self, written: Mapping) -> Scalar | None:
+        """The one key that is a kind or an alias, or None after reporting."""
+        has_child = any(key.text == "child" for key, _ in written.pairs)
+        found = [
+            key
+            for key, _ in written.pairs
+            if (key.text in KINDS or key.text in self._actions)
+            and (has_child or key.text not in _BESIDE_CHILD)
+        ]
+        if len(found) > 1 and has_child:
+            found = [key for key in found if key.text not in _BESIDE_CHILD] or found[:1]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            first, second = found[0], found[1]
+            place = Place(self._source.name, first.line, first.column)
+            self._source.report(
+                "BT112", span_of(second),
+                f"a node is one thing: this is a {first.text!r} and a {second.text!r}",
+                hint="begin a new item with '-'", related=Related(place, "the first is here"),
+            )  # fmt: skip
+            return None
+        self._report_no_kind(written)
+        return None
+
+    def _report_no_kind(self, written: Mapping) -> None:
+        settings = {*ACTION_KEYS, *_CHILDREN, *(key for k in KINDS.values() for key in k.keys)}
+        words = [key for key, _ in written.pairs if key.text not in settings]
+        if not words:
+            hint = "one key of a node is its kind, such as 'sequence: name'"
+            self._source.report("BT111", _first(written), "this node has no kind", hint=hint)
+            return
+        known = [*KINDS, *self._actions]
+        key, near = words[0], ""
+        for word in words:
+            near = did_you_mean(word.text, known)
+            if near:
+                key = word
+                break
+        own = listing(self._actions)
+        hint = f"this tree's actions are {own}" if own else "this tree declares no actions"
+        message = f"no kind of node and no action is called {key.text!r}{near}"
+        self._source.report("BT201", span_of(key), message, hint=None if near else hint)
+
+    def _only_children(self, written: Mapping) -> None:
+        """What is below a node that could not be read is read for its own sake."""
+        for name in _CHILDREN:
+            inner = written.get(name)
+            if inner is not None:
+                self._children(TreeNode(None, Scalar(), written, self._source), name, inner)
+
+    def _fill(self, node: TreeNode, keys: MappingType[str, Key], kind: Kind) -> None:
+        source = self._source
+        unknown = False
+        for key, inner in node.node.pairs:
+            name = key.text
+            if key is node.key:
+                node.written[name] = inner
+                value = kind.value.read(inner, source)
+                node.values[name] = value
+                if kind.named_by_value and isinstance(value, str):
+                    node.name = value
+            elif name in _CHILDREN and name in keys:
+                node.written[name] = inner
+                self._children(node, name, inner)
+            else:
+                known = keys.get(name)
+                if known is None:
+                    unknown = True
+                    self._report_unknown(node, key, keys)
+                    if name in _CHILDREN:
+                        self._children(TreeNode(None, key, node.node, source), name, inner)
+                    continue
+                node.written[name] = inner
+                node.values[name] = known.shape.read(inner, source)
+        own = node.values.get("name")
+        if isinstance(own, str):
+            node.name = own
+        if unknown:
+            return
+        for wanted in keys.values():
+            if wanted.required and wanted.name not in node.written:
+                source.report(
+                    "BT108", span_of(node.key),
+                    f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,
+                )  # fmt: skip
+
+    def _report_unknown(self, node: TreeNode, key: Scalar, keys: MappingType[str, Key]) -> None:
+        if key.text in _CHILDREN:
+            other = "child" if key.text == "children" else "children"
+            hint = f"it holds {other!r}" if other in keys else "it is a leaf"
+            message = f"{node.key.text!r} has no {key.text!r}"
+            self._source.report("BT107", span_of(key), message, hint=hint)
+        else:
+            report_unknown_key(key, keys, self._source)
+
+    def _children(self, node: TreeNode, name: str, inner: Node) -> None:
+        if name == "child":
+            if isinstance(inner, Listing):
+                message = "'child' is one node, not a list"
+                self._source.report("BT109", span_of(inner), message, hint="use a sequence")
+                written: list[Node] = inner.items
+            else:
+                written = [inner]
+        elif not isinstance(inner, Listing):
+            message = f"a list of nodes is needed, not {words_for(inner)}"
+            hint = "each child begins with '- '" if isinstance(inner, Mapping) else None
+            self._source.report("BT109", span_of(inner), message, hint=hint)
+            return
+        else:
+            written = inner.items
+            if not written:
+                self._source.report("BT110", span_of(inner), "there must be a child at least")
+        for item in written:
+            child = self.node(item)
+            if child is not None:
+                node.children.append(child)
+
+
+_ACTION_NAME = KINDS["sequence"]
+"""The value of an alias is the node's name, as that of a composite is."""

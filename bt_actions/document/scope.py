@@ -1,0 +1,63 @@
+"""The variables of one loaded tree, on py_trees' blackboard under a namespace of their own.
+
+The blackboard is process-global and has no lock: read and write on the ticking thread only.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Mapping
+
+from py_trees.blackboard import Blackboard
+
+__all__ = ["Scope"]
+
+_loads = itertools.count(1)
+
+
+class Scope:
+    """Names of a tree and where their values lie; `topics` are read before the blackboard."""
+
+    def __init__(self, prefix: str) -> None:
+        self.prefix = prefix
+        self._children: dict[str, int] = {}
+
+    def __repr__(self) -> str:
+        return f"<Scope {self.prefix}>"
+
+    @classmethod
+    def of_load(cls, tree: str) -> Scope:
+        """The scope of a tree that is loaded now: no other load has the same."""
+        return cls(f"/bt/{_safe(tree)}/{next(_loads)}")
+
+    def inner(self, tree: str) -> Scope:
+        """The scope of a tree included in this one."""
+        name = _safe(tree)
+        number = self._children[name] = self._children.get(name, 0) + 1
+        return Scope(f"{self.prefix}/{name}_{number}")
+
+    def key(self, name: str) -> str:
+        """The blackboard key of a variable."""
+        return f"{self.prefix}/{name}"
+
+    def read(self, name: str) -> object:
+        """The value of a variable. Raises KeyError when it has none."""
+        return Blackboard.storage[self.key(name)]
+
+    def write(self, name: str, value: object) -> None:
+        """Give a variable a value."""
+        Blackboard.set(self.key(name), value)
+
+    def write_all(self, values: Mapping[str, object]) -> None:
+        """Give several variables their values."""
+        for name, value in values.items():
+            self.write(name, value)
+
+    def clear(self, name: str) -> None:
+        """Take a variable's value away, if it has one."""
+        Blackboard.unset(self.key(name))
+
+
+def _safe(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_]", "_", name) or "tree"

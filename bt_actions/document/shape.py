@@ -1,0 +1,85 @@
+"""What all forms of values have in common: the protocol, and how wrong forms are reported."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
+from bt_actions.document.source import Source
+from bt_actions.document.values import BAD
+
+__all__ = [
+    "Schema",
+    "Shape",
+    "is_computed",
+    "or_variable",
+    "report_braces",
+    "words_for",
+    "wrong_form",
+]
+
+Schema = dict[str, object]
+
+
+class Shape(Protocol):
+    """A form of a value."""
+
+    @property
+    def words(self) -> str:
+        """What is needed, as a message and the reference say it: ``a duration, such as 5 s``."""
+
+    def read(self, node: Node, source: Source) -> object:
+        """The value, or BAD after reporting what is wrong."""
+
+    def schema(self) -> Schema:
+        """JSON Schema for it."""
+
+
+def words_for(node: Node) -> str:
+    """What a node is, as a message says it."""
+    if isinstance(node, Mapping):
+        return "a mapping"
+    if isinstance(node, Listing):
+        return "a list"
+    assert isinstance(node, Scalar)
+    value = node.value
+    if value is None:
+        return "nothing"
+    if isinstance(value, str):
+        return repr(value) if len(value) <= 40 else f"{value[:37]!r}..."
+    return node.text if len(node.text) <= 40 else f"{node.text[:37]}..."
+
+
+def wrong_form(shape: Shape, node: Node, source: Source, code: str = "BT109") -> object:
+    """Report that a node is not of a form."""
+    if report_braces(node, source):
+        return BAD
+    hint = None
+    if isinstance(node, Scalar) and "text" in shape.words and not isinstance(node.value, str):
+        hint = f'to mean the text, write "{node.text}"' if node.text else None
+    source.report(code, span_of(node), f"{shape.words} is needed, not {words_for(node)}", hint=hint)
+    return BAD
+
+
+def report_braces(node: Node, source: Source) -> bool:
+    """Report `{x}` where no mapping is meant: YAML reads it as a mapping of x to nothing."""
+    if not isinstance(node, Mapping) or not node.flow or len(node.pairs) != 1:
+        return False
+    key, value = node.pairs[0]
+    if not isinstance(value, Scalar) or value.value is not None or not value.plain:
+        return False
+    hint = f"leave the braces away, or write ${key.text} for a variable"
+    source.report("BT117", span_of(node), f"{{{key.text}}} is read as a mapping", hint=hint)
+    return True
+
+
+def is_computed(node: Node) -> bool:
+    """Whether a node is `$name` or computed."""
+    return isinstance(node, Scalar) and node.text.startswith(("$", "= "))
+
+
+def or_variable(schema: Schema, values: bool) -> Schema:
+    """A schema that lets a variable stand for the value, where `values` says so."""
+    if not values:
+        return schema
+    return {"anyOf": [schema, {"type": "string", "pattern": r"^(\$|= )"}]}

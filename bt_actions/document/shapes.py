@@ -1,0 +1,224 @@
+"""The forms of values with parts: lists, tables, records, data with variables in it.
+
+`model.py` says which key has which form. A form reports what is wrong to the source and then gives
+BAD; it knows nothing of the rest of the document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
+
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
+from bt_actions.document.scalars import Choice, Name
+from bt_actions.document.shape import Schema, Shape, is_computed, wrong_form
+from bt_actions.document.source import Source
+from bt_actions.document.values import BAD, read_value
+from bt_actions.suggest import did_you_mean
+
+__all__ = [
+    "AnyValue", "Key", "ListOf", "ListValue", "OneOf", "Record", "Table", "Values", "keys_schema",
+    "read_keys", "report_unknown_key",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class AnyValue:
+    """Anything, with `$name` in it."""
+
+    words: str = "a value"
+
+    def read(self, node: Node, source: Source) -> object:
+        return read_value(node, source)
+
+    def schema(self) -> Schema:
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
+class Values:
+    """A mapping of fields (or names) to values, with `$name` in them."""
+
+    words: str = "a mapping of fields to values"
+
+    def read(self, node: Node, source: Source) -> object:
+        if isinstance(node, Scalar) and is_computed(node):
+            return read_value(node, source)
+        if not isinstance(node, Mapping):
+            return wrong_form(self, node, source)
+        return read_value(node, source)
+
+    def schema(self) -> Schema:
+        return {"type": ["object", "string"]}
+
+
+@dataclass(frozen=True, slots=True)
+class ListValue:
+    """A list of any values, or `$name` for one."""
+
+    words: str = "a list"
+
+    def read(self, node: Node, source: Source) -> object:
+        if isinstance(node, Listing) or is_computed(node):
+            return read_value(node, source)
+        return wrong_form(self, node, source)
+
+    def schema(self) -> Schema:
+        return {"type": ["array", "string"]}
+
+
+@dataclass(frozen=True, slots=True)
+class ListOf:
+    """A list; with `single`, one item may stand without the brackets."""
+
+    item: Shape
+    single: bool = False
+
+    @property
+    def words(self) -> str:
+        return "a list"
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Listing):
+            if self.single and isinstance(node, Scalar):
+                value = self.item.read(node, source)
+                return BAD if value is BAD else [value]
+            return wrong_form(self, node, source)
+        items = [self.item.read(item, source) for item in node.items]
+        return BAD if any(item is BAD for item in items) else items
+
+    def schema(self) -> Schema:
+        listing: Schema = {"type": "array", "items": self.item.schema()}
+        return {"anyOf": [listing, self.item.schema()]} if self.single else listing
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A mapping from names to values of one form."""
+
+    item: Shape
+    words: str = "a mapping"
+
+    def read(self, node: Node, source: Source) -> object:
+        if isinstance(node, Scalar) and node.plain and node.text == "":
+            return {}
+        if not isinstance(node, Mapping):
+            return wrong_form(self, node, source)
+        found: dict[str, object] = {}
+        for key, inner in node.pairs:
+            name = Name().read(key, source)
+            value = self.item.read(inner, source)
+            if name is not BAD:
+                found[key.text] = value
+        return found
+
+    def schema(self) -> Schema:
+        return {
+            "type": ["object", "null"],
+            "propertyNames": Name().schema(),
+            "additionalProperties": self.item.schema(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key that may stand in a mapping."""
+
+    name: str
+    shape: Shape
+    doc: str
+    required: bool = False
+    default: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A mapping with known keys; `short` is the key that a bare value stands for."""
+
+    words: str
+    keys: MappingType[str, Key]
+    short: str | None = None
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Mapping):
+            if self.short is not None and isinstance(node, Scalar):
+                value = self.keys[self.short].shape.read(node, source)
+                return BAD if value is BAD else {self.short: value}
+            return wrong_form(self, node, source)
+        return read_keys(node, self.keys, source)
+
+    def schema(self) -> Schema:
+        schema = keys_schema(self.keys)
+        if self.short is not None:
+            return {"anyOf": [self.keys[self.short].shape.schema(), schema]}
+        return schema
+
+
+@dataclass(frozen=True, slots=True)
+class OneOf:
+    """A word out of a few, or a record."""
+
+    choice: Choice
+    record: Record
+
+    @property
+    def words(self) -> str:
+        return f"{self.choice.words}, or {self.record.words}"
+
+    def read(self, node: Node, source: Source) -> object:
+        if isinstance(node, Scalar):
+            return self.choice.read(node, source)
+        return self.record.read(node, source)
+
+    def schema(self) -> Schema:
+        return {"anyOf": [self.choice.schema(), self.record.schema()]}
+
+
+def read_keys(
+    node: Mapping,
+    keys: MappingType[str, Key],
+    source: Source,
+    all_keys: MappingType[str, Key] | None = None,
+) -> dict[str, object]:
+    """The values of a mapping's keys; unknown and missing ones are reported.
+
+    `all_keys` are those that may stand here, where some of them are read elsewhere.
+    """
+    values: dict[str, object] = {}
+    unknown = False
+    for key, inner in node.pairs:
+        known = keys.get(key.text)
+        if known is None:
+            unknown = True
+            report_unknown_key(key, all_keys or keys, source)
+        else:
+            values[key.text] = known.shape.read(inner, source)
+    if not unknown:  # a misspelt key would be reported twice
+        for key_model in keys.values():
+            if key_model.required and key_model.name not in values:
+                source.report("BT108", span_of(node), f"the key {key_model.name!r} is missing",
+                              hint=key_model.doc)  # fmt: skip
+    return values
+
+
+def report_unknown_key(key: Scalar, known: MappingType[str, object], source: Source) -> None:
+    """Report a key that cannot stand where it stands."""
+    near = did_you_mean(key.text, known)
+    there = f"there is {', '.join(known)}" if known else "no other key can stand here"
+    hint = None if near else there
+    source.report("BT107", span_of(key), f"unknown key {key.text!r}{near}", hint=hint)
+
+
+def keys_schema(keys: MappingType[str, Key]) -> Schema:
+    """JSON Schema for a mapping with known keys."""
+    schema: Schema = {
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {
+            key.name: {"description": key.doc, **key.shape.schema()} for key in keys.values()
+        },
+    }
+    required = [key.name for key in keys.values() if key.required]
+    if required:
+        schema["required"] = required
+    return schema

@@ -1,0 +1,131 @@
+"""The text of a document, read within bounds. No YAML here.
+
+Reading never takes more than `MAX_BYTES` of memory, whatever the path leads to.
+"""
+
+from __future__ import annotations
+
+import re
+import stat
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bt_actions.document.findings import DocumentError, Finding, Related, Severity, Span
+from bt_actions.document.rules import RULES
+
+__all__ = ["MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "read_source", "source_of"]
+
+MAX_BYTES = 32 * 1024 * 1024
+"""The largest file that is read; a tree of 100,000 nodes has about a third of it."""
+MAX_ERRORS = 1000
+"""After so many errors the checker stops: each costs time to explain."""
+_FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+class TooManyErrors(Exception):
+    """A document has more errors than anybody wants to read; they are in its source."""
+
+
+@dataclass(slots=True, eq=False)
+class Source:
+    """A document's text, the name it is known by, and the findings in it so far."""
+
+    name: str
+    text: str
+    path: Path | None = None
+    findings: list[Finding] = field(default_factory=list)
+    anchored: bool = False
+    """Whether the text names parts of itself (&name); known after it was composed."""
+    _lines: list[str] | None = None
+
+    @property
+    def lines(self) -> list[str]:
+        """The lines, without their ends."""
+        if self._lines is None:
+            self._lines = self.text.splitlines() if self.text else []
+        return self._lines
+
+    def line(self, number: int) -> str | None:
+        """Line `number` (from 1), or None past the end."""
+        lines = self.lines
+        return lines[number - 1] if 0 < number <= len(lines) else None
+
+    def report(
+        self,
+        code: str,
+        span: Span,
+        message: str,
+        *,
+        hint: str | None = None,
+        related: Related | None = None,
+    ) -> None:
+        """File a finding; its severity is its rule's. Raises TooManyErrors after `MAX_ERRORS`."""
+        if len(self.findings) >= MAX_ERRORS and RULES[code].severity is Severity.ERROR:
+            raise TooManyErrors
+        line = self.line(span.line)
+        if (span.end_line, span.end_column) <= (span.line, span.column):
+            span = Span(span.line, span.column, span.line, span.column + 1)
+        self.findings.append(
+            Finding(
+                self.name, span.line, span.column, span.end_line, span.end_column, code,
+                RULES[code].severity, message, hint, related, line,
+            )
+        )  # fmt: skip
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether anything found so far keeps the tree from running."""
+        return any(finding.severity is Severity.ERROR for finding in self.findings)
+
+
+def read_source(path: Path, name: str | None = None) -> Source:
+    """The source in a file. Raises DocumentError when it cannot be read as text."""
+    name = str(path) if name is None else name
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise _unreadable(name, "this is a directory, not a tree")
+        if not stat.S_ISREG(mode) and not stat.S_ISFIFO(mode):
+            raise _unreadable(name, "this is no regular file")
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except DocumentError:  # is a ValueError, too
+        raise
+    except FileNotFoundError:
+        raise _unreadable(name, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise _unreadable(name, f"this cannot be read: {reason}") from None
+    return source_of(data, name, path)
+
+
+def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
+    """The source in some bytes. Raises DocumentError when they are no usable text."""
+    if len(data) > MAX_BYTES:
+        raise _unreadable(name, f"this is larger than {MAX_BYTES // 1024 // 1024} MiB")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8", "replace")
+        line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+        raise _unreadable(
+            name, f"byte 0x{data[error.start]:02x} is no UTF-8", "BT101", line, column
+        ) from None
+    source = Source(name, text, path)
+    bad = _FORBIDDEN.search(text)
+    if bad is not None:
+        line = text.count("\n", 0, bad.start()) + 1
+        column = bad.start() - (text.rfind("\n", 0, bad.start()) + 1) + 1
+        raise _unreadable(
+            name, f"the character U+{ord(bad[0]):04X} cannot stand in a YAML text", "BT101",
+            line, column,
+        )  # fmt: skip
+    return source
+
+
+def _unreadable(
+    name: str, message: str, code: str = "BT100", line: int = 1, column: int = 1
+) -> DocumentError:
+    return DocumentError(
+        [Finding(name, line, column, line, column + 1, code, RULES[code].severity, message)]
+    )

@@ -1,0 +1,110 @@
+"""A document after reading: what was said, with the YAML node each part came from.
+
+Plain values; nothing here checks or builds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from bt_actions.document.findings import Place
+from bt_actions.document.model import Kind
+from bt_actions.document.nodes import Mapping, Node, Scalar
+from bt_actions.document.source import Source
+
+__all__ = ["Declared", "Document", "TreeNode"]
+
+
+class TreeNode:
+    """A node of the tree.
+
+    `values` holds what was read under each key (the kind's own key included), `written` the YAML
+    node of each. `alias` is the action's name in this document, where the node is one; `included`
+    the tree that a subtree stands for.
+    """
+
+    __slots__ = (
+        "alias",
+        "children",
+        "included",
+        "key",
+        "kind",
+        "name",
+        "node",
+        "source",
+        "values",
+        "written",
+    )
+
+    def __init__(self, kind: Kind | None, key: Scalar, node: Mapping, source: Source) -> None:
+        self.kind = kind
+        self.key = key
+        self.node = node
+        self.source = source
+        self.alias: str | None = None
+        self.name: str = ""
+        self.values: dict[str, object] = {}
+        self.written: dict[str, Node] = {}
+        self.children: list[TreeNode] = []
+        self.included: Document | None = None
+
+    @property
+    def place(self) -> Place:
+        """Where the node's kind is written."""
+        return Place(self.source.name, self.key.line, self.key.column)
+
+    def walk(self) -> Iterator[TreeNode]:
+        """This node and all below it, in the order of the text."""
+        stack = [self]
+        while stack:
+            node = stack.pop()
+            yield node
+            stack.extend(reversed(node.children))
+
+
+@dataclass(slots=True)
+class Declared:
+    """Something with a name: an input, an output, an action, a topic."""
+
+    name: str
+    values: dict[str, object]
+    key: Scalar
+    node: Node
+    source: Source
+
+    @property
+    def place(self) -> Place:
+        return Place(self.source.name, self.key.line, self.key.column)
+
+    def written(self, key: str) -> Node:
+        """The YAML node of one of its keys, or of the whole where it is written short."""
+        found = self.node.get(key) if isinstance(self.node, Mapping) else None
+        return self.node if found is None else found
+
+
+@dataclass(slots=True)
+class Document:
+    """A tree, or a library of actions and topics for trees to import."""
+
+    source: Source
+    node: Mapping
+    values: dict[str, object] = field(default_factory=dict)
+    name: str = ""
+    inputs: dict[str, Declared] = field(default_factory=dict)
+    outputs: dict[str, Declared] = field(default_factory=dict)
+    actions: dict[str, Declared] = field(default_factory=dict)
+    topics: dict[str, Declared] = field(default_factory=dict)
+    defaults: dict[str, object] = field(default_factory=dict)
+    root: TreeNode | None = None
+    imported: list[Document] = field(default_factory=list)
+
+    @property
+    def namespace(self) -> str:
+        value = self.values.get("namespace", "")
+        return value if isinstance(value, str) else ""
+
+    def nodes(self) -> Iterator[TreeNode]:
+        """All nodes of the tree, in the order of the text."""
+        if self.root is not None:
+            yield from self.root.walk()

@@ -1,0 +1,92 @@
+"""Types as a tree names them (`float64`, `string[]`, `geometry_msgs/msg/Pose`), and what fits what.
+
+Needs no ROS for the plain types; a message's type is looked up only where types are checked.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Scalar
+from bt_actions.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from bt_actions.ros.interfaces import Kind
+
+__all__ = ["PLAIN_TYPES", "TypeNameError", "fits", "interface_of", "parse_type"]
+
+PLAIN_TYPES = ("bool", *FLOATS, *(name for name in INTEGERS), "string")
+"""The types that need no package."""
+_SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{1,9}))?(\])?)?")
+
+
+class TypeNameError(ValueError):
+    """A text that names no type; `installed` is False when it could be one elsewhere."""
+
+    def __init__(self, message: str, *, missing: bool = False) -> None:
+        super().__init__(message)
+        self.missing = missing
+
+
+def parse_type(text: str, *, types: bool = True) -> FieldType | None:
+    """The type a text names; None for a message's type when `types` is False.
+
+    Raises TypeNameError, which says what was meant or what is missing.
+    """
+    match = _SYNTAX.fullmatch(text)
+    listed = "[" in text
+    if match is None or listed != (match[5] is not None) or (match[2] and match[1] != "string"):
+        raise TypeNameError(f"{text!r} is no type")
+    item = _item(match[1], int(match[2]) if match[2] else None, types)
+    if item is None or not listed:
+        return item
+    if match[4] is None:
+        return Listing(item)
+    size = int(match[4])
+    return Listing(item, limit=size) if match[3] else Listing(item, size=size)
+
+
+def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
+    if name in PLAIN_TYPES:
+        return Scalar(name, limit)
+    if "/" not in name:
+        near = did_you_mean(name, PLAIN_TYPES)
+        known = near or f"; there is {', '.join(PLAIN_TYPES)}, and package/msg/Name"
+        raise TypeNameError(f"{name!r} is no type{known}")
+    if not types:
+        return None
+    return Message(interface_of(name, "msg"))
+
+
+def interface_of(name: str, kind: Kind) -> type:
+    """The class of an interface. Raises TypeNameError."""
+    from bt_actions.ros.interfaces import UnknownInterface, interface
+
+    try:
+        return interface(name, kind)
+    except UnknownInterface as error:
+        raise TypeNameError(str(error), missing=True) from None
+
+
+def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
+    """Whether a value of one type can be put where another is needed; unknown types fit."""
+    if given is None or wanted is None:
+        return True
+    if isinstance(wanted, Message):
+        return isinstance(given, Message) and given.cls is wanted.cls
+    if isinstance(wanted, Listing):
+        return (
+            isinstance(given, Listing)
+            and fits(given.item, wanted.item)
+            and (wanted.size is None or given.size is None or given.size == wanted.size)
+        )
+    if not isinstance(given, Scalar):
+        return False
+    if wanted.name in FLOATS:
+        return given.name in FLOATS or given.name in INTEGERS
+    if wanted.name in INTEGERS:
+        return given.name in INTEGERS
+    if wanted.name in ("string", "wstring"):
+        return given.name in ("string", "wstring")
+    return given.name == wanted.name

@@ -1,0 +1,280 @@
+"""Values as they are written in a tree: literals, and what is computed when it is needed.
+
+A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` stands inside a text;
+`$$` is a dollar sign. Nothing is evaluated here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from bt_actions.document.findings import DocumentError, Span
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
+from bt_actions.document.source import Source, read_source
+from bt_actions.expression import Expression, ExpressionError
+
+__all__ = [
+    "BAD",
+    "Computed",
+    "Interpolated",
+    "Lookup",
+    "computed_in",
+    "inner_span",
+    "locate",
+    "names_file",
+    "read_data",
+    "read_expression",
+    "read_value",
+    "resolve",
+]
+
+Lookup = Callable[[str], object]
+
+
+class _Bad:
+    """Stands for a value that was already reported, so that nothing is reported after it."""
+
+    def __repr__(self) -> str:
+        return "BAD"
+
+
+BAD: Final = _Bad()
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """A value that an expression gives when it is needed; `start` is its place in the scalar."""
+
+    expression: Expression
+    node: Scalar
+    start: int = 0
+
+    def evaluate(self, variable: Lookup) -> object:
+        """The value. Raises ExpressionError."""
+        return self.expression.evaluate({}, variable)
+
+
+@dataclass(frozen=True, slots=True)
+class Interpolated:
+    """A text with values in it."""
+
+    parts: tuple[str | Computed, ...]
+    node: Scalar
+
+    def evaluate(self, variable: Lookup) -> str:
+        """The text. Raises ExpressionError."""
+        return "".join(
+            part if isinstance(part, str) else _as_text(part.evaluate(variable))
+            for part in self.parts
+        )
+
+
+_DATA_FILES = (".yaml", ".yml", ".json")
+_VARIABLE = re.compile(r"\$[A-Za-z_]\w*(?:\.\w+|\[-?\d+\])*", re.ASCII)
+_DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
+
+
+def read_value(node: Node, source: Source) -> object:
+    """Plain data with `Computed` and `Interpolated` in it, or BAD after reporting what is wrong."""
+    if isinstance(node, Scalar):
+        return _read_scalar(node, source)
+    bad = False
+    if isinstance(node, Listing):
+        items = [read_value(item, source) for item in node.items]
+        bad = any(item is BAD for item in items)
+        return BAD if bad else items
+    assert isinstance(node, Mapping)
+    data: dict[str, object] = {}
+    for key, inner in node.pairs:
+        value = read_value(inner, source)
+        bad = bad or value is BAD
+        data[key.text] = value
+    return BAD if bad else data
+
+
+def _read_scalar(node: Scalar, source: Source) -> object:
+    text = node.text
+    if "$" not in text and not text.startswith(("=", "@")):
+        return node.value
+    if names_file(text):
+        return _read_file(node, source)
+    if text.startswith("= "):
+        return _computed(node, source, text[2:], 2)
+    if _VARIABLE.fullmatch(text):
+        return _computed(node, source, text, 0)
+    return _interpolated(node, source)
+
+
+def names_file(text: str) -> bool:
+    """Whether a text stands for the data in a file: ``@points.yaml``."""
+    return text.startswith("@") and text.endswith(_DATA_FILES)
+
+
+def read_data(path: Path) -> object:
+    """The data in a YAML or JSON file; a dollar sign means nothing in it.
+
+    Raises DocumentError, with the place in that file.
+    """
+    source = read_source(path)
+    node = compose(source)
+    if source.findings:
+        raise DocumentError(source.findings)
+    return None if node is None else _data(node)
+
+
+def _data(node: Node) -> object:
+    if isinstance(node, Scalar):
+        return node.value
+    if isinstance(node, Listing):
+        return [_data(item) for item in node.items]
+    assert isinstance(node, Mapping)
+    return {key.text: _data(value) for key, value in node.pairs}
+
+
+def _read_file(node: Scalar, source: Source) -> object:
+    path = Path(node.text[1:])
+    if source.path is not None:
+        path = source.path.parent / path
+    try:
+        return read_data(path)
+    except DocumentError as error:
+        first = error.findings[0]
+        text = f"{path.name}:{first.line}:{first.column}: {first.message}"
+        source.report("BT209", span_of(node), text)
+        return BAD
+
+
+def _computed(node: Scalar, source: Source, text: str, start: int) -> object:
+    expression = read_expression(node, source, text, start, frozenset())
+    return BAD if expression is None else Computed(expression, node, start)
+
+
+def _interpolated(node: Scalar, source: Source) -> object:
+    parts: list[str | Computed] = []
+    at = 0
+    text = node.text
+    for match in _DOLLAR.finditer(text):
+        parts.append(text[at : match.start()])
+        at = match.end()
+        if match[0] == "$$":
+            parts.append("$")
+            continue
+        if match[1] is None:
+            span = inner_span(node, source, match.start(), match.end())
+            hint = "write $(name) inside a text, and $$ for a dollar sign"
+            source.report("BT115", span, "this dollar sign refers to nothing", hint=hint)
+            return BAD
+        written = "$" + match[1].strip()
+        if not _VARIABLE.fullmatch(written):
+            span = inner_span(node, source, match.start(), match.end())
+            hint = "$(name) or $(name.field)"
+            source.report("BT115", span, f"{match[0]} holds no variable's name", hint=hint)
+            return BAD
+        part = _computed(node, source, written, match.start(1) - 1)
+        if part is BAD:
+            return BAD
+        assert isinstance(part, Computed)
+        parts.append(part)
+    parts.append(text[at:])
+    kept = tuple(part for part in parts if part != "")
+    if all(isinstance(part, str) for part in kept):
+        return "".join(str(part) for part in kept)
+    return Interpolated(kept, node)
+
+
+def read_expression(
+    node: Scalar, source: Source, text: str, start: int, roots: frozenset[str]
+) -> Expression | None:
+    """The expression in a part of a scalar, or None after reporting what is wrong with it."""
+    try:
+        return _expression(text, roots)
+    except ExpressionError as error:
+        span = inner_span(node, source, start + error.column, start + error.end_column)
+        source.report("BT114", span, error.message, hint=_cut_hint(node, source))
+        return None
+
+
+@lru_cache(maxsize=4096)
+def _expression(text: str, roots: frozenset[str]) -> Expression:
+    """An expression never changes, and a tree says the same thing in many places."""
+    return Expression(text, roots=roots)
+
+
+def _cut_hint(node: Scalar, source: Source) -> str | None:
+    line = source.line(node.end_line) or ""
+    if node.plain and line[node.end_column - 1 :].lstrip().startswith("#"):
+        return "the '#' after it begins a comment: put the text in quotes"
+    return None
+
+
+def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
+    """The range of a part of a scalar's text; the whole scalar where that cannot be told."""
+    whole = span_of(node)
+    if node.line != node.end_line:
+        return whole
+    line = source.line(node.line) or ""
+    written = line[node.column - 1 : node.end_column - 1]
+    offset = 0 if node.plain else 1
+    if (written if node.plain else written[1:-1]) != node.text:
+        return whole
+    first = node.column + offset + start
+    return Span(node.line, first, node.line, max(first + 1, node.column + offset + end))
+
+
+def locate(node: Node, path: tuple[str | int, ...], *, at_key: bool = False) -> Node:
+    """The YAML node at a path inside another, or the nearest there is on the way."""
+    for depth, step in enumerate(path):
+        last = depth == len(path) - 1
+        if isinstance(node, Mapping):
+            for key, value in node.pairs:
+                if key.text == step:
+                    if last and at_key:
+                        return key
+                    node = value
+                    break
+            else:
+                return node
+        elif isinstance(node, Listing) and isinstance(step, int) and step < len(node.items):
+            node = node.items[step]
+        else:
+            return node
+    return node
+
+
+def computed_in(value: object) -> Iterator[Computed]:
+    """Every computed part of a value, in the order it was written."""
+    if isinstance(value, Computed):
+        yield value
+    elif isinstance(value, Interpolated):
+        for part in value.parts:
+            if isinstance(part, Computed):
+                yield part
+    elif isinstance(value, MappingType):
+        for item in value.values():
+            yield from computed_in(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from computed_in(item)
+
+
+def resolve(value: object, variable: Lookup) -> object:
+    """The value with everything in it computed. Raises ExpressionError."""
+    if isinstance(value, (Computed, Interpolated)):
+        return value.evaluate(variable)
+    if isinstance(value, MappingType):
+        return {key: resolve(item, variable) for key, item in value.items()}
+    if isinstance(value, list):
+        return [resolve(item, variable) for item in value]
+    return value
+
+
+def _as_text(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value)

@@ -1,0 +1,215 @@
+"""Opens a tree with all that it imports and includes; each file is read once.
+
+What cannot be opened is reported where it is named. Nothing is checked here but that the trees
+do not include themselves and do not unfold without bound.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bt_actions.document.find import TreeNotFoundError, find_tree
+from bt_actions.document.findings import DocumentError, Finding, Place, Related
+from bt_actions.document.nodes import Listing, Node, Scalar, span_of
+from bt_actions.document.read import read_document, read_root
+from bt_actions.document.source import Source, read_source
+from bt_actions.document.tree import Declared, Document, TreeNode
+
+__all__ = ["MAX_TREE_NODES", "Workspace"]
+
+MAX_TREE_NODES = 1_000_000
+"""Nodes of a tree after all that it includes was unfolded."""
+_MAX_CHAIN = 50
+
+
+class Workspace:
+    """The documents that belong to one or several trees."""
+
+    def __init__(self) -> None:
+        self._documents: dict[tuple[Path, bool], Document | None] = {}
+        self._sources: list[Source] = []
+        self._sizes: dict[int, int] = {}
+        self._unreadable: list[Finding] = []
+
+    def open(self, path: Path, name: str | None = None) -> Document | None:
+        """The tree in a file, with its imports and subtrees; None when there is none to speak of.
+
+        Raises DocumentError when the file cannot be read at all.
+        """
+        return self._open_tree(read_source(path, name), (_key(path),))
+
+    def open_source(self, source: Source) -> Document | None:
+        """The tree in a source that was read already (standard input, an editor's buffer)."""
+        chain = (_key(source.path),) if source.path is not None else ()
+        return self._open_tree(source, chain)
+
+    @property
+    def documents(self) -> list[Document]:
+        """Every document that was opened, in the order of opening."""
+        return [document for document in self._documents.values() if document is not None]
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Everything found in any of them, by file and place."""
+        found = list(self._unreadable)
+        for source in self._sources:
+            found += sorted(source.findings, key=lambda one: (one.line, one.column, one.code))
+        return found
+
+    def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
+        key = (_key(source.path or Path(source.name)), False)
+        if key in self._documents:
+            return self._documents[key]
+        self._sources.append(source)
+        document = read_document(source)
+        self._documents[key] = document
+        if document is None:
+            return None
+        self._import(document, chain)
+        read_root(document)
+        size = 0
+        for node in document.nodes():
+            size += 1
+            if node.kind is not None and node.kind.name == "subtree":
+                node.included = self._include(node, chain)
+                if node.included is not None:
+                    size += self._sizes.get(id(node.included), 0)
+                if size > MAX_TREE_NODES:
+                    message = f"the tree unfolds to more than {MAX_TREE_NODES:,} nodes"
+                    source.report("BT105", span_of(node.key), message)
+                    break
+        self._sizes[id(document)] = min(size, MAX_TREE_NODES + 1)
+        return document
+
+    def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:
+        wanted = node.values.get("subtree")
+        if not isinstance(wanted, str):
+            return None
+        written = node.written["subtree"]
+        path = self._find(wanted, written, node.source)
+        if path is None:
+            return None
+        key = _key(path)
+        if key in chain:
+            names = [step.name for step in chain[chain.index(key) :]] + [key.name]
+            text = f"the tree includes itself: {' -> '.join(names)}"
+            node.source.report("BT210", span_of(written), text)
+            return None
+        if len(chain) >= _MAX_CHAIN:
+            text = f"more than {_MAX_CHAIN} trees inside each other"
+            node.source.report("BT105", span_of(written), text)
+            return None
+        if (key, False) in self._documents:
+            included = self._documents[key, False]
+        else:
+            source = self._read(path, written, node.source)
+            included = None if source is None else self._open_tree(source, (*chain, key))
+        if included is not None and included.node.get("root") is None:
+            node.source.report("BT209", span_of(written), f"{path.name} holds no tree")
+            return None
+        return included
+
+    def _find(self, wanted: str, written: Node, source: Source) -> Path | None:
+        beside = source.path.parent if source.path is not None else None
+        try:
+            return find_tree(wanted, beside=beside)
+        except TreeNotFoundError as error:
+            source.report("BT209", span_of(written), str(error))
+            return None
+
+    def _read(self, path: Path, written: Node, source: Source) -> Source | None:
+        try:
+            return read_source(path, _shown(path, source))
+        except DocumentError as error:
+            self._unreadable += error.findings
+            text = f"{path.name}: {error.findings[0].message}"
+            source.report("BT209", span_of(written), text)
+            return None
+
+    def _import(self, document: Document, chain: tuple[Path, ...]) -> None:
+        """Take over the actions, topics and defaults of the files a document imports."""
+        names = document.values.get("import")
+        written = document.node.get("import")
+        if not isinstance(names, list) or written is None:
+            return
+        nodes = written.items if isinstance(written, Listing) else [written]
+        defaults: dict[str, object] = {}
+        for name, node in zip(names, nodes, strict=True):
+            library = self._library(str(name), node, document.source, chain)
+            if library is None:
+                continue
+            document.imported.append(library)
+            for theirs, ours in (
+                (library.actions, document.actions),
+                (library.topics, document.topics),
+            ):
+                for declared in theirs.values():
+                    self._take_over(declared, ours, node, document)
+            defaults = merged(defaults, library.defaults)
+        document.defaults = merged(defaults, document.defaults)
+
+    def _take_over(
+        self, declared: Declared, ours: dict[str, Declared], node: Node, document: Document
+    ) -> None:
+        there = ours.setdefault(declared.name, declared)
+        if there is declared or there.source is document.source:
+            return  # a document's own words win over those that it imports
+        document.source.report(
+            "BT216", span_of(node), f"{declared.name!r} is declared by two imports",
+            related=Related(there.place, "the other is here"),
+        )  # fmt: skip
+
+    def _library(
+        self, name: str, node: Node, source: Source, chain: tuple[Path, ...]
+    ) -> Document | None:
+        path = self._find(name, node, source)
+        if path is None:
+            return None
+        key = _key(path)
+        if key in chain:
+            names = [step.name for step in chain[chain.index(key) :]] + [key.name]
+            source.report("BT210", span_of(node), f"a cycle of imports: {' -> '.join(names)}")
+            return None
+        if (key, True) in self._documents:
+            return self._documents[key, True]
+        opened = self._read(path, node, source)
+        if opened is None:
+            return None
+        self._sources.append(opened)
+        library = read_document(opened, library=True)
+        self._documents[key, True] = library
+        if library is not None:
+            self._import(library, (*chain, key))
+        return library
+
+
+def merged(base: object, over: object) -> dict[str, object]:
+    """Two mappings of settings as one, key by key to any depth; `over` wins."""
+    result = dict(base) if isinstance(base, dict) else {}
+    for name, value in (over if isinstance(over, dict) else {}).items():
+        earlier = result.get(name)
+        both = isinstance(earlier, dict) and isinstance(value, dict)
+        result[name] = merged(earlier, value) if both else value
+    return result
+
+
+def place_of_scalar(node: Scalar, source: Source) -> Place:
+    """Where a scalar is written."""
+    return Place(source.name, node.line, node.column)
+
+
+def _key(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return path
+
+
+def _shown(path: Path, source: Source) -> str:
+    """The file's name as a person would write it: as short as the including file's."""
+    if source.path is not None and not Path(source.name).is_absolute():
+        try:
+            return str(path.resolve().relative_to(Path.cwd()))
+        except ValueError:
+            return str(path)
+    return str(path)

@@ -1,0 +1,123 @@
+"""Which variables a node writes, and of which type they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bt_actions.document.infer import infer, type_of_literal
+from bt_actions.document.nodes import Mapping, Node
+from bt_actions.document.tree import Document, TreeNode
+from bt_actions.document.types import TypeNameError, parse_type
+from bt_actions.document.values import Computed, Interpolated
+from bt_actions.ros.fields import FieldType, Listing, Message, Scalar
+
+if TYPE_CHECKING:
+    from bt_actions.document.check import Checker
+
+__all__ = ["Write", "writes_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """A variable that a node writes: from `value`, an expression over `root` or plain data."""
+
+    name: str
+    node: TreeNode
+    written: Node
+    value: object
+    root: str | None = None
+
+    def type_in(self, checker: Checker) -> FieldType | None:
+        """The type of what is written, without reporting anything."""
+        if self.node.kind is not None and self.node.kind.name == "subtree":
+            return self._output_type(checker)
+        if self.root == "item of":
+            return self._item_type(checker)
+        if isinstance(self.value, Interpolated):
+            return Scalar("string")
+        if not isinstance(self.value, Computed):
+            return type_of_literal(self.value)
+        roots = {} if self.root is None else {self.root: _root_type(self.node, self.root, checker)}
+        return infer(self.value.expression, roots, checker.variables.get, lambda *_: None)
+
+    def _item_type(self, checker: Checker) -> FieldType | None:
+        """The type of what a for_each gives its child."""
+        if isinstance(self.value, list):
+            kinds = {type_of_literal(item) for item in self.value}
+            return kinds.pop() if len(kinds) == 1 else None
+        if not isinstance(self.value, Computed):
+            return None
+        kind = infer(self.value.expression, {}, checker.variables.get, lambda *_: None)
+        return kind.item if isinstance(kind, Listing) else None
+
+    def _output_type(self, checker: Checker) -> FieldType | None:
+        included = self.node.included
+        declared = included.outputs.get(str(self.value)) if included is not None else None
+        text = declared.values.get("type") if declared is not None else None
+        if not isinstance(text, str):
+            return None
+        try:
+            return parse_type(text, types=checker.types)
+        except TypeNameError:
+            return None
+
+
+def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
+    """The variables that a node itself writes."""
+    values = node.values
+    declared = document.actions.get(node.alias) if node.alias is not None else None
+    if declared is not None:
+        own = values.get("save")
+        shared = declared.values.get("save")
+        for name, value in (shared if isinstance(shared, dict) else {}).items():
+            if not isinstance(own, dict) or name not in own:
+                yield Write(name, node, node.node, value, "result")
+    saved = values.get("save")
+    if isinstance(saved, dict):
+        table = node.written.get("save")
+        for name, value in saved.items():
+            inner = table.get(name) if isinstance(table, Mapping) else None
+            root = None if node.kind is not None and node.kind.name == "subtree" else "result"
+            if node.kind is not None and node.kind.name == "wait_for_message":
+                root = "message"
+            yield Write(name, node, inner or node.node, value, root)
+    if node.kind is None:
+        return
+    if node.kind.name == "set" and isinstance(values.get("set"), dict):
+        table = node.written.get("set")
+        for name, value in values["set"].items():  # type: ignore[attr-defined]
+            inner = table.get(name) if isinstance(table, Mapping) else None
+            yield Write(name, node, inner or node.node, value)
+    if node.kind.name == "for_each":
+        item = values.get("as", "item")
+        if isinstance(item, str):
+            yield Write(item, node, node.written.get("as", node.key), values.get("in"), "item of")
+        index = values.get("index")
+        if isinstance(index, str):
+            yield Write(index, node, node.written["index"], 0)
+
+
+def _root_type(node: TreeNode, root: str, checker: Checker) -> FieldType | None:
+    """The type of the bare root that a node's expressions may use."""
+    if not checker.types:
+        return None
+    if node.alias is not None:
+        declared = checker.document.actions.get(node.alias)
+        cls = checker.action_class(declared) if declared is not None else None
+        return None if cls is None else Message(cls.Result)  # type: ignore[attr-defined]
+    if node.kind is None or node.kind.name not in _ANSWERS:
+        return None
+    kind, part = _ANSWERS[node.kind.name]
+    name = node.values.get("type")
+    if not isinstance(name, str):
+        return None
+    cls = checker.interface(name, kind, node.written["type"])
+    if cls is None:
+        return None
+    return Message(getattr(cls, part) if part else cls)
+
+
+_ANSWERS = {"action": ("action", "Result"), "service": ("srv", "Response"),
+            "wait_for_message": ("msg", "")}  # fmt: skip

@@ -1,0 +1,298 @@
+"""Expressions of a tree: ``result.stalled and $count < 3``, parsed once, evaluated often.
+
+No ROS here. Python's own ``ast`` does the parsing; only what `Expression._compile` lists is let
+through, and each node of the expression becomes a closure. Evaluating calls nothing but `len`,
+`abs`, `min` and `max`, reads no name that begins with an underscore, makes no large number and no
+large text, and raises nothing but `ExpressionError`.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Mapping
+
+from bt_actions.expression_text import ExpressionError, translate
+from bt_actions.expression_values import (
+    BINARY,
+    COMPARE,
+    FUNCTIONS,
+    MAX_BITS,
+    UNARY,
+    bounded,
+    call,
+    field,
+    item,
+    plain,
+    reason,
+    show,
+    truth,
+)
+
+__all__ = ["MAX_LENGTH", "Expression", "ExpressionError"]
+
+MAX_LENGTH = 2000
+"""Characters in one expression."""
+_MAX_DEPTH = 60
+_CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
+Variable = Callable[[str], object]
+_Roots = Mapping[str, object]
+_Closure = Callable[[_Roots, Variable], object]
+
+
+class Expression:
+    """An expression that was read and found well-formed.
+
+    `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `names` are
+    the variables it reads, without the dollar sign; `tree` is its syntax tree, for type-checkers.
+    """
+
+    __slots__ = ("_evaluate", "_source", "_spans", "names", "roots", "text", "tree")
+
+    def __init__(self, text: str, *, roots: Iterable[str] = frozenset({"result"})) -> None:
+        self.text = text
+        self.roots = frozenset(roots)
+        if len(text) > MAX_LENGTH:
+            raise ExpressionError(f"longer than {MAX_LENGTH} characters", 0, len(text))
+        if not text.strip():
+            raise ExpressionError("an empty expression", 0, len(text))
+        self._source = translate(text)
+        self.tree = self._parse()
+        names: list[tuple[str, tuple[int, int]]] = []
+        self._evaluate = self._compile(self.tree, 0, names)
+        self._spans = tuple(names)
+        self.names = frozenset(name for name, _ in names)
+
+    def __repr__(self) -> str:
+        return f"<Expression {self.text!r}>"
+
+    @property
+    def variable_spans(self) -> tuple[tuple[str, tuple[int, int]], ...]:
+        """Each variable in reading order, with the columns it spans (the dollar sign included)."""
+        return self._spans
+
+    def evaluate(self, roots: Mapping[str, object], variable: Callable[[str], object]) -> object:
+        """The value; `variable` looks a name up and raises KeyError for one that has none."""
+        try:
+            return self._evaluate(roots, variable)
+        except ExpressionError:
+            raise
+        except Exception as error:
+            raise ExpressionError(
+                f"cannot be computed: {reason(error)}", 0, len(self.text)
+            ) from error
+
+    def holds(self, roots: Mapping[str, object], variable: Callable[[str], object]) -> bool:
+        """The value of a condition, which must be true or false."""
+        value = self.evaluate(roots, variable)
+        if not isinstance(value, bool):
+            raise ExpressionError(
+                f"a condition is true or false, but this is {show(value)}", 0, len(self.text)
+            )
+        return value
+
+    def span(self, node: ast.AST) -> tuple[int, int]:
+        """The columns of a node of `tree` in `text`."""
+        origin = self._source.origin
+        start = origin[min(getattr(node, "col_offset", 0), len(origin) - 1)]
+        last = origin[min(max(getattr(node, "end_col_offset", 1) - 1, 0), len(origin) - 1)]
+        return start, max(last + 1, start + 1)
+
+    def variable_of(self, node: ast.AST) -> str | None:
+        """The variable a node of `tree` reads, or None."""
+        if isinstance(node, ast.Name) and node.col_offset in self._source.variables:
+            return node.id[1:]
+        return None
+
+    def _parse(self) -> ast.expr:
+        source = self._source
+        stripped = source.text.lstrip()
+        offset = len(source.text) - len(stripped)
+        try:
+            tree = ast.parse(stripped.rstrip(), mode="eval").body
+        except SyntaxError as error:
+            column = source.origin[
+                min(
+                    offset + ((error.offset or 0) - 1 if error.offset else len(source.text)),
+                    len(source.origin) - 1,
+                )
+            ]
+            raise ExpressionError(_syntax(self.text, column, error), column) from None
+        except (RecursionError, MemoryError, ValueError):
+            raise ExpressionError("nested too deep", 0, len(self.text)) from None
+        if offset:
+            for node in ast.walk(tree):
+                if hasattr(node, "col_offset"):
+                    node.col_offset += offset
+                if getattr(node, "end_col_offset", None) is not None:
+                    node.end_col_offset += offset  # type: ignore[attr-defined]
+        return tree
+
+    def _compile(
+        self, node: ast.expr, depth: int, names: list[tuple[str, tuple[int, int]]]
+    ) -> _Closure:
+        if depth > _MAX_DEPTH:
+            raise ExpressionError("nested too deep", *self.span(node))
+
+        def part(inner: ast.expr) -> _Closure:
+            return self._compile(inner, depth + 1, names)
+
+        match node:
+            case ast.Constant(value=bool() | int() | float() | str() as value):
+                if isinstance(value, int) and value.bit_length() > MAX_BITS:
+                    raise ExpressionError("this number is too large", *self.span(node))
+                return lambda _roots, _variable: value
+            case ast.Name():
+                return self._compile_name(node, names)
+            case ast.Attribute(value=inner, attr=attr):
+                if attr.startswith("_"):
+                    raise self._refusal(
+                        node, f"{attr!r}: names with a leading underscore are private"
+                    )
+                return self._guard(node, field, part(inner), _constant(attr))
+            case ast.Subscript(value=inner, slice=index) if not isinstance(index, ast.Slice):
+                return self._guard(node, item, part(inner), part(index))
+            case ast.UnaryOp(op=op, operand=inner) if type(op) in UNARY:
+                return self._guard(node, UNARY[type(op)], part(inner))
+            case ast.BinOp(left=left, op=binary, right=right) if type(binary) in BINARY:
+                return self._guard(node, BINARY[type(binary)], part(left), part(right))
+            case ast.BoolOp(op=bool_op, values=values):
+                return self._compile_bool(isinstance(bool_op, ast.And), values, part)
+            case ast.Compare(left=left, ops=ops, comparators=rights):
+                return self._compile_compare(node, [left, *rights], ops, part)
+            case ast.List(elts=items) | ast.Tuple(elts=items):
+                return _listing([part(item) for item in items])
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
+                if not args:
+                    raise self._refusal(node, f"{name}() needs a value")
+                return self._guard(node, call(name), *(part(arg) for arg in args))
+        raise self._refusal(node, _why_not(node))
+
+    def _compile_name(self, node: ast.Name, names: list[tuple[str, tuple[int, int]]]) -> _Closure:
+        variable = self.variable_of(node)
+        if variable is not None:
+            names.append((variable, self.span(node)))
+            return _lookup(variable, *self.span(node))
+        if node.id in _CONSTANTS:
+            return _constant(_CONSTANTS[node.id])
+        if node.id not in self.roots:
+            known = ", ".join(sorted(self.roots))
+            given = f"; {known} can be used bare" if known else ""
+            raise self._refusal(
+                node, f"unknown name {node.id!r}: a variable is written ${node.id}{given}"
+            )
+        return _root(node.id, *self.span(node))
+
+    def _compile_bool(
+        self, is_and: bool, values: list[ast.expr], part: Callable[[ast.expr], _Closure]
+    ) -> _Closure:
+        parts = [self._guard(value, truth, part(value)) for value in values]
+        if is_and:
+            return lambda roots, variable: all(p(roots, variable) for p in parts)
+        return lambda roots, variable: any(p(roots, variable) for p in parts)
+
+    def _compile_compare(
+        self,
+        node: ast.expr,
+        operands: list[ast.expr],
+        ops: list[ast.cmpop],
+        part: Callable[[ast.expr], _Closure],
+    ) -> _Closure:
+        tests = []
+        for op in ops:
+            if type(op) not in COMPARE:
+                raise self._refusal(node, "write '==' or '!=' instead of 'is'")
+            tests.append(COMPARE[type(op)])
+        parts = [part(operand) for operand in operands]
+        start, end = self.span(node)
+
+        def compare(roots: _Roots, variable: Variable) -> object:
+            left = plain(parts[0](roots, variable))
+            for test, right_part in zip(tests, parts[1:], strict=True):
+                right = plain(right_part(roots, variable))
+                try:
+                    if not test(left, right):
+                        return False
+                except Exception as error:
+                    raise ExpressionError(reason(error), start, end) from error
+                left = right
+            return True
+
+        return compare
+
+    def _guard(self, node: ast.expr, function: Callable[..., object], *parts: _Closure) -> _Closure:
+        """A closure that applies `function` and puts the place of `node` on what it raises."""
+        start, end = self.span(node)
+
+        def apply(roots: _Roots, variable: Variable) -> object:
+            values = [part(roots, variable) for part in parts]
+            try:
+                return bounded(function(*values))
+            except Exception as error:
+                raise ExpressionError(reason(error), start, end) from error
+
+        return apply
+
+    def _refusal(self, node: ast.expr, message: str) -> ExpressionError:
+        return ExpressionError(message, *self.span(node))
+
+
+def _constant(value: object) -> _Closure:
+    return lambda _roots, _variable: value
+
+
+def _listing(parts: list[_Closure]) -> _Closure:
+    return lambda roots, variable: [part(roots, variable) for part in parts]
+
+
+def _lookup(name: str, start: int, end: int) -> _Closure:
+    def read(_roots: _Roots, variable: Variable) -> object:
+        try:
+            return variable(name)
+        except KeyError:
+            raise ExpressionError(f"${name} has no value", start, end) from None
+
+    return read
+
+
+def _root(name: str, start: int, end: int) -> _Closure:
+    def read(roots: _Roots, _variable: Variable) -> object:
+        try:
+            return roots[name]
+        except KeyError:
+            raise ExpressionError(f"there is no {name} here", start, end) from None
+
+    return read
+
+
+def _syntax(text: str, column: int, error: SyntaxError) -> str:
+    for at in (column, column - 1):
+        around = text[max(at - 1, 0) : at + 2]
+        if text[at : at + 1] == "=" and "==" not in around and around[0] not in "<>!":
+            return "'=' alone compares nothing: write '=='"
+    message = (error.msg or "not an expression").removesuffix(". Perhaps you forgot a comma?")
+    if "==" in message:
+        return "'=' alone compares nothing: write '=='"
+    if "never closed" in message or "unmatched" in message:
+        return message
+    return "this is not an expression"
+
+
+def _why_not(node: ast.expr) -> str:
+    if isinstance(node, ast.Call):
+        return "only len, abs, min and max can be called"
+    if isinstance(node, ast.Constant) and node.value is None:
+        return "there is no 'None' here"
+    names: dict[type[ast.expr], str] = {
+        ast.Lambda: "a lambda",
+        ast.IfExp: "'if'",
+        ast.Dict: "a mapping",
+        ast.Set: "a set",
+        ast.ListComp: "a comprehension",
+        ast.GeneratorExp: "a comprehension",
+        ast.Subscript: "a slice",
+        ast.JoinedStr: "an f-string",
+        ast.NamedExpr: "':='",
+        ast.Starred: "'*'",
+        ast.Await: "'await'",
+    }
+    return f"{names.get(type(node), 'this')} cannot be used in an expression"

@@ -1,0 +1,193 @@
+"""What the parts of an expression do with values: fields, items, numbers, comparisons.
+
+No ROS here: a message is recognised by what it can do. A function here raises `ValueError` with
+a readable text, or whatever the value itself raises; `expression.py` turns both into its error
+with a place. None of them makes a large number or a large text.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from types import SimpleNamespace
+from typing import Any
+
+MAX_BITS = 256
+MAX_ITEMS = 10_000
+FUNCTIONS: dict[str, Callable[..., object]] = {"len": len, "abs": abs, "min": min, "max": max}
+
+
+def call(name: str) -> Callable[..., object]:
+    function = FUNCTIONS[name]
+
+    def call(*values: object) -> object:
+        return function(*(plain(value) for value in values))
+
+    return call
+
+
+def number(value: object) -> int | float:
+    value = plain(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"a number is needed, not {show(value)}")
+    return value
+
+
+def add(left: object, right: object) -> object:
+    if isinstance(left, str) and isinstance(right, str):
+        return left + right
+    return number(left) + number(right)
+
+
+def _arithmetic(function: Callable[[int | float, int | float], object]) -> Callable[..., object]:
+    return lambda left, right: function(number(left), number(right))
+
+
+def _power(left: object, right: object) -> object:
+    base, exponent = number(left), number(right)
+    if isinstance(base, int) and isinstance(exponent, int):
+        if base.bit_length() * max(exponent, 0) > MAX_BITS and abs(base) > 1:
+            raise ValueError("the number would be too large")
+        if exponent < 0:
+            base = float(base)
+    value = base**exponent
+    if isinstance(value, complex):
+        raise ValueError("a root of a negative number")
+    return value
+
+
+def truth(value: object) -> bool:
+    value = plain(value)
+    if not isinstance(value, bool):
+        raise ValueError(f"true or false is needed, not {show(value)}")
+    return value
+
+
+def field(value: object, name: str) -> object:
+    """A field of a message, a key of a mapping, a public attribute of a plain value object."""
+    if isinstance(value, Mapping):
+        if name in value:
+            return scalar(value[name])
+        raise ValueError(f"no key {name!r}{_among(value)}")
+    described = getattr(type(value), "get_fields_and_field_types", None)
+    if described is not None:
+        known = described()
+        if name in known or name.isupper():
+            return scalar(getattr(value, name))
+        raise ValueError(f"{type(value).__name__} has no field {name!r}{_among(known)}")
+    public: Iterable[str] = ()
+    if is_dataclass(value):
+        public = [field.name for field in fields(value)]
+    elif isinstance(value, SimpleNamespace):
+        public = vars(value)
+    if name in public:
+        return scalar(getattr(value, name))
+    raise ValueError(f"{show(value)} has no field {name!r}{_among(public)}")
+
+
+def _among(known: Iterable[object]) -> str:
+    names = ", ".join(sorted(str(name) for name in known)[:12])
+    return f"; there is {names}" if names else ""
+
+
+def item(value: object, index: object) -> object:
+    index = plain(index)
+    if isinstance(value, Mapping):
+        return field(value, index) if isinstance(index, str) else scalar(value[index])
+    if isinstance(index, bool) or not isinstance(index, int):
+        raise ValueError(f"an index is a whole number, not {show(index)}")
+    if not hasattr(value, "__len__") or not hasattr(value, "__getitem__"):
+        raise ValueError(f"{show(value)} has no items")
+    size = len(value)
+    if not -size <= index < size:
+        raise ValueError(f"index {index} is outside of {size} items")
+    return scalar(value[index])
+
+
+def scalar(value: object) -> object:
+    """A numpy scalar as Python's own; arrays stay as they are until somebody compares them."""
+    if type(value).__module__ == "numpy" and not getattr(value, "shape", ()):
+        return value.item()  # type: ignore[attr-defined]
+    return value
+
+
+def plain(value: object) -> object:
+    if isinstance(value, (bool, int, float, str, list)):
+        return value
+    to_list = getattr(value, "tolist", None)  # array.array and numpy alike
+    if to_list is not None and type(value).__module__ in ("array", "numpy"):
+        items: object = to_list()
+        return items
+    return value
+
+
+def bounded(value: object) -> object:
+    if isinstance(value, int) and value.bit_length() > MAX_BITS:
+        raise ValueError("the number is too large")
+    if isinstance(value, str) and len(value) > MAX_ITEMS:
+        raise ValueError("the text is too long")
+    return value
+
+
+def contains(left: object, right: object) -> bool:
+    if not isinstance(right, (str, list, tuple, Mapping)):
+        raise ValueError(f"{show(right)} holds nothing that 'in' could look for")
+    if isinstance(right, str) and not isinstance(left, str):
+        raise ValueError(f"{show(left)} cannot be in a text")
+    return left in right
+
+
+def ordered(function: Callable[[Any, Any], bool]) -> Callable[[object, object], bool]:
+    def test(left: object, right: object) -> bool:
+        if not isinstance(left, str) or not isinstance(right, str):
+            return function(number(left), number(right))
+        return function(left, right)
+
+    return test
+
+
+UNARY: dict[type[ast.unaryop], Callable[..., object]] = {
+    ast.Not: lambda value: not truth(value),
+    ast.USub: lambda value: -number(value),
+    ast.UAdd: number,
+}
+BINARY: dict[type[ast.operator], Callable[..., object]] = {
+    ast.Add: add,
+    ast.Sub: _arithmetic(operator.sub),
+    ast.Mult: _arithmetic(operator.mul),
+    ast.Div: _arithmetic(operator.truediv),
+    ast.FloorDiv: _arithmetic(operator.floordiv),
+    ast.Mod: _arithmetic(operator.mod),
+    ast.Pow: _power,
+}
+COMPARE: dict[type[ast.cmpop], Callable[..., bool]] = {
+    ast.Eq: lambda left, right: bool(left == right),
+    ast.NotEq: lambda left, right: bool(left != right),
+    ast.Lt: ordered(operator.lt),
+    ast.LtE: ordered(operator.le),
+    ast.Gt: ordered(operator.gt),
+    ast.GtE: ordered(operator.ge),
+    ast.In: contains,
+    ast.NotIn: lambda left, right: not contains(left, right),
+}
+
+
+def show(value: object) -> str:
+    try:
+        text = repr(value)
+    except Exception:  # noqa: BLE001 - a value's own repr may raise anything
+        text = f"<{type(value).__name__}>"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def reason(error: Exception) -> str:
+    if isinstance(error, ZeroDivisionError):
+        return "division by zero"
+    if isinstance(error, OverflowError):
+        return "the number is too large"
+    try:
+        return str(error) or type(error).__name__
+    except Exception:  # noqa: BLE001 - as above
+        return type(error).__name__

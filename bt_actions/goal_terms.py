@@ -1,0 +1,89 @@
+"""The words in which a goal's life is told: its states, what can happen to it, what it commands.
+
+Values only; what follows from what is decided in goal.py.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from bt_actions.policy import End, Outcome
+
+
+class Now(NamedTuple):
+    """One moment on both clocks, in seconds; only differences mean anything."""
+
+    steady: float
+    ros: float
+    """The node's clock: stands still and jumps where simulated time does."""
+
+
+class State(Enum):
+    """Where a goal is in its life."""
+
+    QUEUED = "QUEUED"
+    WAITING_FOR_SERVER = "WAITING_FOR_SERVER"
+    SENDING = "SENDING"
+    EXECUTING = "EXECUTING"
+    CANCELING = "CANCELING"
+    DONE = "DONE"
+
+
+class Command(Enum):
+    """What the caller must do next."""
+
+    RELEASE = "give the resources back, or leave the queue for them"
+    SEND = "send the goal request"
+    ASK_RESULT = "ask for the result; asking twice does no harm"
+    CANCEL = "ask the server to cancel this goal; asking twice does no harm"
+
+
+class Event(Enum):
+    """What can happen to a goal. The comment names the detail that comes with it."""
+
+    GRANTED = "the resources are ours"
+    TAKEN = "the resources are taken, and waiting is not wanted"
+    SERVER_READY = "one live server is there, and owes us nothing"
+    SERVER_AMBIGUOUS = "two live servers are there"
+    INVALID = "the message could not be built"  # reason
+    SEND_FAILED = "the request did not leave"  # reason
+    ACCEPTED = "the server accepted the goal"
+    REJECTED = "the server refused the goal"
+    FEEDBACK = "feedback came"  # the message
+    STATUS = "the status topic shows the goal"  # GoalStatus number; terminal, or the first seen
+    RESULT = "the result came"  # (GoalStatus number, message)
+    RESULT_UNKNOWN = "the only server, the one we sent to, does not know the goal"
+    CANCEL_ANSWERED = "the server answered a cancel request"  # CancelGoal return code
+    SERVER_CHANGED = "another server answers under the name; is the goal still known?"
+    SERVER_LOST = "the server died or was restarted"  # reason
+    SERVER_RETURNED = "the server we had lost is back, with whatever it still runs"
+    SERVER_RESTARTED = "in place of the server we had lost there is a new one"
+    INTERRUPTED = "the tree no longer wants it"
+    REPLACED = "a newer goal of this process was accepted in its place"
+    DRAINED = "it was waited for long enough: what is not known stays so"
+    CLOSED = "the process ends: give up"
+    QUEUE_DUE = "timeout.queue has passed"
+    SERVER_DUE = "timeout.server has passed"
+    ACCEPT_DUE = "timeout.accept has passed"
+    RESULT_DUE = "timeout.result has passed"
+    FEEDBACK_DUE = "timeout.feedback has passed"
+    CANCEL_DUE = "timeout.cancel has passed"
+    ASK_DUE = "time to ask the server again"
+
+
+# GoalStatus and CancelGoal as ROS 2 numbers them (action_msgs).
+STATUS_SUCCEEDED, STATUS_CANCELED, STATUS_ABORTED = 4, 5, 6
+CANCEL_ACCEPTED, CANCEL_REJECTED, CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED = 0, 1, 2, 3
+
+ENDS = {
+    STATUS_SUCCEEDED: End.SUCCEEDED,
+    STATUS_CANCELED: End.CANCELED,
+    STATUS_ABORTED: End.ABORTED,
+}
+OUTCOMES = {
+    STATUS_SUCCEEDED: Outcome.SUCCEEDED,
+    STATUS_CANCELED: Outcome.CANCELED_BY_OTHER,
+    STATUS_ABORTED: Outcome.ABORTED,
+}
+ON_ROS_CLOCK = frozenset({Event.RESULT_DUE, Event.FEEDBACK_DUE})

@@ -1,0 +1,208 @@
+"""What there is to say about a node of a tree, as tables: policies, types, what it takes and gives.
+
+Most comes from the behaviour itself, so that a node made in Python has tables as well. Plain texts:
+escaping is the page's. Never ticks, sets up or changes a tree, and never imports rclpy.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from py_trees.behaviour import Behaviour
+
+from bt_actions.behaviours.variables import Var
+from bt_actions.policy import Retry, Timeouts
+from bt_actions.render.look import action_of
+
+if TYPE_CHECKING:
+    from bt_actions.document.tree import Document, TreeNode
+
+__all__ = ["Line", "Table", "describe", "interface_of", "tables"]
+
+Kind = Literal["action", "srv", "msg"]
+_PARTS = {"action": ("Goal", "Result", "Feedback"), "srv": ("Request", "Response")}
+_OURS = ("py_trees", "bt_actions")
+_DEEPEST = 3
+"""Levels of messages inside a message."""
+_MOST_LINES = 60
+"""Of one message."""
+_MOST_CHARACTERS = 300
+"""Of one value."""
+
+
+class Line(NamedTuple):
+    """A line of a table; `indent` is how deep a field lies in its message."""
+
+    key: str
+    value: str
+    indent: int = 0
+
+
+class Table(NamedTuple):
+    """Lines that belong together."""
+
+    title: str
+    lines: tuple[Line, ...]
+
+
+def tables(node: Behaviour, written: TreeNode | None, document: Document | None) -> Iterator[Table]:
+    """What `node` takes and gives, and what it does when things go wrong.
+
+    `written` is what it was made from, where that is a document; `document` is the tree whose root
+    it is, or which it includes.
+    """
+    if document is not None:
+        yield from _ports(document)
+    if action_of(node) is not None:
+        yield Table("Action", tuple(_action(node, from_python=written is None)))
+    elif type(node).__module__.partition(".")[0] not in _OURS:
+        name = f"{type(node).__module__}.{type(node).__qualname__}"
+        yield Table("Behaviour", (Line("class", name),))
+    timeouts, retry = getattr(node, "timeouts", None), getattr(node, "retry", None)
+    if isinstance(timeouts, Timeouts):
+        names = (field.name for field in fields(timeouts))
+        lines = (Line(name, _seconds(getattr(timeouts, name))) for name in names)
+        yield Table("Timeouts", tuple(lines))
+    if isinstance(retry, Retry):
+        yield Table("Retry", tuple(_retry(retry)))
+
+
+def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str, Kind] | None:
+    """The interface that a node uses, for `describe`; None where it uses none."""
+    kind: Kind
+    for attribute, kind in (("action_type", "action"), ("service_type", "srv")):
+        found = getattr(node, attribute, None)
+        if isinstance(found, type | str) and found:
+            return found, kind
+    if written is not None and written.kind is not None:
+        name = written.values.get("type")
+        if written.kind.name in ("publish", "wait_for_message") and isinstance(name, str):
+            return name, "msg"
+    return None
+
+
+def describe(interface: type | str, kind: Kind) -> Iterator[Table]:
+    """The messages of an interface with their fields and constants, or why they cannot be told."""
+    from bt_actions.ros import fields as ros_fields
+    from bt_actions.ros import interfaces
+
+    try:
+        found = interfaces.interface(interface, kind) if isinstance(interface, str) else interface
+        parts = [getattr(found, part, None) for part in _PARTS[kind]] if kind in _PARTS else [found]
+        for part in parts:
+            if ros_fields.is_message_class(part):
+                assert isinstance(part, type)
+                lines = tuple(islice(_fields(part, 0), _MOST_LINES + 1))
+                if len(lines) > _MOST_LINES:
+                    lines = (*lines[:_MOST_LINES], Line("…", ""))
+                yield Table(interfaces.short_name(part), lines or (Line("no fields", ""),))
+    except (LookupError, ImportError) as error:
+        yield Table("Type", (Line("cannot be read here", _cut(str(error))),))
+
+
+def _action(node: Behaviour, *, from_python: bool) -> Iterator[Line]:
+    action = action_of(node)
+    assert action is not None
+    yield Line("server", action[0])
+    yield Line("type", _type_name(getattr(node, "action_type", "")))
+    if from_python and hasattr(node, "goal"):
+        yield Line("goal", _value(node.goal))
+    expect = getattr(node, "expect", None)
+    yield Line("expect", "no more than success" if expect is None else _condition(expect))
+    saved: Mapping[str, str] = getattr(node, "save", None) or {}
+    for target, place in saved.items():
+        name = target if from_python else target.rpartition("/")[2]  # a document's own variable
+        yield Line("save", f"{name}: {place}")
+    yield Line("busy", str(getattr(node, "busy", "wait")))
+    resources = sorted(getattr(node, "resources", None) or ())
+    yield Line("resources", ", ".join(resources) or f"{action[0]} (its server)")
+
+
+def _retry(retry: Retry) -> Iterator[Line]:
+    if retry.attempts == 1:
+        yield Line("attempts", "1: not tried again")
+        return
+    yield Line("attempts", str(retry.attempts))
+    yield Line("backoff", _seconds(retry.backoff))
+    yield Line("factor", f"{retry.factor:g}")
+    yield Line("max_backoff", _seconds(retry.max_backoff))
+    yield Line("jitter", f"{retry.jitter:g}")
+    yield Line("outcomes", ", ".join(sorted(retry.outcomes)))
+    yield Line("when", "always" if retry.when is None else _condition(retry.when))
+
+
+def _ports(document: Document) -> Iterator[Table]:
+    from bt_actions.document.inputs import inputs_of
+
+    inputs = []
+    for name, one in inputs_of(document).items():
+        given = "required" if one.required else f"{_value(one.default)} {one.unit}".strip()
+        inputs.append(Line(name, f"{one.type}, {given}"))
+    if inputs:
+        yield Table("Inputs", tuple(inputs))
+    outputs = []
+    for name, declared in document.outputs.items():
+        words = (declared.values.get("type"), declared.values.get("unit"))
+        outputs.append(Line(name, ", ".join(str(word) for word in words if word)))
+    if outputs:
+        yield Table("Outputs", tuple(outputs))
+
+
+def _fields(message: type, depth: int) -> Iterator[Line]:
+    from bt_actions.ros import fields as ros_fields
+
+    for name, kind in ros_fields.describe(message).items():
+        if name == "structure_needs_at_least_one_member":  # what rosidl puts into an empty one
+            continue
+        yield Line(name, str(kind), depth)
+        inner = kind.item if isinstance(kind, ros_fields.Listing) else kind
+        if isinstance(inner, ros_fields.Message) and depth < _DEEPEST:
+            yield from _fields(inner.cls, depth + 1)
+    for name, value in ros_fields.constants(message).items():
+        yield Line(name, f"= {value!r}", depth)
+
+
+def _type_name(found: type | str) -> str:
+    if isinstance(found, str):
+        return found
+    package, _, rest = found.__module__.partition(".")
+    return f"{package}/{rest.partition('.')[0]}/{found.__name__}".replace("//", "/")
+
+
+def _seconds(seconds: float | None) -> str:
+    return "none" if seconds is None else f"{seconds:g} s"
+
+
+def _condition(condition: Any) -> str:
+    """A condition as it was written, where it was written."""
+    text = condition if isinstance(condition, str) else getattr(condition, "text", None)
+    return _cut(text.strip()) if isinstance(text, str) else _function(condition)
+
+
+def _function(function: Any) -> str:
+    return f"{getattr(function, '__qualname__', type(function).__name__)} (a function)"
+
+
+def _value(value: Any) -> str:
+    return _cut(_plain(value))
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, Var):
+        return f"${value.name}"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {_plain(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_plain(item) for item in value) + "]"
+    if callable(value):
+        return _function(value)
+    text = value if isinstance(value, str) else repr(value)
+    return re.sub(r" at 0x[0-9a-f]+", "", text)  # another one in each process
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _MOST_CHARACTERS else f"{text[: _MOST_CHARACTERS - 1]}…"

@@ -1,0 +1,147 @@
+"""What a node of a tree looks like, for every picture and page of it: words, shape, colours.
+
+Shapes are py_trees' own (octagon: fallback, box: sequence, parallelogram: parallel, ellipse:
+decorators and leaves). Draws and lays out nothing, never changes a tree, imports no rclpy.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import BlackBoxLevel
+from py_trees.composites import Composite, Parallel, Selector, Sequence
+from py_trees.decorators import Decorator
+
+__all__ = [
+    "DOWN_UP_TO",
+    "Row",
+    "action_of",
+    "clean",
+    "direction_of",
+    "kind",
+    "label",
+    "look",
+    "rows",
+]
+
+DOWN_UP_TO = 16
+"""Leaves up to which a picture grows down, as py_trees draws; a wider one grows to the right."""
+
+_LABEL_WIDTH = 28
+_WORDS = {
+    "Sequence": "sequence",
+    "Selector": "fallback",
+    "Parallel": "parallel",
+    "Inverter": "invert",
+    "FailureIsSuccess": "force_success",
+    "SuccessIsFailure": "force_failure",
+    "OneShot": "run_once",
+    "Retry": "retry",
+    "Repeat": "repeat",
+    "Timeout": "timeout",
+    "Success": "success",
+    "Failure": "failure",
+    "Running": "running",
+    "ActionBehaviour": "action",
+    "CallService": "service",
+    "Deadline": "timeout",
+    "RetryChild": "retry",
+    "SetValues": "set",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One node of a tree in reading order."""
+
+    node: Behaviour
+    depth: int
+    branches: tuple[bool, ...]
+    """For each level below the root: does the line go on below this node?"""
+
+
+def rows(root: Behaviour) -> Iterator[Row]:
+    """Yield every node below and including `root`, parents first; not bounded by recursion."""
+    waiting = [Row(root, 0, ())]
+    while waiting:
+        row = waiting.pop()
+        yield row
+        last = len(row.node.children) - 1
+        waiting.extend(
+            Row(child, row.depth + 1, (*row.branches, index != last))
+            for index, child in reversed(list(enumerate(row.node.children)))
+        )
+
+
+def direction_of(nodes: Iterable[Row], direction: str | None = None) -> str:
+    """Return "down" or "right": `direction` itself, or by the number of leaves where it is None."""
+    if direction is not None:
+        return direction
+    return "down" if sum(not row.node.children for row in nodes) <= DOWN_UP_TO else "right"
+
+
+def kind(node: Behaviour) -> str:
+    """Return what `node` is, in the words of the YAML language where it has one."""
+    word = type(node).__name__
+    for base in type(node).__mro__:
+        if base.__name__ in _WORDS and base.__module__.startswith(("py_trees.", "bt_actions.")):
+            word = _WORDS[base.__name__]
+            break
+        if base.__module__.startswith("bt_actions."):
+            word = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", base.__name__).lower()
+            break
+    if isinstance(node, Selector | Sequence) and not node.memory:
+        return f"reactive {word}"
+    if isinstance(node, Parallel):
+        policy = type(node.policy).__name__.removeprefix("SuccessOn").lower()
+        return f"{word}, {policy}"
+    return word
+
+
+def action_of(node: Behaviour) -> tuple[str, str] | None:
+    """Return server and short type name of an action leaf, None for any other node."""
+    server = getattr(node, "server", None)
+    action_type = getattr(node, "action_type", None)
+    if not isinstance(server, str) or action_type is None:
+        return None
+    name = action_type if isinstance(action_type, str) else getattr(action_type, "__name__", "")
+    return server, str(name).rsplit("/", 1)[-1]
+
+
+def label(node: Behaviour) -> tuple[list[str], list[str]]:
+    """Return the lines of a node's name, and the smaller ones below: its kind, or its action."""
+    name = clean(node.name) or " "
+    action = action_of(node)
+    under = [kind(node)] if action is None else list(action)
+    return textwrap.wrap(name, _LABEL_WIDTH) or [name], [clean(line) for line in under if line]
+
+
+def look(node: Behaviour) -> tuple[str, str, str | None]:
+    """Return the shape as py_trees draws it, its fill, lightened, and a font colour or None."""
+    if node.blackbox_level != BlackBoxLevel.NOT_A_BLACKBOX:
+        shape, _, _ = _shape(node)
+        return shape, "#333333", "#ffffff"
+    return _shape(node)
+
+
+def _shape(node: Behaviour) -> tuple[str, str, str | None]:
+    if isinstance(node, Selector):
+        return "octagon", "#8ee3ea", None
+    if isinstance(node, Sequence):
+        return "box", "#ffc46b", None
+    if isinstance(node, Parallel):
+        return "parallelogram", "#ffe070", None
+    if isinstance(node, Composite | Decorator):
+        return "ellipse", "#f4f4fc", None
+    if action_of(node) is not None:
+        return "ellipse", "#bfd7ff", None
+    return "ellipse", "#d4d8dd", None
+
+
+def clean(name: str) -> str:
+    """Return `name` on one line, without the characters that XML and terminals do not take."""
+    return re.sub("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]+", " ", name)

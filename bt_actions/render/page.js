@@ -1,0 +1,338 @@
+// What the reader of a page sees and does: the drawing of what page_layout.js has laid out, the card of
+// the node that is pointed at or focused, folding, searching. Everything from the tree is set as text
+// or as a number, never as markup. Loads and stores nothing.
+
+const SVG = "http://www.w3.org/2000/svg";
+const LINGER = 200;                               // ms that a card outlives the pointer
+const find = (id) => document.getElementById(id);
+const view = find("view"), svg = find("tree"), card = find("card");
+
+// The drawing.
+
+const make = (name, attributes, parent) => {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  parent?.append(element);
+  return element;
+};
+let scale = 1, size = [0, 0], offset = [0, 0], drawn = [], current = nodes[0], hovered = null, shut = true, hits = [];
+
+function draw() {
+  drawn = visible();
+  size = lay_out(drawn);
+  const edges = [], groups = [];
+  drawn.forEach((node) => {
+    groups.push(group_of(node));
+    if (node.index) edges.push(make("path", { d: edge(nodes[node.parent], node) }));
+  });
+  find("edges").replaceChildren(...edges);
+  find("nodes").replaceChildren(...groups);
+  resize();
+  mark();
+}
+
+function group_of(node) {
+  const group = make("g", {
+    class: node.font ? "node dark" : "node", transform: `translate(${node.x} ${node.y})`,
+    id: `n${node.index}`, role: "treeitem", tabindex: node === current ? 0 : -1,
+    "aria-level": node.depth + 1, "aria-posinset": node.place_in,
+    "aria-setsize": node.index ? nodes[node.parent].children.length : 1,
+    "aria-label": [node.name, ...(node.under[0] === node.kind ? node.under : [node.kind, ...node.under])].join(", "),
+  });
+  const [name, attributes] = outline(node);
+  make(name, { class: "shape", fill: node.fill, ...attributes }, group);
+  let y = -node.text_h / 2;
+  const write = (line, kind, height) => {
+    make("text", { class: kind, y: y + height }, group).textContent = line;
+    y += height * LINE;
+  };
+  node.lines.forEach((line) => write(line, "name", NAME));
+  node.under.forEach((line) => write(line, "under", UNDER));
+  if (node.children.length) {
+    group.setAttribute("aria-expanded", node.open);
+    const label = node.open ? "\u2212" : `+${node.below}`;
+    const half = Math.max(8, label.length * 3.2 + 4);
+    const [x, y] = down ? [0, node.h / 2 + 8] : [(node.w - node.slant) / 2 + half, 0];
+    const fold = make("g", { class: "fold", "aria-hidden": "true", transform: `translate(${x} ${y})` }, group);
+    const [left, top] = down ? [-half - 4, -8] : [-half, -12];
+    make("rect", { class: "area", x: left, y: top, width: 2 * half + (down ? 8 : 4), height: 24 }, fold);
+    make("rect", { class: "knob", x: -half, y: -8, width: 2 * half, height: 16, rx: 8 }, fold);
+    make("text", { y: 3.5 }, fold).textContent = label;
+  }
+  return group;
+}
+
+const element = (node) => find(`n${node.index}`);
+const node_at = (target) => nodes[target.closest?.(".node")?.id.slice(1)];
+
+function mark() {
+  const shown = card.hidden ? null : hovered || current, hit = new Set(hits);
+  drawn.forEach((node) => {
+    element(node).classList.toggle("shown", node === shown);
+    element(node).classList.toggle("hit", hit.has(node));
+  });
+}
+
+function resize() {
+  const [w, h] = size;
+  svg.setAttribute("viewBox", `0 0 ${w} ${h}`);
+  svg.setAttribute("width", w * scale);
+  svg.setAttribute("height", h * scale);
+}
+
+// Change the size, or fold, and keep one point of the picture where the reader looks at it.
+
+function keeping(point, change) {
+  const place = () => {
+    const box = svg.getBoundingClientRect(), [x, y] = point();
+    return [box.left + x * scale, box.top + y * scale];
+  };
+  const [x, y] = place(), moved = () => { const [new_x, new_y] = place(); return [new_x - x, new_y - y]; };
+  change();
+  view.scrollBy(...moved());
+  const [left, top] = moved();  // what could not be scrolled
+  shift(offset[0] - left, offset[1] - top);
+}
+
+function shift(x, y) {
+  offset = [Math.max(0, x), Math.max(0, y)];
+  svg.style.margin = `${offset[1]}px 0 0 ${offset[0]}px`;
+}
+
+function zoom(factor, x, y) {
+  const box = svg.getBoundingClientRect(), frame = view.getBoundingClientRect();
+  const at = [
+    ((x ?? frame.left + frame.width / 2) - box.left) / scale,
+    ((y ?? frame.top + frame.height / 2) - box.top) / scale,
+  ];
+  keeping(() => at, () => { scale = Math.min(4, Math.max(0.1, scale * factor)); resize(); });
+  show();
+}
+
+function fit(least) {
+  scale = Math.max(least, Math.min(1.2, view.clientWidth / size[0], view.clientHeight / size[1]));
+  resize();
+  shift((view.clientWidth - size[0] * scale) / 2, (view.clientHeight - size[1] * scale) / 2);
+  const [root] = nodes;
+  view.scrollTo(down ? root.x * scale - view.clientWidth / 2 : 0, down ? 0 : root.y * scale - view.clientHeight / 2);
+}
+
+function toggle(node, open = !node.open) {
+  if (!node.children.length || node.open === open) return;
+  node.open = open;
+  keeping(() => [node.x, node.y], draw);
+}
+
+function reveal(node) {
+  let above = nodes[node.parent];
+  for (; above; above = nodes[above.parent]) above.open = true;
+}
+
+function go_to(node, focus = true) {
+  current = node;
+  if (!drawn.includes(node)) { reveal(node); draw(); }
+  drawn.forEach((one) => element(one).setAttribute("tabindex", one === node ? 0 : -1));
+  if (focus) element(node).focus({ preventScroll: true });
+  const box = element(node).getBoundingClientRect(), frame = view.getBoundingClientRect(), room = 24;
+  const way = (low, high, from, to) => (low < from + room ? low - from - room : high > to - room ? high - to + room : 0);
+  view.scrollBy(way(box.left, box.right, frame.left, frame.right), way(box.top, box.bottom, frame.top, frame.bottom));
+}
+
+// The card.
+
+const put = (name, parent, text, kind) => {
+  const made = document.createElement(name);
+  if (text !== undefined) made.textContent = text;
+  if (kind) made.className = kind;
+  parent.append(made);
+  return made;
+};
+
+function fill(node) {
+  card.replaceChildren();
+  card.scrollTop = 0;
+  card.setAttribute("aria-label", `About ${node.name}`);
+  put("span", put("h2", card, `${node.name} `), node.kind, "kind");
+  const path = [];
+  for (let above = node; above; above = nodes[above.parent]) path.unshift(above.name);
+  put("p", card, path.length > 12 ? [...path.slice(0, 4), "…", ...path.slice(-7)].join(" / ") : path.join(" / "));
+  if (node.place) put("code", put("p", card), node.place);
+  if (node.yaml) put("pre", card, node.yaml);
+  node.tables.forEach((number) => {
+    const [title, lines] = data.tables[number], table = put("table", card);
+    put("caption", table, title);
+    lines.forEach(([key, value, indent]) => {
+      const row = put("tr", table), head = put("th", row, key);
+      head.scope = "row";
+      head.style.paddingLeft = `${indent * 12}px`;
+      put("td", row, value);
+    });
+  });
+}
+
+let filled = null;
+function show() {
+  const node = hovered || (shut ? null : current);
+  card.hidden = !node || !drawn.includes(node);
+  if (!card.hidden) {
+    if (filled !== node) fill(node);
+    filled = node;
+    const box = element(node).querySelector(".shape").getBoundingClientRect(), gap = 14;
+    const wide = document.documentElement.clientWidth, high = document.documentElement.clientHeight;
+    const right = box.right + gap + card.offsetWidth < wide, left = box.left - gap - card.offsetWidth > 0;
+    let x = box.right + gap, y = box.top;
+    if (!right && left) x = box.left - gap - card.offsetWidth;
+    if (!right && !left) {
+      x = box.left;
+      y = box.bottom + gap + card.offsetHeight < high ? box.bottom + gap : box.top - gap - card.offsetHeight;
+    }
+    card.style.left = `${Math.max(8, Math.min(x, wide - card.offsetWidth - 8))}px`;
+    card.style.top = `${Math.max(8, Math.min(y, high - card.offsetHeight - 8))}px`;
+  }
+  mark();
+}
+
+let leaving = 0, pointer = "";
+function hover(node) {
+  clearTimeout(leaving);
+  if (node && node !== hovered) { hovered = node; show(); }
+  if (!node && hovered) leaving = setTimeout(() => { hovered = null; show(); }, LINGER);
+}
+document.addEventListener("pointermove", (event) => {
+  const where = `${event.clientX} ${event.clientY}`;  // a scroll under a pointer at rest is no move
+  if (event.pointerType === "touch" || where === pointer || grip) return;
+  pointer = where;
+  hover(card.contains(event.target) ? hovered : node_at(event.target));
+});
+document.documentElement.addEventListener("pointerleave", () => hover(null));
+
+// Pointer: a click on a knob folds, on a node keeps its card, on the ground closes it; a drag moves.
+
+let grip = null;
+view.addEventListener("click", (event) => {
+  const node = node_at(event.target);
+  if (node) {
+    const folds = event.target.closest(".fold");
+    if (folds) toggle(node);
+    else shut = false;
+    go_to(node);
+  } else shut = true;
+  hovered = null;
+  show();
+  if (node) go_to(node);  // a card at the foot of a small screen has taken room from the view
+});
+view.addEventListener("dblclick", (event) => {
+  const node = node_at(event.target);
+  if (node && !event.target.closest(".fold")) { toggle(node); go_to(node); show(); }
+});
+view.addEventListener("pointerdown", (event) => {
+  if (event.pointerType !== "mouse" || event.button || node_at(event.target)) return;
+  const box = view.getBoundingClientRect();
+  if (event.clientX > box.left + view.clientWidth || event.clientY > box.top + view.clientHeight) return; // scroll bars
+  grip = [event.clientX, event.clientY];
+  view.classList.add("dragged");
+  view.setPointerCapture(event.pointerId);
+});
+view.addEventListener("pointermove", (event) => {
+  if (!grip) return;
+  view.scrollBy(grip[0] - event.clientX, grip[1] - event.clientY);
+  grip = [event.clientX, event.clientY];
+});
+["pointerup", "pointercancel"].forEach((name) => view.addEventListener(name, () => {
+  grip = null;
+  view.classList.remove("dragged");
+}));
+view.addEventListener("wheel", (event) => {
+  if (!event.ctrlKey) return;
+  event.preventDefault();
+  zoom(Math.exp(-event.deltaY / 300), event.clientX, event.clientY);
+}, { passive: false });
+view.addEventListener("scroll", () => { if (!card.hidden) show(); }, { passive: true });
+window.addEventListener("resize", show);
+
+// Keyboard, as the pattern for trees has it (WAI-ARIA).
+
+svg.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const at = drawn.indexOf(current), { children, open, parent } = current;
+  const keys = {
+    ArrowDown: () => go_to(drawn[Math.min(at + 1, drawn.length - 1)]),
+    ArrowUp: () => go_to(drawn[Math.max(at - 1, 0)]),
+    ArrowRight: () => { if (children.length && open) go_to(children[0]); else { toggle(current, true); go_to(current); } },
+    ArrowLeft: () => { if (children.length && open) { toggle(current, false); go_to(current); } else if (parent >= 0) go_to(nodes[parent]); },
+    Home: () => go_to(drawn[0]),
+    End: () => go_to(drawn.at(-1)),
+    Enter: () => { toggle(current); go_to(current); },
+    " ": () => { toggle(current); go_to(current); },
+  };
+  if (!(event.key in keys)) return;
+  event.preventDefault();
+  keys[event.key]();
+  hovered = null;
+  shut = false;
+  show();
+});
+view.addEventListener("focusin", (event) => {  // on the SVG it would make that focusable
+  const node = node_at(event.target);
+  if (node && event.target.matches(":focus-visible")) { current = node; shut = false; show(); }
+});
+document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape" && !card.hidden) {
+    const inside = card.contains(document.activeElement);
+    hovered = null;
+    shut = true;
+    show();
+    if (inside) element(current).focus();
+  }
+  if (event.target.matches?.("input") || event.ctrlKey || event.metaKey || event.altKey) return;
+  const keys = { "/": () => find("query").focus(), "+": () => zoom(1.25), "-": () => zoom(0.8), 0: () => fit(0.1) };
+  if (!(event.key in keys)) return;
+  event.preventDefault();
+  keys[event.key]();
+});
+
+// The bar.
+
+let next = -1;
+function search() {
+  const wanted = find("query").value.trim().toLowerCase();
+  hits = wanted ? nodes.filter((node) => node.words.includes(wanted)) : [];
+  next = -1;
+  find("found").textContent = wanted ? `${hits.length} found` : "";
+  mark();
+}
+find("query").addEventListener("input", search);
+find("search").addEventListener("submit", (event) => event.preventDefault());
+find("query").addEventListener("keydown", (event) => {
+  if (event.key !== "Enter" || !hits.length) return;
+  next = (next + (event.shiftKey ? -1 : 1) + hits.length) % hits.length;
+  find("found").textContent = `${next + 1} of ${hits.length}`;
+  go_to(hits[next], false);
+  hovered = null;
+  shut = false;
+  show();
+});
+
+function refold(depth) {
+  fold_at(depth);
+  current = nodes[0];
+  shut = true;
+  draw();
+  fit(0.7);
+  show();
+}
+find("unfold").addEventListener("click", () => refold(data.unfold));
+find("fold").addEventListener("click", () => refold(data.open < data.unfold ? data.open : 1));
+find("smaller").addEventListener("click", () => zoom(0.8));
+find("larger").addEventListener("click", () => zoom(1.25));
+find("fit").addEventListener("click", () => fit(0.1));
+
+const system = matchMedia("(prefers-color-scheme: dark)"), page = document.documentElement;
+const is_dark = () => (page.dataset.theme ? page.dataset.theme === "dark" : system.matches);
+const told = () => find("theme").setAttribute("aria-pressed", is_dark());
+find("theme").addEventListener("click", () => { page.dataset.theme = is_dark() ? "light" : "dark"; told(); });
+system.addEventListener("change", told);
+told();
+
+["bar", "view", "hint"].forEach((id) => { find(id).hidden = false; });
+refold(data.open);

@@ -1,0 +1,86 @@
+"""Where in a document a behaviour comes from, and the lines that made it.
+
+Works from what a loaded tree remembers (`place` on each node, `loaded` on its root) and reads no
+file again. A behaviour made in Python was not written, and has nothing here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from py_trees.behaviour import Behaviour
+
+if TYPE_CHECKING:
+    from bt_actions.document.findings import Place
+    from bt_actions.document.tree import Document, TreeNode
+
+__all__ = ["Written", "own_text"]
+
+_MOST_CHARACTERS = 4000
+_FAR = 1 << 30
+_Position = tuple[int, int]
+"""Line and column, both from 1."""
+
+
+class Written:
+    """The documents behind some behaviours."""
+
+    def __init__(self, behaviours: Iterable[Behaviour]) -> None:
+        self._loaded: dict[int, Document] = {}
+        self._nodes: dict[Place, TreeNode] = {}
+        for behaviour in behaviours:
+            document = getattr(getattr(behaviour, "loaded", None), "document", None)
+            if document is not None:
+                self._loaded[id(behaviour)] = document
+                self._take(document)
+
+    def node(self, behaviour: Behaviour) -> TreeNode | None:
+        """The node of a document that `behaviour` was made from."""
+        place = getattr(behaviour, "place", None)
+        return None if place is None else self._nodes.get(place)
+
+    def document(self, behaviour: Behaviour) -> Document | None:
+        """The tree whose inputs and outputs are `behaviour`'s: a loaded root, or a subtree."""
+        node = self.node(behaviour)
+        return self._loaded.get(id(behaviour)) or (None if node is None else node.included)
+
+    def _take(self, document: Document) -> None:
+        waiting, seen = [document], {id(document)}
+        while waiting:
+            for node in waiting.pop().nodes():
+                self._nodes[node.place] = node
+                if node.included is not None and id(node.included) not in seen:
+                    seen.add(id(node.included))
+                    waiting.append(node.included)
+
+
+def own_text(node: TreeNode) -> str:
+    """What stands in the document for `node`, comments too, its children left out as "…"."""
+    start, end = (node.node.line, node.node.column), (node.node.end_line, node.node.end_column)
+    lines = node.source.lines
+    rest = _between(lines, end, (end[0], _FAR))
+    if rest.lstrip().startswith("#"):
+        end = (end[0], _FAR)
+    below = [
+        ((child.node.line, child.node.column), (child.node.end_line, child.node.end_column))
+        for child in node.children
+    ]
+    inside = [(first, last) for first, last in below if start <= first and last <= end]
+    if inside:
+        head = _between(lines, start, min(inside)[0])
+        tail = _between(lines, max(last for _, last in inside), end)
+        text = f"{head}…{re.sub(r'^[ ]*#.*', '', tail)}"  # the comment is the last child's
+    else:
+        text = _between(lines, start, end)
+    text = re.sub(rf"^ {{0,{start[1] - 1}}}", "", text, flags=re.MULTILINE).rstrip()
+    return text if len(text) <= _MOST_CHARACTERS else f"{text[: _MOST_CHARACTERS - 1]}…"
+
+
+def _between(lines: list[str], start: _Position, end: _Position) -> str:
+    part = lines[start[0] - 1 : end[0]]
+    if part:
+        part[-1] = part[-1][: end[1] - 1]
+        part[0] = part[0][start[1] - 1 :]
+    return "\n".join(part)

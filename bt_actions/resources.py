@@ -1,0 +1,69 @@
+"""Who holds what, and who waits for it.
+
+A resource is a name ("/r1/move_robot", "base"). A holder asks for a set of names at once and gets
+all of them or none, so that two holders can never wait for each other. No ROS, no thread, no
+clock: the caller locks, and gives up on behalf of a holder whose deadline passed (`release`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from enum import Enum
+from typing import Generic, TypeVar
+
+from bt_actions.policy import Busy
+
+Holder = TypeVar("Holder", bound=Hashable)
+
+
+class Answer(Enum):
+    """What became of a request."""
+
+    GRANTED = "granted"
+    QUEUED = "queued"
+    TAKEN = "taken"
+
+
+class Resources(Generic[Holder]):
+    """The table of holders and the queue, first come first served."""
+
+    def __init__(self) -> None:
+        self._held: dict[Holder, frozenset[str]] = {}
+        self._queue: dict[Holder, frozenset[str]] = {}
+
+    def request(self, holder: Holder, names: frozenset[str], busy: Busy) -> Answer:
+        """Ask for all of `names`; raises ValueError when `holder` has asked before."""
+        if holder in self._held or holder in self._queue:
+            raise ValueError(f"{holder!r} holds or waits already")
+        free = not self.holders(names)
+        waits = free and any(names & wanted for wanted in self._queue.values())
+        if busy in (Busy.REPLACE, Busy.SHARE) or (free and not waits):
+            self._held[holder] = names
+            return Answer.GRANTED
+        if busy is Busy.FAIL:
+            return Answer.TAKEN
+        self._queue[holder] = names
+        return Answer.QUEUED
+
+    def release(self, holder: Holder) -> list[Holder]:
+        """Take `holder` out of the table or the queue; return who is granted thereby, in order."""
+        self._queue.pop(holder, None)
+        self._held.pop(holder, None)
+        granted = []
+        passed: set[str] = set()
+        for waiting, names in list(self._queue.items()):
+            if not names & passed and not self.holders(names):
+                del self._queue[waiting]
+                self._held[waiting] = names
+                granted.append(waiting)
+            else:
+                passed |= names  # nobody overtakes on a name that an earlier one waits for
+        return granted
+
+    def holders(self, names: frozenset[str]) -> list[Holder]:
+        """Return who holds any of `names`, the oldest first."""
+        return [holder for holder, held in self._held.items() if held & names]
+
+    def __len__(self) -> int:
+        """Count holders and waiters together."""
+        return len(self._held) + len(self._queue)

@@ -1,0 +1,266 @@
+"""An action client that loses no answer, and that can be read without an executor.
+
+rclpy's client hands out a future for each request and completes it where it spins. Three things
+follow that this project cannot live with, and each has its cure here:
+- An answer may arrive before the request's sequence number has been filed, where the sender is
+  not the executor's thread; it is then dropped ("Ignoring unexpected goal response", rclpy #1123).
+  Sending with filing, and taking, are each done under one lock.
+- The done-callbacks of futures are tasks of the executor: where nobody spins any more, they never
+  run. Here answers go straight to a listener, and `pump` takes them from any thread.
+- Futures of requests that are never answered are kept for ever. Here `forget` drops them.
+
+What is taken waits in one inbox and is delivered in its order by whoever comes first: the executor,
+or a `pump`. After a pump, nothing that had arrived before it is still under way.
+
+It carries messages and decides nothing. Of rclpy's ActionClient it keeps construction, the wait
+set and destruction; it uses the low-level handle, whose methods are checked for at construction.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Any, Protocol
+
+from action_msgs.srv import CancelGoal
+from rclpy.action import ActionClient as RclpyActionClient
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from unique_identifier_msgs.msg import UUID
+
+from bt_actions.ros.log import log
+from bt_actions.ros.shared import lock
+
+TAKE_AT_MOST = 200
+"""Messages of one kind taken at a time, so that a flood of feedback starves nobody."""
+DEPTH = 100
+"""Of our end of the services; with the default of 10 a burst of answers is lost silently."""
+
+_USED_OF_HANDLE = (
+    "send_goal_request",
+    "send_result_request",
+    "send_cancel_request",
+    "take_goal_response",
+    "take_result_response",
+    "take_cancel_response",
+    "take_feedback",
+    "take_status",
+    "is_action_server_available",
+)
+
+
+class Listener(Protocol):
+    """Who is told what the servers say: under the one lock, from whichever thread delivers."""
+
+    def goal_answered(self, goal_id: bytes, accepted: bool) -> None:
+        """The goal request was answered."""
+
+    def result_came(self, goal_id: bytes, status: int, result: Any) -> None:
+        """The result came; status 0 means that the server does not know the goal."""
+
+    def cancel_answered(self, goal_id: bytes, code: int) -> None:
+        """A cancel request was answered, with a return code of action_msgs/srv/CancelGoal."""
+
+    def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
+        """Feedback came, of a goal that may be anybody's."""
+
+    def statuses_came(self, statuses: dict[bytes, int]) -> None:
+        """The server published the status of its goals."""
+
+    def probe_answered(self, probe: int) -> None:
+        """A server answered the probe of this number; each live server answers once."""
+
+
+class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typed
+    """The one client of an action on a node, shared by all leaves that use it."""
+
+    def __init__(self, node: Node, action_type: Any, action_name: str, listener: Listener) -> None:
+        """Create the client in a callback group of its own.
+
+        Raises RuntimeError when this rclpy's low-level client lacks a method that is needed.
+        """
+        self._lock = threading.RLock()
+        self._listener = listener
+        self._goal_requests: dict[int, bytes] = {}
+        self._result_requests: dict[int, bytes | int] = {}  # an int is a probe's number
+        self._cancel_requests: dict[int, bytes] = {}
+        self._inbox: deque[tuple[str, Any, Any]] = deque()
+        self._closed = False
+        self._impl = action_type.Impl  # before rclpy's part: the executor may take at once
+        services = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
+        super().__init__(
+            node,
+            action_type,
+            action_name,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            goal_service_qos_profile=services,
+            result_service_qos_profile=services,
+            cancel_service_qos_profile=services,
+            feedback_sub_qos_profile=QoSProfile(depth=DEPTH),
+        )
+        missing = [name for name in _USED_OF_HANDLE if not hasattr(self._client_handle, name)]
+        if missing:
+            raise RuntimeError(f"this rclpy's action client has no {', '.join(missing)}")
+
+    # Requests; each raises what rclpy raises when the handle or the context is no longer valid
+
+    def send(self, goal_id: bytes, goal: Any) -> None:
+        """Send the goal request."""
+        request = self._impl.SendGoalService.Request()
+        request.goal_id = UUID(uuid=list(goal_id))
+        request.goal = goal
+        with self._lock:
+            self._goal_requests[self._client_handle.send_goal_request(request)] = goal_id
+
+    def ask_result(self, goal_id: bytes) -> None:
+        """Ask for the result; every accepted goal must be asked for, or the server keeps it."""
+        self._ask_result(goal_id, goal_id)
+
+    def cancel(self, goal_id: bytes) -> None:
+        """Ask the server to cancel this goal, and no other."""
+        request = CancelGoal.Request()
+        request.goal_info.goal_id = UUID(uuid=list(goal_id))
+        with self._lock:
+            self._cancel_requests[self._client_handle.send_cancel_request(request)] = goal_id
+
+    def probe(self, probe: int, random_id: bytes) -> None:
+        """Ask for a goal that nobody knows: each live server answers once, with status 0."""
+        self._ask_result(random_id, probe)
+
+    def _ask_result(self, goal_id: bytes, asked_for: bytes | int) -> None:
+        request = self._impl.GetResultService.Request()
+        request.goal_id = UUID(uuid=list(goal_id))
+        with self._lock:
+            self._result_requests[self._client_handle.send_result_request(request)] = asked_for
+
+    def forget(self, goal: bytes | int) -> None:
+        """Drop what is still filed for a goal (its id) or a probe (its number)."""
+        with self._lock:
+            for filed in (self._goal_requests, self._result_requests, self._cancel_requests):
+                for number in [number for number, of in filed.items() if of == goal]:
+                    del filed[number]
+
+    # The executor's view. It may have this client in hand while it is destroyed on another thread;
+    # rclpy's own methods then raise in the executor, which ends its spin.
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Take part in the wait, unless destroyed."""
+        with self._lock:
+            if not self._closed:
+                super().add_to_wait_set(wait_set)
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Whether there is something to take."""
+        with self._lock:
+            return not self._closed and bool(super().is_ready(wait_set))
+
+    # Answers
+
+    def pump(self) -> None:
+        """Take and deliver what has arrived, here and now, whether or not somebody spins."""
+        self.take_data()
+        self._deliver()
+
+    def take_data(self) -> None:
+        """Take all that has arrived into the inbox. Called by the executor, and by `pump`."""
+        taken = self._inbox
+        with self._lock:
+            if self._closed:
+                return
+            with self._client_handle:
+                for _ in range(TAKE_AT_MOST):
+                    number, response = self._client_handle.take_goal_response(
+                        self._impl.SendGoalService.Response
+                    )
+                    if response is None:
+                        break
+                    goal_id = self._goal_requests.pop(number, None)
+                    if goal_id is not None:
+                        taken.append(("goal", goal_id, response.accepted))
+                for _ in range(TAKE_AT_MOST):
+                    feedback = self._client_handle.take_feedback(self._impl.FeedbackMessage)
+                    if feedback is None:
+                        break
+                    taken.append(("feedback", bytes(feedback.goal_id.uuid), feedback.feedback))
+                for _ in range(TAKE_AT_MOST):
+                    number, response = self._client_handle.take_cancel_response(CancelGoal.Response)
+                    if response is None:
+                        break
+                    goal_id = self._cancel_requests.pop(number, None)
+                    if goal_id is not None:
+                        taken.append(("cancel", goal_id, _cancel_code(response, goal_id)))
+                for _ in range(TAKE_AT_MOST):
+                    number, response = self._client_handle.take_result_response(
+                        self._impl.GetResultService.Response
+                    )
+                    if response is None:
+                        break
+                    self._file_result(number, response)
+                for _ in range(TAKE_AT_MOST):
+                    status = self._client_handle.take_status(self._impl.GoalStatusMessage)
+                    if status is None:
+                        break
+                    statuses = {
+                        bytes(entry.goal_info.goal_id.uuid): entry.status
+                        for entry in status.status_list
+                    }
+                    taken.append(("status", statuses, None))
+
+    def _file_result(self, number: int, response: Any) -> None:
+        asked_for = self._result_requests.get(number)
+        if isinstance(asked_for, int):
+            self._inbox.append(
+                ("probe", asked_for, None)
+            )  # stays filed: a second server may answer
+        elif asked_for is not None:
+            if response.status == 0:  # with two servers, the other may know the goal
+                self._inbox.append(("result", asked_for, (0, None)))
+            else:
+                del self._result_requests[number]
+                self._inbox.append(("result", asked_for, (response.status, response.result)))
+
+    async def execute(self, taken: None) -> None:
+        """Deliver what the executor has had taken."""
+        self._deliver()
+
+    def _deliver(self) -> None:
+        with lock:
+            while self._inbox:
+                kind, about, detail = self._inbox.popleft()
+                try:
+                    self._tell(kind, about, detail)
+                except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
+                    log.error(f"{self._action_name}: {kind} was not taken in: {error!r}")
+
+    def _tell(self, kind: str, about: Any, detail: Any) -> None:
+        tell = self._listener
+        if kind == "feedback":
+            tell.feedback_came(about, detail)
+        elif kind == "goal":
+            tell.goal_answered(about, detail)
+        elif kind == "result":
+            tell.result_came(about, *detail)
+        elif kind == "cancel":
+            tell.cancel_answered(about, detail)
+        elif kind == "status":
+            tell.statuses_came(about)
+        else:
+            tell.probe_answered(about)
+
+    def destroy(self) -> None:
+        """Destroy the client. Answers that are still under way are lost."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            super().destroy()
+
+
+def _cancel_code(response: Any, goal_id: bytes) -> int:
+    """Return the code that is meant: rclpy's servers answer 0 with an empty list for a refusal."""
+    code = int(response.return_code)
+    canceling = {bytes(goal.goal_id.uuid) for goal in response.goals_canceling}
+    if code == CancelGoal.Response.ERROR_NONE and goal_id not in canceling:
+        return int(CancelGoal.Response.ERROR_REJECTED)
+    return code

@@ -1,0 +1,79 @@
+"""The alarm: one plain thread that minds every open goal's deadlines and servers, ticks or not.
+
+It sleeps until the earliest deadline, ends when no goal has been open for a while, and starts again
+with the next.
+It knows lines only by their `attend`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Protocol
+
+from bt_actions.ros.log import log
+from bt_actions.ros.shared import lock
+
+AT_LEAST_EVERY = 0.2
+"""Seconds; a clock that is not the steady one may run faster than the alarm can know."""
+LINGER = 5.0
+"""Seconds without an open goal until the thread ends; to start one for each goal costs more."""
+
+
+class Attended(Protocol):
+    """What the alarm minds."""
+
+    def attend(self, now: float) -> float:
+        """Do what is due and return the seconds until there is more."""
+
+
+_open: set[Attended] = set()
+_bell = threading.Condition(lock)
+_thread: threading.Thread | None = None
+_wakes_at = 0.0
+
+
+def mind(line: Attended) -> None:
+    """Mind this line until it is forgotten; the caller holds the lock."""
+    global _thread
+    _open.add(line)
+    if _thread is None or not _thread.is_alive():
+        _thread = threading.Thread(target=_attend, name="bt_actions-alarm", daemon=True)
+        _thread.start()
+
+
+def forget(line: Attended) -> None:
+    """Stop minding this line; the caller holds the lock."""
+    _open.discard(line)
+
+
+def minded() -> list[Attended]:
+    """Return the lines with open goals."""
+    with lock:
+        return list(_open)
+
+
+def wake_by(moment: float) -> None:
+    """See to it that the alarm is awake at `moment` (steady clock); the caller holds the lock."""
+    global _wakes_at
+    if moment < _wakes_at:
+        _wakes_at = moment
+        _bell.notify()
+
+
+def _attend() -> None:
+    global _thread, _wakes_at
+    with lock:
+        busy_at = time.monotonic()
+        while _open or time.monotonic() - busy_at < LINGER:
+            wait = AT_LEAST_EVERY
+            if _open:
+                busy_at = time.monotonic()
+            for line in list(_open):
+                try:
+                    wait = min(wait, line.attend(time.monotonic()))
+                except Exception as error:  # noqa: BLE001 - the last guard of every deadline
+                    log.error(f"{line!r}: {error!r}")
+            _wakes_at = time.monotonic() + wait
+            _bell.wait(wait)
+        _thread = None

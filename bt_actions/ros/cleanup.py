@@ -1,0 +1,148 @@
+"""Finds and cancels goals that a killed orchestrator left on servers it can no longer speak to.
+
+A process that dies by SIGKILL cancels nothing. Its goals are found in the status topics of all
+actions in sight, told by their ids (goal_ids.py), and canceled one by one; goals of other clients,
+and of orchestrators that are alive, are never touched. No action type is needed for any of it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from action_msgs.msg import GoalStatusArray
+from action_msgs.srv import CancelGoal
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_action_status_default
+from unique_identifier_msgs.msg import UUID
+
+from bt_actions.goal_ids import author_of
+from bt_actions.goal_terms import ENDS
+from bt_actions.policy import End
+
+STATUS = "/_action/status"
+ASK_AGAIN = 1.0
+"""Seconds between two requests to cancel the same goal."""
+SETTLE = 4.0
+"""Seconds after an action came in sight within which its status must have been received; where a
+client was just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
+
+
+@dataclass(slots=True)
+class LeftBehind:
+    """A goal whose orchestrator is dead. `end` is UNKNOWN until the server tells."""
+
+    action: str
+    goal_id: bytes
+    pid: int
+    end: End = End.UNKNOWN
+    asked_at: float = float("-inf")
+
+
+def cleanup(
+    *,
+    look: float = 5.0,
+    patience: float = 5.0,
+    found: Callable[[LeftBehind], None] = lambda left: None,
+    sighted: Callable[[str], None] = lambda action: None,
+    context: Context | None = None,
+) -> list[LeftBehind]:
+    """Cancel what dead orchestrators of this machine left; return it with its ends.
+
+    Looks for servers for `look` seconds (longer while new ones come in sight), and waits `patience`
+    seconds more for the goals that it canceled to end. `found` is called with each at once, and
+    `sighted` with the name of each action in sight. Blocks.
+    """
+    own = Context() if context is None else context
+    if context is None:
+        own.init()
+    node = Node("bt_actions_cleanup", context=own)
+    executor = SingleThreadedExecutor(context=own)
+    executor.add_node(node)
+    sweep = _Sweep(node, found, sighted)
+    try:
+        began = time.monotonic()
+        while True:
+            now = time.monotonic()
+            looked = max(began + look, sweep.newest + SETTLE)
+            if now < looked:
+                sweep.discover(now)
+            elif sweep.over or now >= looked + patience:
+                break
+            sweep.ask()
+            executor.spin_once(timeout_sec=0.05)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        if context is None:
+            own.shutdown()
+    return list(sweep.left.values())
+
+
+class _Sweep:
+    def __init__(
+        self,
+        node: Node,
+        found: Callable[[LeftBehind], None],
+        sighted: Callable[[str], None],
+    ) -> None:
+        self._node = node
+        self._found = found
+        self._sighted = sighted
+        self._subscriptions: dict[str, Any] = {}
+        self._clients: dict[str, Any] = {}
+        self.left: dict[bytes, LeftBehind] = {}
+        self.newest = float("-inf")
+
+    @property
+    def over(self) -> bool:
+        """Whether every goal that was found has ended."""
+        return all(goal.end is not End.UNKNOWN for goal in self.left.values())
+
+    def discover(self, now: float) -> None:
+        """Listen to every action's status that is in sight."""
+        for topic, _types in self._node.get_topic_names_and_types():
+            if topic.endswith(STATUS) and topic not in self._subscriptions:
+                action = topic.removesuffix(STATUS)
+                self.newest = now
+                self._sighted(action)
+                self._subscriptions[topic] = self._node.create_subscription(
+                    GoalStatusArray,
+                    topic,
+                    lambda message, action=action: self._read(action, message),
+                    qos_profile_action_status_default,
+                )
+
+    def _read(self, action: str, message: Any) -> None:
+        for entry in message.status_list:
+            goal_id = bytes(entry.goal_info.goal_id.uuid)
+            left = self.left.get(goal_id)
+            if left is not None:
+                left.end = ENDS.get(entry.status, End.UNKNOWN)
+                continue
+            author = author_of(goal_id)
+            if entry.status in ENDS or author is None or author.alive:
+                continue
+            left = self.left[goal_id] = LeftBehind(action, goal_id, author.pid)
+            self._found(left)
+
+    def ask(self) -> None:
+        """Ask the servers to cancel what has not ended, again every second."""
+        now = time.monotonic()
+        for left in self.left.values():
+            if left.end is not End.UNKNOWN or now - left.asked_at < ASK_AGAIN:
+                continue
+            client = self._clients.get(left.action)
+            if client is None:
+                client = self._clients[left.action] = self._node.create_client(
+                    CancelGoal, f"{left.action}/_action/cancel_goal"
+                )
+            if client.service_is_ready():
+                left.asked_at = now
+                request = CancelGoal.Request()
+                request.goal_info.goal_id = UUID(uuid=list(left.goal_id))
+                client.call_async(request)

@@ -1,0 +1,44 @@
+"""The two clocks of a node as seconds: the steady one, and the node's own.
+
+Where no simulated time is in force the node's own clock is the steady one too, so that a wall clock
+that is set moves no deadline. Holds no deadline itself.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from bt_actions.goal_terms import Now
+from bt_actions.ros.shared import lock
+
+
+class Clocks:
+    """Reads both clocks of one node; going over to simulated time and back leaves no jump."""
+
+    def __init__(self, node: Any) -> None:
+        self._clock = node.get_clock()
+        self._simulated = False
+        self._offset = 0.0
+        self._last = time.monotonic()
+
+    def now(self) -> Now:
+        """Return this moment."""
+        with lock:  # two threads that find simulated time switched on must not both make up for it
+            return self._now()
+
+    def _now(self) -> Now:
+        steady = time.monotonic()
+        simulated, reading = False, steady
+        try:
+            if self._clock.ros_time_is_active:
+                simulated, reading = True, self._clock.now().nanoseconds * 1e-9
+                if reading == 0.0:  # no /clock message yet: time stands still, and will not jump
+                    return Now(steady, self._last)
+        except Exception:  # noqa: BLE001 - the node was destroyed: InvalidHandle, or worse, by version
+            simulated = False
+        if simulated != self._simulated:
+            self._simulated = simulated
+            self._offset = self._last - reading
+        self._last = reading + self._offset
+        return Now(steady, self._last)

@@ -1,0 +1,119 @@
+"""What people write instead of a message's fields: times, durations, angles, constants by name.
+
+Each function leaves alone what it does not know, and raises ValueError with a readable text for
+what it knows and finds wrong.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import re
+from collections.abc import Callable, Mapping
+
+from bt_actions.ros.fields import constants
+from bt_actions.ros.interfaces import UnknownInterface, interface, short_name
+from bt_actions.suggest import did_you_mean
+from bt_actions.units import parse_angle, parse_duration
+
+__all__ = ["constant", "duration_of", "quaternion_of", "time_of"]
+
+_BILLION = 1_000_000_000
+_CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
+_PARTS = ("Goal", "Result", "Feedback", "Request", "Response")
+_ANGLES = ("roll", "pitch", "yaw")
+
+
+def time_of(value: object, now: Callable[[], int]) -> object:
+    """``now``, or seconds since the epoch, as the fields of a builtin_interfaces/Time."""
+    if value == "now":
+        nanoseconds = now()
+        return {"sec": nanoseconds // _BILLION, "nanosec": nanoseconds % _BILLION}
+    if isinstance(value, str):
+        raise ValueError(f"a time is 'now', seconds, or {{sec, nanosec}}, not {value!r}")
+    return _seconds(value)
+
+
+def duration_of(value: object) -> object:
+    """``500 ms`` or seconds as the fields of a builtin_interfaces/Duration."""
+    if isinstance(value, str):
+        return _seconds(parse_duration(value))
+    return _seconds(value)
+
+
+def _seconds(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    if not math.isfinite(value) or not -(2**31) <= value < 2**31:
+        raise ValueError(f"{value} seconds do not fit a time")
+    nanoseconds = round(value * _BILLION)
+    return {"sec": nanoseconds // _BILLION, "nanosec": nanoseconds % _BILLION}
+
+
+def quaternion_of(value: object) -> object:
+    """``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields."""
+    if not isinstance(value, Mapping) or not any(name in value for name in _ANGLES):
+        return value
+    for name in value:
+        if name not in _ANGLES:
+            raise ValueError(f"roll, pitch and yaw stand alone: {name!r} cannot be beside them")
+    roll, pitch, yaw = (parse_angle(value.get(name, 0.0)) / 2 for name in _ANGLES)
+    sin_r, cos_r, sin_p, cos_p = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    sin_y, cos_y = math.sin(yaw), math.cos(yaw)
+    return {
+        "x": sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
+        "y": cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
+        "z": cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
+        "w": cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
+    }
+
+
+def constant(text: str, owner: type) -> object:
+    """The constant a name stands for, seen from a field of `owner`; other texts are returned.
+
+    ``STATUS_MOVING`` is looked up in `owner`; ``MoveRobot.Feedback.STATUS_MOVING``,
+    ``Feedback.STATUS_MOVING`` and ``sensor_msgs/msg/BatteryState.POWER_SUPPLY_STATUS_FULL`` in the
+    class they name, beside `owner` unless a package is given.
+    """
+    match = _CONSTANT.fullmatch(text)
+    if match is None:
+        return text
+    place = owner if match[1] is None else _class(match[1], owner)
+    known = constants(place)
+    if match[2] not in known:
+        near = did_you_mean(match[2], known)
+        text = f"{short_name(place)} has no constant {match[2]!r}"
+        raise ValueError(text + (near or (f"; it has {', '.join(known)}" if known else "")))
+    return known[match[2]]
+
+
+def _class(path: str, owner: type) -> type:
+    """The class a path such as ``MoveRobot.Feedback`` names, from the module of `owner`."""
+    package, _, rest = path.rpartition("/")
+    names = rest.split(".")
+    if names[-1] in _PARTS and len(names) == 1 and not package:
+        names = [owner.__name__.rpartition("_")[0], *names]
+    if package:
+        name, _, kind = package.partition("/")
+        found: object = _interface(f"{name}/{kind or 'msg'}/{names[0]}")
+    else:
+        module = importlib.import_module(".".join(owner.__module__.split(".")[:2]))
+        messages = importlib.import_module(f"{owner.__module__.split('.')[0]}.msg") if (
+            not hasattr(module, names[0]) and ".msg" not in owner.__module__
+        ) else module  # fmt: skip
+        found = getattr(messages, names[0], None)
+    for name in names[1:]:
+        found = getattr(found, name, None) if name in _PARTS else None
+    if not isinstance(found, type):
+        raise ValueError(f"no message class {path!r} is known here")
+    return found
+
+
+def _interface(name: str) -> type:
+    kind = name.split("/")[1]
+    if kind not in ("action", "srv", "msg"):
+        raise ValueError(f"{name!r} is no type name: it is written package/msg/Name")
+    try:
+        return interface(name, kind)  # type: ignore[arg-type]
+    except UnknownInterface as error:
+        raise ValueError(str(error)) from None

@@ -1,0 +1,38 @@
+"""The middleware's settings for processes of our own; to be called before ROS is first touched.
+
+What the user has set is never overridden. Does not import rclpy.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from enum import Enum
+from pathlib import Path
+
+SHORT_LEASE = Path(__file__).with_name("short_lease.xml")
+_PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+_IN_THIS_FOLDER = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
+_LOGS = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
+_RANGES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
+
+
+class Reach(Enum):
+    """How far a process may see and be seen, in ROS_AUTOMATIC_DISCOVERY_RANGE's words."""
+
+    NETWORK = ""
+    MACHINE = "LOCALHOST"
+    """For simulated servers: they carry the names of real ones, and would be mistaken for them."""
+    PROCESS = "OFF"
+    """For a tree with its own simulated servers: another one beside it is none of its business."""
+
+
+def prepare(reach: Reach = Reach.NETWORK) -> None:
+    """Let others notice within 3 s when this process dies, and set how far it may be seen."""
+    chosen = any(os.environ.get(name) for name in _PROFILES)
+    if not chosen and not any(Path(name).exists() for name in _IN_THIS_FOLDER):
+        os.environ[_PROFILES[0]] = str(SHORT_LEASE)
+    if not any(os.environ.get(name) for name in _LOGS):
+        os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")  # rcl insists on one
+    if reach is not Reach.NETWORK and not any(os.environ.get(name) for name in _RANGES):
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = reach.value

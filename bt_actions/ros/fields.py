@@ -1,0 +1,130 @@
+"""What a ROS message consists of, as plain values: for filling one, and for checking a tree.
+
+Read from the classes that rosidl generates; imports no rclpy.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+from bt_actions.ros.interfaces import short_name
+
+__all__ = [
+    "FLOATS",
+    "INTEGERS",
+    "FieldType",
+    "Listing",
+    "Message",
+    "Scalar",
+    "constants",
+    "describe",
+    "is_message_class",
+]
+
+INTEGERS = MappingProxyType(
+    {
+        "int8": (-(2**7), 2**7 - 1),
+        "uint8": (0, 2**8 - 1),
+        "int16": (-(2**15), 2**15 - 1),
+        "uint16": (0, 2**16 - 1),
+        "int32": (-(2**31), 2**31 - 1),
+        "uint32": (0, 2**32 - 1),
+        "int64": (-(2**63), 2**63 - 1),
+        "uint64": (0, 2**64 - 1),
+        "byte": (0, 255),
+    }
+)
+"""The least and the greatest value of each integer type."""
+FLOATS = MappingProxyType({"float32": 3.402823466e38, "float64": float("inf")})
+"""The greatest finite value of each float type."""
+_NAMES = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """`name` is the ROS name of the type; `limit` bounds the length of a string."""
+
+    name: str
+    limit: int | None = None
+
+    def __str__(self) -> str:
+        return self.name if self.limit is None else f"{self.name}<={self.limit}"
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message inside a message."""
+
+    cls: type
+
+    def __str__(self) -> str:
+        return short_name(self.cls)
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """An array of exactly `size`, a sequence of at most `limit`, or an unbounded one."""
+
+    item: FieldType
+    size: int | None = None
+    limit: int | None = None
+
+    def __str__(self) -> str:
+        if self.size is not None:
+            return f"{self.item}[{self.size}]"
+        return f"{self.item}[]" if self.limit is None else f"{self.item}[<={self.limit}]"
+
+
+FieldType = Scalar | Message | Listing
+
+
+@lru_cache(maxsize=4096)
+def describe(cls: type) -> Mapping[str, FieldType]:
+    """The fields of a message class in order, with their types."""
+    generated: Any = cls
+    names = generated.get_fields_and_field_types()
+    return MappingProxyType(
+        {name: _type(slot) for name, slot in zip(names, generated.SLOT_TYPES, strict=True)}
+    )
+
+
+@lru_cache(maxsize=4096)
+def constants(cls: type) -> Mapping[str, object]:
+    """The constants that a message class declares."""
+    # rosidl keeps them on the metaclass, as properties and in a private dictionary.
+    return MappingProxyType(
+        {
+            name: getattr(cls, name)
+            for name in vars(type(cls))
+            if name.isupper() and not name.startswith("_") and not name.endswith("__DEFAULT")
+        }
+    )
+
+
+def is_message_class(value: object) -> bool:
+    """Whether `value` is a class that rosidl generated."""
+    return isinstance(value, type) and hasattr(value, "get_fields_and_field_types")
+
+
+def _type(slot: Any) -> FieldType:
+    from rosidl_parser import definition as idl  # here, so that naming a type needs no ROS
+
+    if isinstance(slot, idl.BasicType):
+        return Scalar(_NAMES.get(slot.typename, slot.typename))
+    if isinstance(slot, idl.AbstractGenericString):
+        name = "wstring" if isinstance(slot, idl.AbstractWString) else "string"
+        bounded = isinstance(slot, (idl.BoundedString, idl.BoundedWString))
+        return Scalar(name, slot.maximum_size if bounded else None)
+    if isinstance(slot, idl.Array):
+        return Listing(_type(slot.value_type), size=slot.size)
+    if isinstance(slot, idl.BoundedSequence):
+        return Listing(_type(slot.value_type), limit=slot.maximum_size)
+    if isinstance(slot, idl.UnboundedSequence):
+        return Listing(_type(slot.value_type))
+    module = importlib.import_module(".".join(slot.namespaces))
+    return Message(getattr(module, slot.name))

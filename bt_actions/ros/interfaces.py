@@ -1,0 +1,176 @@
+"""Which actions, services and messages are installed, and their Python classes by name.
+
+Imports no rclpy, and imports a package only after seeing that it holds interfaces.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from bt_actions.suggest import did_you_mean
+
+__all__ = [
+    "UnknownInterface",
+    "find_action",
+    "installed",
+    "interface",
+    "interface_name",
+    "packages",
+    "short_name",
+]
+
+Kind = Literal["action", "srv", "msg"]
+_WORDS: dict[str, str] = {"action": "action", "srv": "service", "msg": "message"}
+_PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+class UnknownInterface(LookupError):
+    """No such interface is installed; the text says which package is missing or what it has."""
+
+    def __init__(self, name: str, message: str) -> None:
+        super().__init__(message)
+        self.name = name
+
+
+def interface(name: str, kind: Kind) -> type:
+    """The class of ``"pkg/action/Name"``; ``"pkg/Name"`` will do, since the kind is known.
+
+    Raises UnknownInterface, which names the package, or what it holds instead.
+    """
+    return _found(name, kind)
+
+
+@lru_cache(maxsize=1024)
+def _found(name: str, kind: Kind) -> type:
+    """As `interface`; a class that was found is looked for no more."""
+    package, short = _split(name, kind)
+    folder = _folder(package, kind)
+    if folder is None:
+        raise UnknownInterface(name, _missing_package(package, kind))
+    found = _load(package, kind, short)
+    if found is None:
+        known = _listed(folder)
+        raise UnknownInterface(
+            name,
+            f"package {package!r} has no {_WORDS[kind]} {short!r}"
+            + (did_you_mean(short, known) or _listing(known)),
+        )
+    return found
+
+
+def find_action(short: str) -> type:
+    """The action meant by ``MoveRobot``, ``pkg/MoveRobot`` or the full name.
+
+    Raises UnknownInterface when there is none, or more than one; it names the candidates.
+    """
+    if "/" in short:
+        return interface(short, "action")
+    names = installed("action")
+    found = [name for name in names if name.rpartition("/")[2] == short]
+    if len(found) == 1:
+        return interface(found[0], "action")
+    if found:
+        raise UnknownInterface(short, f"{short!r} is more than one action: {', '.join(found)}")
+    words = {name.rpartition("/")[2] for name in names}
+    raise UnknownInterface(
+        short, f"no installed package has an action {short!r}" + did_you_mean(short, words)
+    )
+
+
+def packages(kind: Kind) -> dict[str, Path]:
+    """The packages that hold interfaces of a kind, with the folder of their Python classes."""
+    found: dict[str, Path] = {}
+    for entry in sys.path:
+        try:
+            children = sorted(Path(entry or ".").iterdir())
+        except OSError:
+            continue
+        for child in children:
+            if child.name not in found and _PACKAGE.fullmatch(child.name):
+                folder = child / kind
+                if _holds_interfaces(folder):
+                    found[child.name] = folder
+    return found
+
+
+def installed(kind: Kind) -> list[str]:
+    """The full names of all installed interfaces of a kind."""
+    return sorted(
+        f"{package}/{kind}/{short}"
+        for package, folder in packages(kind).items()
+        for short in _listed(folder)
+    )
+
+
+def interface_name(cls: type) -> str:
+    """``"pkg/action/Name"`` of an interface's class."""
+    package, kind = cls.__module__.split(".")[:2]
+    return f"{package}/{kind}/{cls.__name__}"
+
+
+def short_name(cls: type) -> str:
+    """The class as people call it: ``MoveRobot.Goal``, ``SetBool.Request``, ``Pose``."""
+    name = cls.__name__
+    for part in ("Goal", "Result", "Feedback", "Request", "Response"):
+        owner = name.removesuffix(f"_{part}")
+        if owner != name and ".msg" not in cls.__module__:
+            return f"{owner}.{part}"
+    return name
+
+
+def _split(name: str, kind: Kind) -> tuple[str, str]:
+    parts = name.split("/")
+    if len(parts) == 3 and parts[1] in _WORDS and parts[1] != kind:
+        raise UnknownInterface(name, f"{name!r} names no {_WORDS[kind]}, but one of {parts[1]}/")
+    if len(parts) == 3 and parts[1] == kind:
+        parts = [parts[0], parts[2]]
+    if len(parts) != 2 or not _PACKAGE.fullmatch(parts[0]) or not _NAME.fullmatch(parts[1]):
+        raise UnknownInterface(name, f"{name!r} is no type name: it is written package/{kind}/Name")
+    return parts[0], parts[1]
+
+
+def _folder(package: str, kind: Kind) -> Path | None:
+    for entry in sys.path:
+        folder = Path(entry or ".") / package / kind
+        if _holds_interfaces(folder):
+            return folder
+    return None
+
+
+def _holds_interfaces(folder: Path) -> bool:
+    """Generated folders import their own hidden modules by full name; others do not."""
+    return bool(_listed(folder))
+
+
+def _load(package: str, kind: Kind, short: str) -> type | None:
+    module = importlib.import_module(f"{package}.{kind}")
+    found = getattr(module, short, None)
+    wanted = {"action": "Goal", "srv": "Request", "msg": "get_fields_and_field_types"}[kind]
+    return found if isinstance(found, type) and hasattr(found, wanted) else None
+
+
+@lru_cache(maxsize=1024)
+def _listed(folder: Path) -> tuple[str, ...]:
+    """The interfaces of a package, read from the file that imports them: nothing is loaded."""
+    try:
+        text = (folder / "__init__.py").read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return ()
+    own = rf"^from {folder.parent.name}\.{folder.name}\._\w+ import ([A-Za-z0-9]+)\b(?!_)"
+    return tuple(sorted(set(re.findall(own, text, re.MULTILINE))))
+
+
+def _missing_package(package: str, kind: Kind) -> str:
+    text = f"package {package!r} is not installed here, or has no {_WORDS[kind]}s"
+    near = did_you_mean(package, packages(kind), cutoff=0.8)  # most end in _msgs
+    return text + (near or ": install it, or source the workspace it is built in")
+
+
+def _listing(known: tuple[str, ...]) -> str:
+    return f"; it has {', '.join(known[:8])}{' ...' if len(known) > 8 else ''}" if known else ""

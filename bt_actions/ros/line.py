@@ -1,0 +1,357 @@
+"""One action server as one node sees it: the shared client, the watch, and the goals on it.
+
+Takes what the server says and what discovery shows, tells the goals, and does what they say. It
+decides nothing about a goal (goal.py) or about who is alive (server.py). All under the one lock.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import ENDS, STATUS_SUCCEEDED, Command, Event, State
+from bt_actions.policy import Busy, End, Outcome
+from bt_actions.ros import alarm
+from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.log import log
+from bt_actions.ros.shared import Ticket, lock
+from bt_actions.server import Server, ServerWatch
+from bt_actions.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from bt_actions.ros.traffic import Traffic
+
+LOOK_WHILE_WAITING = 0.05
+LOOK_WHILE_RUNNING = 0.2
+LOOK_WHILE_LOST = 1.0
+LOOK_WHILE_ORPHANED = 0.01
+"""Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
+its return would matter; nobody spins our node any more, so that the alarm must take the answers."""
+PROBES_KEPT = 20
+FEEDBACK = "/_action/feedback"
+LOST_KEPT = 100
+"""Goals of one line remembered in case their server, or their request, turns up: the newest."""
+
+_probes = itertools.count(1)
+
+
+class Line:
+    """One action as one node sees it: the shared client, the watch, and the goals on it."""
+
+    def __init__(self, traffic: Traffic, action_type: Any, name: str) -> None:
+        self.traffic = traffic
+        self.action_type = action_type
+        self.name = name
+        self.users = 0
+        self.goals: dict[bytes, Ticket] = {}
+        self.watch = ServerWatch()
+        self.client = ActionClient(traffic.node, action_type, name, self)
+        self.orphaned = False
+        self._status_topic = f"{name}/_action/status"
+        self._look_at = 0.0
+        self._last_probes: deque[int] = deque()
+        self._warned_crowd = False
+
+    def __repr__(self) -> str:
+        return f"<Line {self.name}, {len(self.goals)} goals>"
+
+    # What the server says (ActionClient's Listener)
+
+    def goal_answered(self, goal_id: bytes, accepted: bool) -> None:
+        """Pass on the answer to a goal request."""
+        self._tell_by_id(goal_id, Event.ACCEPTED if accepted else Event.REJECTED)
+
+    def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
+        """Pass on feedback of a goal of ours."""
+        with lock:
+            ticket = self.goals.get(goal_id)
+            if ticket is None:
+                return
+            self.tell(ticket, Event.FEEDBACK, feedback)
+            if ticket.keeps_feedback:
+                ticket.feedback.append(feedback)
+                self.traffic.notify(None)
+
+    def cancel_answered(self, goal_id: bytes, code: int) -> None:
+        """Pass on the answer to a cancel request."""
+        self._tell_by_id(goal_id, Event.CANCEL_ANSWERED, code)
+
+    def result_came(self, goal_id: bytes, status: int, result: Any) -> None:
+        """Pass on a result; judge by the watch what it means that a goal is not known."""
+        with lock:
+            ticket = self.goals.get(goal_id)
+            if ticket is None:
+                return
+            if status in ENDS:
+                if status != STATUS_SUCCEEDED and self._rival_sent(ticket):
+                    self.tell(ticket, Event.REPLACED)  # this has overtaken the rival's acceptance
+                self.tell(ticket, Event.RESULT, (status, result))
+            elif status != 0:  # answered too soon, by a server that is none of rclpy's or rclcpp's
+                self.tell(ticket, Event.STATUS, status)
+            elif not self.watch.changed(ticket.sent_to):
+                if self.watch.state(time.monotonic()) is Server.READY:
+                    self.tell(ticket, Event.RESULT_UNKNOWN)
+            elif self.watch.alone and ticket.goal.accepted:
+                self.tell(ticket, Event.SERVER_LOST, f"{self.name} was restarted under the goal")
+                self.tell(ticket, Event.SERVER_RESTARTED)
+
+    def _rival_sent(self, ticket: Ticket) -> bool:
+        """Whether a newer goal that replaces this one is on its way, or has arrived."""
+        holders = self.traffic.resources.holders(ticket.goal.resources)
+        newer = holders[holders.index(ticket) + 1 :] if ticket in holders else []
+        return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
+
+    def statuses_came(self, statuses: dict[bytes, int]) -> None:
+        """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
+        with lock:
+            for goal_id in self.goals.keys() & statuses.keys():
+                if statuses[goal_id] > 0:
+                    self.tell(self.goals[goal_id], Event.STATUS, statuses[goal_id])
+
+    def probe_answered(self, probe: int) -> None:
+        """Pass on the answer to a probe."""
+        with lock:
+            self.watch.probe_answered(time.monotonic(), probe)
+            self.traffic.notify(None)
+
+    def _tell_by_id(self, goal_id: bytes, event: Event, detail: Any = None) -> None:
+        with lock:
+            ticket = self.goals.get(goal_id)
+            if ticket is not None:
+                self.tell(ticket, event, detail)
+
+    # What the goals want
+
+    def tell(self, ticket: Ticket, event: Event, detail: Any = None, message: Any = None) -> None:
+        """Tell a goal what happened and do what it says; `message` is the goal to be sent."""
+        with lock:
+            self._apply(ticket, lambda now: ticket.goal.on(event, now, detail), message)
+
+    def poll(self, ticket: Ticket) -> None:
+        """Let the goal's deadlines take effect, unless its tree is paused before sending.
+
+        What has arrived by now is taken in first: an answer that came in time is in time, though
+        the executor, or this whole process, was too busy to look.
+        """
+        with lock:
+            goal = ticket.goal
+            if ticket.paused_at is None or goal.sent:
+                if goal.sent and goal.due_in(self.traffic.clocks.now()) == 0.0:
+                    self.client.pump()
+                self._apply(ticket, goal.poll, None)
+
+    def _apply(
+        self, ticket: Ticket, step: Callable[[Any], tuple[Command, ...]], message: Any
+    ) -> None:
+        goal = ticket.goal
+        before = (goal.state, goal.outcome, goal.end)
+        was_accepted = goal.accepted
+        now = self.traffic.clocks.now()
+        commands = step(now)
+        if goal.state is State.DONE:
+            self.close_book(goal)
+        if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
+            goal.reason += self._instead()
+        if before != (goal.state, goal.outcome, goal.end):
+            ticket.traffic.note(ticket)
+        for command in commands:
+            self._carry_out(ticket, command, message)
+        due = goal.due_in(now)
+        if due is not None:
+            alarm.wake_by(now.steady + due)
+        newly = goal.accepted and not was_accepted and goal.state is State.EXECUTING
+        if newly and goal.busy is Busy.REPLACE:
+            for older in self.traffic.resources.holders(goal.resources):
+                if older is ticket:
+                    break
+                older.line.tell(older, Event.REPLACED)
+
+    def _carry_out(self, ticket: Ticket, command: Command, message: Any) -> None:
+        goal = ticket.goal
+        if command is Command.RELEASE:
+            for next_one in self.traffic.resources.release(ticket):
+                next_one.line.tell(next_one, Event.GRANTED)
+            return
+        try:
+            if command is Command.SEND:
+                ticket.sent_to = self.watch.gids
+                self.client.send(goal.id, message)
+                with contextlib.suppress(Exception):  # it has left: what fails now is no failure
+                    ticket.sent_to |= self._shown()  # restarted since the last look: it went there
+            elif command is Command.CANCEL:
+                self.client.cancel(goal.id)
+            else:
+                self.client.ask_result(goal.id)
+        except Exception as error:  # noqa: BLE001 - InvalidHandle, RCLError, or TypeError of a wrong message
+            if command is Command.SEND:
+                self.tell(ticket, Event.SEND_FAILED, error)
+            else:
+                log.warning(f"{self.name}: {command.name} could not be sent: {error!r}")
+
+    def close_book(self, goal: Goal) -> None:
+        """Know nothing of this goal any more, and mind only what is left."""
+        if self.goals.pop(goal.id, None) is not None:
+            self.client.forget(goal.id)
+        if not self.goals:
+            alarm.forget(self)
+            self.traffic.drop_if_unused(self)
+
+    def _instead(self) -> str:
+        """Say what is in sight where the action is not: another type, or a name like it."""
+        node, actions = self.traffic.node, dict[str, str]()
+        try:
+            for topic, _ in node.get_topic_names_and_types():
+                if topic.endswith(FEEDBACK):
+                    for info in node.get_publishers_info_by_topic(topic):
+                        kind = info.topic_type.removesuffix("_FeedbackMessage")
+                        actions[topic.removesuffix(FEEDBACK)] = kind
+        except Exception:  # noqa: BLE001 - our node was destroyed
+            return ""
+        if self.name in actions:
+            return f"; there is one of another type or version, {actions[self.name]}"
+        if not actions:
+            return "; no action server at all is in sight in this ROS domain"
+        return did_you_mean(self.name, actions)
+
+    # The watch over the server
+
+    def owes_us(self) -> bool:
+        """Whether the server may still run a goal that we gave up: it must be canceled first."""
+        return any(ticket.goal.owed for ticket in self.goals.values())
+
+    def in_flight(self) -> int:
+        """Count the goal requests that wait for their answer."""
+        return sum(ticket.goal.state is State.SENDING for ticket in self.goals.values())
+
+    def _take_over(self) -> None:
+        """Take lost goals of other nodes whose server is in sight here: it is to cancel them first.
+
+        Each node discovers for itself; theirs may see the server later, or in part, or never again.
+        """
+        for line in alarm.minded():
+            if not isinstance(line, Line) or line is self or not line.shares_server_with(self):
+                continue
+            for ticket in list(line.goals.values()):
+                if ticket.goal.lost and ticket.sent_to & self.watch.gids:
+                    ticket.line, ticket.was_gone = self, True
+                    self.goals[ticket.goal.id] = ticket
+                    line.close_book(ticket.goal)
+                    alarm.mind(self)
+
+    def shares_server_with(self, other: Line) -> bool:
+        """Whether both, which belong to two nodes, mean the same action."""
+        same_domain = self.traffic.resources is other.traffic.resources
+        return same_domain and self.name == other.name and self.action_type is other.action_type
+
+    def forget_lost(self) -> None:
+        """Give up on goals whose server is gone: nobody is left whom its return would concern."""
+        for ticket in list(self.goals.values()):
+            if ticket.goal.outcome is not None and not ticket.goal.holding:
+                self.tell(ticket, Event.CLOSED)
+
+    def _bound_the_lost(self) -> None:
+        settled = [
+            ticket
+            for ticket in self.goals.values()
+            if ticket.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
+            and ticket.goal.outcome is not None
+        ]
+        for ticket in settled[:-LOST_KEPT]:
+            self.tell(ticket, Event.CLOSED)
+
+    def _shown(self) -> frozenset[bytes]:
+        """Return the GIDs of the servers in sight; raises where our node is gone."""
+        infos = self.traffic.node.get_publishers_info_by_topic(self._status_topic)
+        return frozenset(bytes(info.endpoint_gid) for info in infos)
+
+    def look(self, now: float) -> Server:
+        """Observe the server, tell the goals what that means for them, and return its state."""
+        try:
+            ready = self.client.server_is_ready()
+            gids = self._shown()
+            valid = self.traffic.node.context.ok()
+        except Exception:  # noqa: BLE001 - InvalidHandle: our own node was destroyed
+            valid = False
+        if not valid:
+            self._orphan()
+            return Server.ABSENT
+        before = self.watch.state(now)
+        self.watch.observe(now, ready, gids)
+        self._take_over()
+        if self.watch.wants_probe(now):
+            self._probe()
+        for ticket in list(self.goals.values()):
+            if ticket.goal.sent:
+                self._judge(ticket, now)
+        state = self.watch.state(now)
+        if state is not before:
+            self.traffic.notify(None)
+        if state is Server.AMBIGUOUS and not self._warned_crowd:
+            self._warned_crowd = True
+            log.warning(f"{self.name}: two action servers answer to this name; none is sent to")
+        elif state is Server.READY:
+            self._warned_crowd = False
+        return state
+
+    def _judge(self, ticket: Ticket, now: float) -> None:
+        goal, watch = ticket.goal, self.watch
+        gone = watch.gone(now, ticket.sent_to)
+        was_gone, ticket.was_gone = ticket.was_gone, gone
+        if goal.lost:
+            if was_gone and not gone:
+                self.tell(ticket, Event.SERVER_RETURNED)
+        elif gone:
+            self.client.pump()  # its last words
+            how = "was restarted" if watch.gids else "went away"
+            self.tell(ticket, Event.SERVER_LOST, f"{self.name} {how} under the goal")
+        elif watch.changed(ticket.sent_to) and watch.alone and now - ticket.asked_at > 0.5:
+            ticket.asked_at = now
+            self.tell(ticket, Event.SERVER_CHANGED)
+
+    def _probe(self) -> None:
+        probe = next(_probes)
+        self._last_probes.append(probe)
+        if len(self._last_probes) > PROBES_KEPT:
+            self.client.forget(self._last_probes.popleft())
+        with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
+            self.client.probe(probe, uuid.uuid4().bytes)
+
+    def _orphan(self) -> None:
+        """Our node is gone, or its context: nobody can want these goals any more."""
+        if not self.orphaned:
+            self.orphaned = True
+            if self.goals:
+                log.warning(f"{self.name}: the node is gone; canceling what it left")
+        for ticket in list(self.goals.values()):  # also one that was begun since
+            if ticket.goal.outcome is None:
+                self.tell(ticket, Event.INTERRUPTED)
+
+    def attend(self, now: float) -> float:
+        """Do what is due at this line, on the alarm; return the seconds until it wants to again."""
+        waiting = any(not ticket.goal.sent for ticket in self.goals.values())
+        if now >= self._look_at:
+            self.look(now)
+            settling = self.watch.state(now) is Server.SETTLING
+            if waiting or settling:
+                self._look_at = now + LOOK_WHILE_WAITING
+            elif any(not ticket.accounted_for for ticket in self.goals.values()):
+                self._look_at = now + LOOK_WHILE_RUNNING
+            else:
+                self._look_at = now + LOOK_WHILE_LOST
+        if self.orphaned:
+            self.client.pump()
+            self._look_at = now + LOOK_WHILE_ORPHANED
+        wait = self._look_at - now
+        for ticket in list(self.goals.values()):
+            self.poll(ticket)
+            due = ticket.goal.due_in(self.traffic.clocks.now())
+            if due is not None and ticket.paused_at is None:
+                wait = min(wait, due)
+        self._bound_the_lost()
+        return max(wait, 0.001)

@@ -1,0 +1,99 @@
+"""The log of what becomes of goals, written by a thread of its own.
+
+Most of it is told under the one lock. Whoever reads standard error may stop to read: then the log
+waits, and nothing else does. Decides nothing and keeps nothing that was written.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import queue
+import select
+import threading
+import time
+
+import rclpy.logging
+
+MOST = 1000
+"""Lines that wait to be written; of a reader that has stopped, newer ones are only counted."""
+LINGER = 5.0
+"""Seconds without a line until the thread ends."""
+AT_EXIT = 1.0
+"""Seconds that a process which ends gives the log to be written."""
+LONGEST = 3000
+"""Characters of a line; a pipe that has room at all has room for 4,096 bytes."""
+STDERR = 2
+THREAD = "bt_actions-log"
+
+
+class Log:
+    """Takes lines from any thread and never waits."""
+
+    def __init__(self, name: str) -> None:
+        self._logger = rclpy.logging.get_logger(name)
+        self._lines: queue.Queue[tuple[str, str]] = queue.Queue()
+        self._guard = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._dropped = 0
+        atexit.register(self.flush)
+
+    def info(self, text: str) -> None:
+        """Log something worth knowing."""
+        self._put("info", text)
+
+    def warning(self, text: str) -> None:
+        """Log something that may need attention."""
+        self._put("warning", text)
+
+    def error(self, text: str) -> None:
+        """Log something that needs attention."""
+        self._put("error", text)
+
+    def flush(self, seconds: float = AT_EXIT) -> None:
+        """Wait until all has been written, but not for long."""
+        end = time.monotonic() + seconds
+        while self._lines.unfinished_tasks and time.monotonic() < end:
+            time.sleep(0.001)
+
+    def _put(self, level: str, text: str) -> None:
+        with self._guard:
+            if self._lines.qsize() >= MOST:
+                self._dropped += 1
+                return
+            if self._dropped:
+                self._lines.put(("warning", f"{self._dropped} lines were not logged"))
+                self._dropped = 0
+            self._lines.put((level, text[:LONGEST]))
+            if self._thread is None or not self._thread.is_alive():
+                self._thread = threading.Thread(target=self._write, name=THREAD, daemon=True)
+                self._thread.start()
+
+    def _write(self) -> None:
+        while True:
+            try:
+                level, text = self._lines.get(timeout=LINGER)
+            except queue.Empty:
+                with self._guard:
+                    if self._lines.empty():
+                        self._thread = None
+                        return
+                continue
+            self._await_room()
+            if level == "info":
+                self._logger.info(text)
+            elif level == "warning":
+                self._logger.warning(text)
+            else:
+                self._logger.error(text)
+            self._lines.task_done()
+
+    def _await_room(self) -> None:
+        """Wait until standard error takes a line: rclpy writes with the interpreter's lock held."""
+        poll = select.poll()
+        poll.register(STDERR, select.POLLOUT)
+        with contextlib.suppress(OSError):
+            poll.poll()
+
+
+log = Log("bt_actions")

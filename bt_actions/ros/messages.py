@@ -1,0 +1,299 @@
+"""A ROS message from plain data and back, checked field by field against its type.
+
+Pure functions: no node, no clock of their own unless none is given, and no rclpy.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from bt_actions.ros.conveniences import constant, duration_of, quaternion_of, time_of
+from bt_actions.ros.fields import (
+    FLOATS,
+    INTEGERS,
+    FieldType,
+    Listing,
+    Message,
+    Scalar,
+    describe,
+)
+from bt_actions.ros.interfaces import (
+    UnknownInterface,
+    find_action,
+    interface,
+    interface_name,
+    short_name,
+)
+from bt_actions.suggest import did_you_mean
+
+__all__ = [
+    "MessageError",
+    "Problem",
+    "UnknownInterface",
+    "examine",
+    "fill",
+    "fill_value",
+    "find_action",
+    "interface",
+    "interface_name",
+    "to_plain",
+]
+
+Path = tuple[str | int, ...]
+Hole = Callable[[object, FieldType, Path], bool]
+M = TypeVar("M")
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing wrong with the data: where (`at_key`: the field's name itself), and what."""
+
+    path: Path
+    text: str
+    at_key: bool = False
+
+    def __str__(self) -> str:
+        return f"{dotted(self.path)}: {self.text}" if self.path else self.text
+
+
+class MessageError(ValueError):
+    """The data does not fit the message's type; `path` and `text` are the first problem's."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        super().__init__("; ".join(str(problem) for problem in problems[:10]))
+        self.problems = tuple(problems)
+        self.path = dotted(problems[0].path)
+        self.text = problems[0].text
+
+
+def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.time_ns) -> M:
+    """A message of a type from a mapping of its fields; what is not named keeps its default.
+
+    `data` may hold message objects at any depth, and may be one of `message_type` already. `now`
+    gives nanoseconds for `stamp: now`; pass the node's clock where there is one. Raises
+    MessageError, with every problem in it.
+    """
+    filler = _Filler(now, None)
+    message = filler.convert(Message(message_type), data, ())
+    if filler.problems:
+        raise MessageError(filler.problems)
+    return message  # type: ignore[no-any-return]
+
+
+def fill_value(kind: FieldType, data: object, *, now: Callable[[], int] = time.time_ns) -> object:
+    """A value for a field of type `kind`, as `fill` makes it. Raises MessageError."""
+    filler = _Filler(now, None)
+    value = filler.convert(kind, data, ())
+    if filler.problems:
+        raise MessageError(filler.problems)
+    return value
+
+
+def examine(kind: FieldType, data: object, hole: Hole | None = None) -> list[Problem]:
+    """What is wrong with the data; makes nothing.
+
+    `hole` is asked first about each value, with the type it must have: True means that it is
+    settled there (a variable, whose type the caller checks).
+    """
+    filler = _Filler(time.time_ns, hole)
+    filler.convert(kind, data, ())
+    return filler.problems
+
+
+def to_plain(message: object) -> Any:
+    """Dictionaries, lists and scalars that JSON can say (except NaN and infinities)."""
+    fields = getattr(type(message), "get_fields_and_field_types", None)
+    if fields is not None:
+        return {name: to_plain(getattr(message, name)) for name in fields()}
+    if isinstance(message, bytes):
+        return message[0] if len(message) == 1 else list(message)
+    to_list = getattr(message, "tolist", None)  # array.array and numpy alike
+    if to_list is not None:
+        return to_list()
+    if isinstance(message, (list, tuple)):
+        return [to_plain(item) for item in message]
+    if isinstance(message, Mapping):
+        return {str(key): to_plain(value) for key, value in message.items()}
+    return message
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """``pose.position.x``, as paths are written everywhere."""
+    return ".".join(str(part) for part in path)
+
+
+class _Filler:
+    """Walks type and data together; collects problems instead of raising at the first."""
+
+    def __init__(self, now: Callable[[], int], hole: Hole | None) -> None:
+        self.problems: list[Problem] = []
+        self._now = now
+        self._hole = hole
+        self._owner: type | None = None
+
+    def convert(self, kind: FieldType, value: object, path: Path) -> Any:
+        if self._hole is not None and self._hole(value, kind, path):
+            return None
+        if isinstance(kind, Message):
+            return self._message(kind.cls, value, path)
+        if isinstance(kind, Listing):
+            return self._listing(kind, value, path)
+        return self._scalar(kind, value, path)
+
+    def _bad(self, path: Path, text: str, *, at_key: bool = False) -> None:
+        self.problems.append(Problem(path, text, at_key))
+
+    def _message(self, cls: type, value: object, path: Path) -> Any:
+        if isinstance(value, cls):
+            return value
+        try:
+            value = self._convenience(cls, value)
+        except ValueError as error:
+            self._bad(path, str(error))
+            return None
+        if isinstance(value, cls):
+            return value
+        if not isinstance(value, Mapping):
+            self._bad(path, f"the fields of a {short_name(cls)} are needed, not {show(value)}")
+            return None
+        known = describe(cls)
+        message: Any = cls()
+        outer, self._owner = self._owner, cls
+        for name, item in value.items():
+            kind = known.get(name) if isinstance(name, str) else None
+            if kind is None:
+                self._bad((*path, str(name)), _no_field(cls, str(name), known), at_key=True)
+                continue
+            before = len(self.problems)
+            converted = self.convert(kind, item, (*path, name))
+            if len(self.problems) == before and converted is not None:
+                setattr(message, name, converted)
+        self._owner = outer
+        return message
+
+    def _convenience(self, cls: type, value: object) -> object:
+        """What may be written instead of the fields of a time, a duration or a quaternion."""
+        name = interface_name(cls)
+        if name == "builtin_interfaces/msg/Time":
+            return time_of(value, self._now)
+        if name == "builtin_interfaces/msg/Duration":
+            return duration_of(value)
+        if name == "geometry_msgs/msg/Quaternion":
+            return quaternion_of(value)
+        return value
+
+    def _listing(self, kind: Listing, value: object, path: Path) -> Any:
+        to_list = getattr(value, "tolist", None)
+        items = to_list() if to_list is not None else value
+        if isinstance(items, (bytes, bytearray)):
+            items = list(items)
+        if not isinstance(items, (list, tuple)):
+            self._bad(path, f"a list of {kind.item} is needed, not {show(value)}")
+            return None
+        if kind.size is not None and len(items) != kind.size:
+            self._bad(path, f"exactly {kind.size} items are needed, not {len(items)}")
+        elif kind.limit is not None and len(items) > kind.limit:
+            self._bad(path, f"at most {kind.limit} items fit, not {len(items)}")
+        return [self.convert(kind.item, item, (*path, at)) for at, item in enumerate(items)]
+
+    def _scalar(self, kind: Scalar, value: object, path: Path) -> Any:
+        if type(value).__module__ == "numpy" and hasattr(value, "item"):
+            value = value.item()
+        if isinstance(value, str) and kind.name not in ("string", "wstring") and self._owner:
+            try:
+                value = constant(value, self._owner)
+            except ValueError as error:
+                self._bad(path, str(error))
+                return None
+        text = _wrong(kind, value)
+        if text is not None:
+            self._bad(path, text)
+            return None
+        if kind.name in FLOATS:
+            return float(value)  # type: ignore[arg-type]
+        if kind.name == "byte" and isinstance(value, int):
+            return bytes([value])
+        return value
+
+
+def _wrong(kind: Scalar, value: object) -> str | None:
+    """Why a value does not fit a scalar type, or None."""
+    if kind.name == "bool":
+        return None if isinstance(value, bool) else f"true or false is needed, not {show(value)}"
+    if kind.name in FLOATS:
+        return _wrong_float(kind.name, value)
+    if kind.name in INTEGERS:
+        return _wrong_integer(kind.name, value)
+    if not isinstance(value, str):
+        return f"a text is needed, not {show(value)}"
+    if kind.limit is not None and len(value) > kind.limit:
+        return f"at most {kind.limit} characters fit, not {len(value)}"
+    if "\0" in value or not _encodable(value):
+        return "this text holds characters that no ROS string can carry"
+    return None
+
+
+def _wrong_float(name: str, value: object) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return f"a number ({name}) is needed, not {show(value)}"
+    try:
+        number = float(value)
+    except OverflowError:
+        return f"{show(value)} does not fit a {name}"
+    if math.isfinite(number) and abs(number) > FLOATS[name]:
+        return f"{show(value)} does not fit a {name}"
+    return None
+
+
+def _wrong_integer(name: str, value: object) -> str | None:
+    if name == "byte" and isinstance(value, bytes) and len(value) == 1:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int):
+        return f"a whole number ({name}) is needed, not {show(value)}"
+    least, greatest = INTEGERS[name]
+    if not least <= value <= greatest:
+        return f"{show(value)} does not fit {_an(name)}: {least} to {greatest}"
+    return None
+
+
+def _an(name: str) -> str:
+    return f"an {name}" if name.startswith("i") else f"a {name}"
+
+
+def _no_field(cls: type, name: str, known: Mapping[str, FieldType]) -> str:
+    text = f"{short_name(cls)} has no field {name!r}"
+    near = did_you_mean(name, known)
+    if near:
+        return text + near
+    return f"{text}; it has {', '.join(known)}" if known else f"{text}: it has no fields"
+
+
+def _encodable(value: str) -> bool:
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def show(value: object) -> str:
+    """A value as a message shows it: as it is written in YAML where that is short."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "a mapping"
+    if isinstance(value, (list, tuple)):
+        return "a list"
+    if hasattr(value, "get_fields_and_field_types"):
+        return f"a {short_name(type(value))}"
+    try:
+        text = repr(value)
+    except Exception:  # noqa: BLE001 - a value's own repr may raise anything
+        return f"a {type(value).__name__}"
+    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -1,0 +1,48 @@
+"""The ROS parameters that `--ros-args` give to a node, before there is one.
+
+rcl reads the words: whatever it takes, finds in a file for this node, or refuses is its own to say.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+from rclpy.context import Context
+from rclpy.node import Node
+
+__all__ = ["parameters_in"]
+
+_OF_EVERY_NODE = frozenset({"use_sim_time", "start_type_description_service"})
+
+
+def parameters_in(words: Sequence[str], namespace: str = "") -> dict[str, object]:
+    """The values that the words behind `--ros-args` give to a node, without rclpy's own parameters.
+
+    Raises ValueError, with rcl's reason, for words that it does not understand.
+    """
+    context = Context()
+    try:
+        context.init(args=["--ros-args", *words])
+        node = Node(
+            f"bt_actions_{os.getpid()}_parameters",
+            context=context,
+            namespace=namespace,
+            enable_rosout=False,
+            start_parameter_services=False,
+            automatically_declare_parameters_from_overrides=True,
+        )
+        found = node.get_parameters_by_prefix("")
+        node.destroy_node()
+    except RuntimeError as error:  # rclpy's RCLError
+        raise ValueError(str(error).splitlines()[0]) from error
+    finally:
+        context.try_shutdown()
+    for name in _OF_EVERY_NODE & found.keys():
+        if not isinstance(found[name].value, bool):
+            raise ValueError(f"{name} is true or false, not {found[name].value!r}")
+    return {
+        name: parameter.value
+        for name, parameter in found.items()
+        if name not in _OF_EVERY_NODE and not name.startswith("qos_overrides.")
+    }

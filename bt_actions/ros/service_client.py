@@ -1,0 +1,77 @@
+"""A service client that calls once at a time and wakes the tree when the answer is there.
+
+Decides nothing: neither how long to wait nor whether to call again. Never blocks.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+
+from bt_actions.ros.interfaces import interface
+from bt_actions.ros.messages import fill
+from bt_actions.ros.topics import wake
+
+__all__ = ["ServiceClient"]
+
+
+class ServiceClient:
+    """A client of one service on a node, and its call under way, if any."""
+
+    def __init__(self, node: Node, service_type: type | str, service_name: str) -> None:
+        """Create the client in a callback group of its own.
+
+        Raises UnknownInterface (a LookupError) when the service type is not installed.
+        """
+        if isinstance(service_type, str):
+            service_type = interface(service_type, "srv")
+        self.service_type: Any = service_type
+        self._node = node
+        self._future: Any = None
+        self._client = node.create_client(
+            self.service_type, service_name, callback_group=MutuallyExclusiveCallbackGroup()
+        )
+
+    @property
+    def ready(self) -> bool:
+        """Whether the service is there."""
+        return bool(self._client.service_is_ready())
+
+    @property
+    def calling(self) -> bool:
+        """Whether a call was begun and not dropped since."""
+        return self._future is not None
+
+    @property
+    def answered(self) -> bool:
+        """Whether the call was answered."""
+        return self._future is not None and bool(self._future.done())
+
+    def call(self, fields: object) -> None:
+        """Begin a call with these fields; what is still under way is dropped.
+
+        Raises ValueError where they do not fit the request.
+        """
+        self.drop()
+        clock, node = self._node.get_clock(), self._node
+        request = fill(self.service_type.Request, fields, now=lambda: int(clock.now().nanoseconds))
+        self._future = self._client.call_async(request)
+        self._future.add_done_callback(lambda _: wake(node))
+
+    def answer(self) -> Any:
+        """Return the answer of a call that was answered; the call is over."""
+        future, self._future = self._future, None
+        return future.result()
+
+    def drop(self) -> None:
+        """Take no interest in an answer any more."""
+        if self._future is not None and not self._future.done():
+            self._client.remove_pending_request(self._future)
+        self._future = None
+
+    def close(self) -> None:
+        """Drop the call and destroy the client."""
+        self.drop()
+        self._node.destroy_client(self._client)

@@ -1,0 +1,80 @@
+"""What all action traffic of this process shares: the one lock, the goals' tickets, the resources.
+
+Under the lock nothing waits, and no code of the user's runs. It is taken before a client's own
+lock, never after. Nothing is decided or sent here.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import State
+from bt_actions.policy import End, Outcome
+from bt_actions.resources import Resources
+
+if TYPE_CHECKING:
+    from bt_actions.ros.line import Line
+    from bt_actions.ros.traffic import Traffic
+
+FEEDBACK_KEPT = 100
+"""Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
+
+lock = threading.RLock()
+changed = threading.Condition(lock)
+"""Notified at every change of any goal."""
+_resources: dict[int, Resources[Ticket]] = {}
+
+
+def resources_of(domain: int) -> Resources[Ticket]:
+    """Return the table of resources, held per process and ROS domain."""
+    with lock:
+        return _resources.setdefault(domain, Resources())
+
+
+@dataclass(eq=False, slots=True)
+class Ticket:
+    """A goal on its way, with what its owner and its server need to know."""
+
+    goal: Goal
+    line: Line
+    """Where it is sent; should it be lost, the line that sees its server again takes it over."""
+    traffic: Traffic
+    """Of the node that it was begun on, which is told of its changes."""
+    owner: Any
+    begun_by: object = None
+    """What `Traffic.begun_by` said at the time; None where nobody did."""
+    attempt: int = 1
+    keeps_feedback: bool = False
+    feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
+    sent_to: frozenset[bytes] = frozenset()
+    was_gone: bool = False
+    """When last looked at, none of the servers it was sent to was there."""
+    asked_at: float = float("-inf")
+    paused_at: float | None = None
+
+    @property
+    def accounted_for(self) -> bool:
+        """Whether the goal's end is known, so that nothing is left to wait for."""
+        goal = self.goal
+        return goal.outcome is not None and goal.end is not End.UNKNOWN and not goal.suspect
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What an observer is told: a goal has a new state, outcome or end."""
+
+    time: float
+    ticket: Ticket
+    state: State
+    outcome: Outcome | None
+    end: End
+    reason: str
+
+
+Observer = Callable[[Change | None], None]
+"""Called under the lock, on any thread; None means: something to read, no change of a goal."""

@@ -1,0 +1,211 @@
+"""A node of our own and the thread that spins it, with the one order of shutdown that is clean.
+
+Other orders gave errors about invalid handles, segmentation faults, or leaked a thread pool:
+executor, spin thread, thread pool, clients, node, context. Nothing here knows of trees or goals
+beyond closing the node's traffic.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import itertools
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    ShutdownException,
+    SingleThreadedExecutor,
+)
+from rclpy.node import Node
+
+from bt_actions.ros.traffic import Traffic
+
+THREADS = 2
+"""Of the multi-threaded executor; the interpreter lock does the work, more are no faster."""
+PATIENCE = 1.0
+"""Seconds after which a node that somebody else should be spinning counts as not spun."""
+PATIENCE_RUNNING = 5.0
+"""The same while a tree runs, where a slow callback of the user's must be no false alarm."""
+
+_number = itertools.count(1)
+
+
+class Spinner:
+    """Owns what the caller did not bring (context, node, executor) and spins what it may.
+
+    - No node: a context and a node of its own.
+    - An executor that holds no node yet, or none: spun here, on a thread of its own.
+    - An executor that holds nodes already is somebody's, who spins it; it is never spun here.
+
+    `executor` may be ``"multi"`` (the default) or ``"single"``. `died` is called on the spin
+    thread when it ends by an error.
+    """
+
+    def __init__(
+        self,
+        node: Node | None,
+        executor: Executor | str | None,
+        *,
+        name: str = "",
+        namespace: str = "",
+        died: Callable[[BaseException], None] = lambda error: None,
+    ) -> None:
+        self._died = died
+        self._thread: threading.Thread | None = None
+        self._context: Context | None = None
+        self._stopping = False
+        self._alive = threading.Event()
+        self._asked_at = 0.0
+        self._own_node = node is None
+        given = executor if isinstance(executor, Executor) else None
+        if node is not None and node.executor is not None and node not in node.executor.get_nodes():
+            node.executor = None  # left behind by an executor that was shut down
+        if node is not None and given is None and executor is None:
+            given = node.executor
+        self.spins = given is None or not given.get_nodes()
+        context = node.context if node is not None else given.context if given else None
+        if context is None:
+            context = self._context = Context()
+            context.init()
+        unique = name or f"bt_actions_{os.getpid()}_{next(_number)}"
+        self.node = node or Node(unique, context=context, namespace=namespace)
+        self._traffic = Traffic.of(self.node)
+        self._own_executor = given is None
+        self.executor: Executor = given or _make(executor, context)
+        if self.node.executor is None:
+            self.executor.add_node(self.node)
+            self._added = True
+        else:
+            self._added = False
+
+    @property
+    def owns_context(self) -> bool:
+        """Whether the ROS context was made here."""
+        return self._context is not None
+
+    def start(self) -> None:
+        """Begin to spin; where somebody else should be spinning, make sure that they do.
+
+        Raises RuntimeError when nobody does, for 1 s.
+        """
+        if self.spins:
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._spin, name="bt_actions-spin")
+                self._thread.daemon = True  # a crash of the main thread must not hang the process
+                self._thread.start()
+            return
+        self._ask_for_life()
+        self._alive.wait(PATIENCE)
+        self._check(PATIENCE)
+
+    def check(self) -> None:
+        """Make sure now and then that whoever spins our node still does; never waits.
+
+        Raises RuntimeError when nobody has for 5 s, or the node was taken out of its executor.
+        """
+        if not self.spins:
+            self._check(PATIENCE_RUNNING)
+
+    def _check(self, patience: float) -> None:
+        since = time.monotonic() - self._asked_at
+        left = self.node not in self.executor.get_nodes()
+        if left or (not self._alive.is_set() and since >= patience):
+            raise RuntimeError(
+                f"node {self.node.get_fully_qualified_name()} is in an executor that nobody spins; "
+                "spin it on another thread while the tree runs, or leave the executor out"
+            )
+        if self._alive.is_set() and since >= PATIENCE:
+            self._ask_for_life()
+
+    def _ask_for_life(self) -> None:
+        self._alive = threading.Event()
+        self._asked_at = time.monotonic()
+        with contextlib.suppress(AttributeError):  # of the guard of an executor that is shut down
+            self.executor.create_task(self._alive.set)
+            self.executor.wake()
+
+    def _spinning(self) -> bool:
+        return self._thread is not None and self._thread.is_alive()
+
+    def _spin(self) -> None:
+        """Spin until told to stop; an executor that was given must stay usable, so no shutdown."""
+        try:
+            while not self._stopping:
+                self.executor.spin_once()
+                if not self.node.context.ok():
+                    raise ExternalShutdownException
+        except ShutdownException:
+            if not self._stopping:
+                self._died(RuntimeError("the executor was shut down while a tree runs in it"))
+        except BaseException as error:  # noqa: BLE001 - a dead spin thread must not go unnoticed
+            if not self._stopping:
+                self._died(error)
+
+    def stop(self, before_nodes: Callable[[], None]) -> None:
+        """Shut down what is ours, in the clean order; goals must be drained before.
+
+        `before_nodes` is called when nothing spins any more, while nodes and context still live.
+        """
+        if self.spins:
+            self._stopping = True
+            if self._thread is not None:
+                with contextlib.suppress(Exception):  # of a guard whose context is gone
+                    self.executor.create_task(_nothing)  # so that spin_once returns
+                self._thread.join(PATIENCE)
+            pool: Any = getattr(self.executor, "_executor", None)
+            if self._own_executor:
+                if pool is not None and not self._spinning():
+                    pool.shutdown(wait=True)  # what it still runs needs the executor's guard
+                self.executor.shutdown()
+            if self._thread is not None:
+                self._thread.join()
+                self._thread = None
+            if self._own_executor and pool is not None:
+                pool.shutdown(wait=True)
+        if self._added:
+            self.node.executor = None  # takes it out of the executor, and lets another have it
+        before_nodes()
+        if self._own_node:
+            self._traffic.destroy()
+            self.node.destroy_node()
+        if self._context is not None:
+            with contextlib.suppress(RuntimeError):
+                self._context.shutdown()
+
+
+def _nothing() -> None:
+    pass
+
+
+def _make(kind: Executor | str | None, context: Context) -> Executor:
+    if kind in (None, "multi"):
+        return MultiThreadedExecutor(num_threads=THREADS, context=context)
+    if kind == "single":
+        return SingleThreadedExecutor(context=context)
+    raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {kind!r}")
+
+
+def node_beside(node: Node, name: str) -> Node:
+    """Return a new node in the same context; the caller destroys it.
+
+    What `--ros-args` says is about the other one, whose name it may not get too.
+    """
+    return Node(name, context=node.context, use_global_arguments=False)
+
+
+def on_executor_thread() -> bool:
+    """Whether the caller was itself called by an executor, so that waiting for one would hang."""
+    frame = inspect.currentframe()
+    while frame is not None:
+        if frame.f_globals.get("__name__") in ("rclpy.executors", "rclpy.task"):
+            return True
+        frame = frame.f_back
+    return False

@@ -1,0 +1,91 @@
+"""Topics for trees: latest values that leaves read, and qualities of service by name.
+
+Callbacks only store a message and wake whoever ticks; nothing of the tree runs in them.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_profile_sensor_data,
+    qos_profile_services_default,
+)
+
+from bt_actions.ros.shared import lock
+from bt_actions.ros.traffic import Traffic
+
+__all__ = ["Latest", "qos_profile", "wake"]
+
+
+def qos_profile(name: str) -> QoSProfile:
+    """The quality of service that a tree calls by this name. Raises KeyError."""
+    return {
+        "default": QoSProfile(depth=10),
+        "sensor": qos_profile_sensor_data,
+        "latched": QoSProfile(
+            depth=1,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        ),
+        "best_effort": QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT),
+        "services": qos_profile_services_default,
+    }[name]
+
+
+def wake(node: Node) -> None:
+    """Have whoever runs a tree on this node tick it soon; callable from any thread."""
+    traffic = Traffic.of(node)
+    with lock:
+        traffic.notify(None)
+
+
+class Latest:
+    """The latest message of a topic, and how old it is on the node's clock.
+
+    A clock that jumps back makes no message younger, and none older.
+    """
+
+    def __init__(self, node: Node, message_type: type, topic: str, qos: str) -> None:
+        self._node = node
+        self._clocks = Traffic.of(node).clocks
+        self._lock = threading.Lock()
+        self._message: Any = None
+        self._age = 0.0
+        self._aged_at = 0.0
+        self.count = 0
+        self._subscription = node.create_subscription(
+            message_type,
+            topic,
+            self._take,
+            qos_profile(qos),
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+        self.topic: str = self._subscription.topic_name
+        """The topic's full name."""
+
+    def get(self) -> tuple[Any, float, int]:
+        """The message (None before the first), its age in seconds, and how many came so far."""
+        now = self._clocks.now().ros
+        with self._lock:
+            self._age += max(0.0, now - self._aged_at)
+            self._aged_at = now
+            return self._message, self._age, self.count
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._node.destroy_subscription(self._subscription)
+
+    def _take(self, message: Any) -> None:
+        now = self._clocks.now().ros
+        with self._lock:
+            self._message = message
+            self._age, self._aged_at = 0.0, now
+            self.count += 1
+        wake(self._node)

@@ -1,0 +1,311 @@
+"""Carries out what goals and resources decide, for every goal of this process, until it is done.
+
+A leaf begins a goal here and advances it at its ticks. From the moment the request is out, the
+goal is driven by what arrives, whether or not anybody ticks: answers (on executor threads),
+deadlines and the watch over the servers (on the alarm, a plain thread that sleeps while no goal is
+open). What a leaf leaves behind is thereby drained without it.
+
+One lock guards all of it. Under the lock nothing waits, and no code of the user's runs: observers
+only take note. This file decides nothing about a goal (goal.py), its tries (attempts.py), or
+whether a server is alive (server.py).
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from rclpy.node import Node
+
+from bt_actions.goal import Goal
+from bt_actions.goal_ids import new_goal_id
+from bt_actions.goal_terms import Event, State
+from bt_actions.policy import Busy, End, Timeouts
+from bt_actions.resources import Answer
+from bt_actions.ros import alarm
+from bt_actions.ros.clocks import Clocks
+from bt_actions.ros.line import Line
+from bt_actions.ros.log import log
+from bt_actions.ros.shared import Change, Observer, Ticket, changed, lock, resources_of
+from bt_actions.server import Server
+
+JUST_PAST = 0.1
+"""Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
+IN_FLIGHT = 8
+"""Goal requests under way at a server; its queue holds 10, and drops what is over silently."""
+_ON_NODE = "_bt_actions_traffic"
+_begins = threading.local()
+_closing = False  # the process ends: a tree that ticks on begins nothing any more
+
+
+class Traffic:
+    """All action traffic of one node."""
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self.clocks = Clocks(node)
+        self.resources = resources_of(node.context.get_domain_id())
+        self._lines: dict[str, Line] = {}
+        self._observers: list[Observer] = []
+        self.unaccounted: list[Ticket] = []
+        """Goals that nobody waits for any more, though their end is UNKNOWN; some may still end."""
+
+    @classmethod
+    def of(cls, node: Node) -> Traffic:
+        """Return the one Traffic of `node`."""
+        with lock:
+            traffic: Traffic | None = getattr(node, _ON_NODE, None)
+            if traffic is None:
+                traffic = cls(node)
+                setattr(node, _ON_NODE, traffic)  # lives as long as the node does
+            return traffic
+
+    def line(self, action_type: Any, action_name: str) -> Line:
+        """Return the shared line to an action, and count its user.
+
+        Raises TypeError when the name is in use with another type.
+        """
+        name = expand(action_name, self.node.get_namespace())
+        with lock:
+            line = self._lines.get(name)
+            if line is None:
+                line = self._lines[name] = Line(self, action_type, name)
+            elif line.action_type is not action_type:
+                raise TypeError(
+                    f"{name} is used with two types: {line.action_type.__module__}."
+                    f"{line.action_type.__name__} and {action_type.__module__}."
+                    f"{action_type.__name__}"
+                )
+            line.users += 1
+            return line
+
+    def leave(self, line: Line) -> None:
+        """Count a user of `line` off; with the last one, and no goal open, its client goes too."""
+        with lock:
+            line.users -= 1
+            if line.users <= 0:
+                line.forget_lost()
+            self.drop_if_unused(line)
+
+    def drop_if_unused(self, line: Line) -> None:
+        """Destroy the client of a line that has no user and no open goal."""
+        if line.users <= 0 and not line.goals and self._lines.get(line.name) is line:
+            del self._lines[line.name]
+            line.client.destroy()
+
+    # A leaf's calls
+
+    @staticmethod
+    @contextlib.contextmanager
+    def begun_by(who: object) -> Iterator[None]:
+        """Have what this thread begins meanwhile known as begun by `who` (Ticket.begun_by)."""
+        before = _who_begins()
+        _begins.who = who
+        try:
+            yield
+        finally:
+            _begins.who = before
+
+    def begin(
+        self,
+        line: Line,
+        owner: Any,
+        timeouts: Timeouts,
+        resources: frozenset[str],
+        busy: Busy,
+        *,
+        attempt: int = 1,
+        keeps_feedback: bool = False,
+    ) -> Ticket:
+        """Begin a goal: it queues for its resources. It is sent by `advance`."""
+        with lock:
+            now = self.clocks.now()
+            goal = Goal(new_goal_id(), line.name, timeouts, now, resources=resources, busy=busy)
+            ticket = Ticket(goal, line, self, owner, _who_begins(), attempt, keeps_feedback)
+            line.goals[goal.id] = ticket
+            alarm.mind(line)
+            answer = self.resources.request(ticket, goal.resources, busy)
+            if answer is Answer.GRANTED:
+                line.tell(ticket, Event.GRANTED)
+            elif answer is Answer.TAKEN:
+                line.tell(ticket, Event.TAKEN)
+            else:
+                self.note(ticket)
+            return ticket
+
+    def advance(self, ticket: Ticket, make_message: Callable[[], Any]) -> None:
+        """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
+
+        `make_message` is called without the lock, on the caller's thread, at most once; what it
+        raises makes the goal INVALID_GOAL.
+        """
+        line = ticket.line
+        with lock:
+            line.poll(ticket)
+            if _closing:
+                line.tell(ticket, Event.INTERRUPTED)
+            if ticket.goal.state is not State.WAITING_FOR_SERVER:
+                return
+            if line.look(time.monotonic()) is Server.AMBIGUOUS:
+                line.tell(ticket, Event.SERVER_AMBIGUOUS)
+            if not self._may_send(ticket):
+                return
+        try:
+            message = make_message()
+        except Exception as error:  # noqa: BLE001 - the user's: any
+            line.tell(ticket, Event.INVALID, error)
+            return
+        with lock:
+            if self._may_send(ticket):
+                line.tell(ticket, Event.SERVER_READY, message=message)
+
+    def _may_send(self, ticket: Ticket) -> bool:
+        line = ticket.line
+        return (
+            ticket.goal.state is State.WAITING_FOR_SERVER
+            and not _closing
+            and not line.orphaned
+            and self.node.context.ok()
+            and line.watch.state(time.monotonic()) is Server.READY
+            and not line.owes_us()
+            and line.in_flight() < IN_FLIGHT
+        )
+
+    def interrupt(self, ticket: Ticket) -> None:
+        """The tree no longer wants it. Returns at once; the goal is drained."""
+        ticket.line.tell(ticket, Event.INTERRUPTED)
+
+    def pause(self, tickets: Iterable[Ticket]) -> None:
+        """Stop the deadlines of goals that were not sent yet."""
+        with lock:
+            for ticket in tickets:
+                if not ticket.goal.sent and ticket.paused_at is None:
+                    ticket.paused_at = time.monotonic()
+
+    def resume(self, tickets: Iterable[Ticket]) -> None:
+        """Let the deadlines run on, with what remained of them."""
+        with lock:
+            for ticket in tickets:
+                if ticket.paused_at is not None:
+                    ticket.goal.postpone(time.monotonic() - ticket.paused_at)
+                    ticket.paused_at = None
+
+    # Who watches
+
+    def observe(self, observer: Observer) -> None:
+        """Call `observer` at every change, under the lock: it must only take note."""
+        with lock:
+            self._observers.append(observer)
+
+    def unobserve(self, observer: Observer) -> None:
+        """Stop calling `observer`."""
+        with lock, contextlib.suppress(ValueError):
+            self._observers.remove(observer)
+
+    def note(self, ticket: Ticket) -> None:
+        """Report a goal's change to the log and the observers."""
+        goal = ticket.goal
+        unknown = goal.outcome is not None and goal.end is End.UNKNOWN
+        if unknown and ticket not in self.unaccounted:
+            self.unaccounted.append(ticket)
+            log.error(f"{goal!r}: not accounted for, it may still be running: {goal.reason}")
+        elif not unknown and ticket in self.unaccounted:
+            self.unaccounted.remove(ticket)
+            log.info(f"{goal!r}: accounted for at last")
+        now = self.clocks.now().ros
+        self.notify(Change(now, ticket, goal.state, goal.outcome, goal.end, goal.reason))
+
+    def notify(self, change: Change | None) -> None:
+        """Tell the observers, and whoever waits."""
+        for observer in list(self._observers):
+            try:
+                observer(change)
+            except Exception as error:  # noqa: BLE001 - the run goes on without it
+                self._observers.remove(observer)
+                log.error(f"an observer of goals raised and was removed: {error!r}")
+        changed.notify_all()
+
+    def destroy(self) -> None:
+        """Drain what is still open and destroy the clients; nobody may spin the node any more."""
+        with lock:
+            left = [ticket for line in self._lines.values() for ticket in line.goals.values()]
+        drain(ticket for ticket in left if not ticket.accounted_for)
+        with lock:
+            lines, self._lines = list(self._lines.values()), {}
+            for line in lines:
+                for ticket in list(line.goals.values()):
+                    line.tell(ticket, Event.CLOSED)
+                line.client.destroy()
+                alarm.forget(line)
+            setattr(self.node, _ON_NODE, None)
+
+
+def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) -> list[Ticket]:
+    """Cancel these goals and wait until each is accounted for, under one deadline.
+
+    The deadline is the largest `timeout.cancel` among them, plus `timeout.accept` (twice, if that
+    is more) where the acceptance is open. Answers are taken here too, so it does not matter
+    whether anybody spins, whether the context is valid, or on which thread this runs. `hurry` is
+    called again and again without the lock, and ends the wait early when it says so. No goal is
+    waited for a second time. Returns the goals whose end is UNKNOWN.
+    """
+    with lock:
+        wanted = [ticket for ticket in tickets if ticket.goal.state is not State.DONE]
+        for ticket in wanted:
+            ticket.line.tell(ticket, Event.INTERRUPTED)
+        waits = [t for t in wanted if not t.accounted_for and not t.goal.waited_for]
+        patience = max((ticket.goal.drains_within for ticket in waits), default=0.0)
+        deadline = time.monotonic() + patience + JUST_PAST
+    while waits and time.monotonic() < deadline and not hurry():
+        with lock:
+            for line in {ticket.line for ticket in waits}:
+                line.client.pump()
+            for ticket in waits:
+                ticket.line.poll(ticket)
+            waits = [ticket for ticket in waits if not ticket.accounted_for]
+            if waits:
+                changed.wait(0.005)
+    for ticket in waits:
+        ticket.line.tell(ticket, Event.DRAINED)
+    return [ticket for ticket in wanted if not ticket.accounted_for]
+
+
+def _who_begins() -> object:
+    return getattr(_begins, "who", None)
+
+
+def expand(name: str, namespace: str) -> str:
+    """Return the fully qualified form of `name`; remapping rules do not reach action names."""
+    if name.startswith("/"):
+        return name
+    return f"{namespace.rstrip('/')}/{name}"
+
+
+@atexit.register
+def _close_at_exit() -> None:
+    """Close what a loop that crashed, or never called shutdown, has left; send nothing more."""
+    global _closing
+    with lock:
+        _closing = True
+        lines = [line for line in alarm.minded() if isinstance(line, Line)]
+        left = [ticket for line in lines for ticket in line.goals.values() if not ticket.goal.lost]
+    try:
+        drain(left)
+    except KeyboardInterrupt:
+        log.warning("interrupted while the goals are canceled: not waiting for them any more")
+    for ticket in left:
+        if not ticket.accounted_for:
+            log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
+
+
+def _disown() -> None:
+    """In the child of a fork: the goals are the parent's, and so is what guards them."""
+    atexit.unregister(_close_at_exit)
+
+
+os.register_at_fork(after_in_child=_disown)

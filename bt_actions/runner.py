@@ -1,0 +1,473 @@
+"""Runs a tree to its end: ticks when something happened and when a deadline falls due.
+
+One tick at a time, on one thread (the caller's in `run`, one of its own after `start`). It does not
+poll; a heartbeat covers behaviours that only watch the clock. Whatever ends a run (an outcome, an
+interrupt, a timeout, an exception), the tree's goals are drained before it is over. ROS comes in
+through ros/ and only when a runner is made.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Duration, Status
+from py_trees.trees import BehaviourTree
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
+from bt_actions.policy import End, Outcome
+from bt_actions.signals import ended_by_signals
+from bt_actions.ticking import ChangeVisitor, culprit_of, path_of, root_of, tick_once
+
+if TYPE_CHECKING:
+    from bt_actions.ros.shared import Change, Ticket
+
+BURST = 1000
+"""Ticks in a row, at most, while each changes a status."""
+PATIENCE_AT_EXIT = 30.0
+"""Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
+
+
+class TreeError(Exception):
+    """A behaviour raised, or the spin thread died; the tree's goals have been drained."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoalReport:
+    """A goal that nobody can account for: it may still be running."""
+
+    name: str
+    server: str
+    goal_id: str
+    outcome: Outcome | None
+    reason: str
+
+
+class TreeRunner:
+    """Runs one tree, on a node of its own or on one that is given.
+
+    Args:
+        root_or_behaviour_tree: what to run; of a BehaviourTree, handlers and visitors are called.
+        node: to send goals from; without one, context, node and spin thread are made here. A node
+            that is in an executor is never spun here: its owner spins it.
+        executor: "multi" (the default), "single", or an executor; one without nodes is spun here.
+        heartbeat: seconds after which the tree is ticked though nothing has happened.
+        namespace: of the node that is made here.
+
+    Use it as a context manager, or call `shutdown` in the end. Not reentrant, but may run again.
+    """
+
+    def __init__(
+        self,
+        root_or_behaviour_tree: Behaviour | BehaviourTree,
+        *,
+        node: Any = None,
+        executor: Any = None,
+        heartbeat: float = 0.1,
+        namespace: str = "",
+    ) -> None:
+        from bt_actions.ros.spinning import Spinner
+
+        if not heartbeat > 0.0:
+            raise ValueError(f"heartbeat must be more than zero seconds, not {heartbeat!r}")
+        tree = root_or_behaviour_tree
+        self.tree = tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree)
+        self.heartbeat = heartbeat
+        self._wakes: queue.SimpleQueue[None] = queue.SimpleQueue()  # put() is safe in a handler
+        self._awake = False
+        self._changes: deque[Change] = deque()
+        self._observers: list[Observer] = []
+        self._on_close: list[Callable[[], None]] = []
+        self._visitor = ChangeVisitor()
+        self._stop_wanted = False
+        self._abandoned = False
+        self._pause_wanted = False
+        self._paused = False
+        self._spin_error: BaseException | None = None
+        self._thread: threading.Thread | None = None
+        self._outcome: Status | BaseException | None = None
+        self._running = threading.Lock()
+        self._runs_on: int | None = None
+        self._closed = False
+        self._pid = os.getpid()
+        self._tickets: set[Ticket] = set()
+        self._mark = object()  # of the goals that a tick of ours begins
+        self._spinner = Spinner(node, executor, namespace=namespace, died=self._spin_died)
+        self._traffic = _traffic_of(self._spinner.node)
+        self._traffic.observe(self._note)
+        # Before the exit hook of ros/traffic.py: a tree that ticks on would send another goal, and
+        # a daemon thread in spin() aborts the process that ends beside it.
+        atexit.register(self._shut_down)
+
+    @property
+    def node(self) -> Any:
+        """The ROS node that goals are sent from."""
+        return self._spinner.node
+
+    @property
+    def executor(self) -> Any:
+        """The executor that spins the node; further nodes may be added to it."""
+        return self._spinner.executor
+
+    @property
+    def unaccounted(self) -> list[GoalReport]:
+        """The goals of this tree whose end is UNKNOWN, by now."""
+        return [
+            GoalReport(
+                ticket.owner.name,
+                ticket.goal.server,
+                ticket.goal.id.hex(),
+                ticket.goal.outcome,
+                ticket.goal.reason,
+            )
+            for ticket in list(self._tickets)
+            if ticket.goal.end is End.UNKNOWN
+            and (ticket.goal.outcome is not None or not self._running.locked())
+        ]
+
+    def observe(self, callback: Observer) -> None:
+        """Call `callback` with each event of a run, on the ticking thread."""
+        self._observers.append(callback)
+
+    def on_close(self, callback: Callable[[], None]) -> None:
+        """Call `callback` in `shutdown`, when nothing spins any more and the context still lives.
+
+        The place to destroy further nodes that were added to `executor`.
+        """
+        self._on_close.append(callback)
+
+    def _close_guests(self) -> None:
+        for callback in self._on_close:
+            try:
+                callback()
+            except Exception as error:  # noqa: BLE001 - the rest must be closed all the same
+                self.node.get_logger().error(f"closing: {error!r}")
+
+    # Running
+
+    def run(self, timeout: float | None = None) -> Status:
+        """Run the tree until it succeeds or fails, and return which; INVALID when interrupted.
+
+        Raises TimeoutError after `timeout` seconds, TreeError when a behaviour raised or the
+        spin thread died (goals are drained first in each case), and RuntimeError on an executor's
+        thread, in a second run at a time, or where nobody spins the node. On the main thread and
+        with a node of its own, SIGINT, SIGTERM and SIGHUP take effect after the goals were drained.
+        """
+        from bt_actions.ros.spinning import on_executor_thread
+
+        if on_executor_thread():
+            raise RuntimeError("run() on an executor's thread would wait for itself; use start()")
+        if not self._running.acquire(blocking=False):
+            raise RuntimeError("this tree is running already")
+        try:
+            with self._mind_signals():
+                return self._run(timeout)
+        finally:
+            self._stop_wanted = self._abandoned = False
+            self._runs_on = None
+            self._running.release()
+
+    def _mind_signals(self) -> contextlib.AbstractContextManager[None]:
+        """With a node of the user's, its context's signal handling is the user's as well."""
+        if not self._spinner.owns_context:
+            return contextlib.nullcontext()
+        return ended_by_signals(lambda again: self.interrupt(abandon=again))
+
+    def start(self) -> None:
+        """Run the tree on a thread of its own; see `wait`. For use inside a running node."""
+        if self._thread is not None:
+            raise RuntimeError("this tree has been started already; wait() for it first")
+        if not self._running.acquire(blocking=False):
+            raise RuntimeError("this tree is running already")
+        self._outcome = None
+        self._thread = threading.Thread(target=self._run_started, name="bt_actions-tree")
+        self._thread.daemon = True  # the exit hook of ros/traffic.py drains what it leaves
+        self._thread.start()
+
+    def _run_started(self) -> None:
+        try:
+            self._outcome = self._run(None)
+        except BaseException as error:  # noqa: BLE001 - raised again by wait()
+            self._outcome = error
+        finally:
+            self._stop_wanted = self._abandoned = False
+            self._runs_on = None
+            self._running.release()
+
+    def wait(self, timeout: float | None = None) -> Status:
+        """Wait for a tree that was started, and return or raise what `run` would.
+
+        Raises TimeoutError when it is still running after `timeout` seconds; it goes on.
+        """
+        thread = self._thread
+        if thread is None:
+            raise RuntimeError("nothing to wait for: the tree has not been started")
+        thread.join(timeout)
+        if thread.is_alive():
+            raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s")
+        self._thread = None
+        outcome = self._outcome
+        if isinstance(outcome, Status):
+            return outcome
+        assert outcome is not None
+        raise outcome
+
+    def pause(self) -> None:
+        """Stop ticking: no new goal starts, running ones finish, and their deadlines hold."""
+        self._pause_wanted = True
+        self._wake()
+
+    def resume(self) -> None:
+        """Tick on."""
+        self._pause_wanted = False
+        self._wake()
+
+    def interrupt(self, *, abandon: bool = False) -> None:
+        """End the run: cancel and drain its goals. Returns at once; safe in a signal handler.
+
+        Before a run it makes that run return at once.
+
+        With `abandon`, stop waiting for goals that are being drained; `unaccounted` tells which.
+        """
+        self._abandoned = self._abandoned or abandon
+        self._stop_wanted = True
+        self._wake()
+
+    def shutdown(self) -> None:
+        """End the run if there is one, and shut down the tree and all that was made here.
+
+        Raises RuntimeError on a thread of an executor that is spun here, and within the run.
+        """
+        from bt_actions.ros.spinning import on_executor_thread
+
+        if self._closed:
+            return
+        if self._spinner.spins and on_executor_thread():
+            raise RuntimeError("shutdown() on the executor's own thread would wait for itself")
+        if self._runs_on == threading.get_ident():
+            raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
+        self._shut_down(patience=-1.0)
+
+    def _shut_down(self, patience: float = PATIENCE_AT_EXIT) -> None:
+        """Shut down; where a run does not end within `patience` seconds, leave all as it is."""
+        if os.getpid() != self._pid:
+            return  # the child of a fork: all of this is the parent's
+        self._closed = True
+        atexit.unregister(self._shut_down)
+        if self._running.locked():
+            self.interrupt()
+        if not self._running.acquire(timeout=patience):
+            return
+        self._running.release()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        with contextlib.suppress(Exception):
+            self.tree.shutdown()
+        self._traffic.unobserve(self._note)
+        self._spinner.stop(self._close_guests)
+
+    def __enter__(self) -> TreeRunner:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.shutdown()
+
+    # The loop
+
+    def _run(self, timeout: float | None) -> Status:
+        if self._closed:
+            raise RuntimeError("this runner has been shut down")
+        deadline = None if timeout is None else time.monotonic() + timeout
+        self._visitor.forget()
+        self.tree.visitors.append(self._visitor)
+        self._runs_on = threading.get_ident()
+        try:
+            self._guarded("setup", self._set_up)  # clients are made before anything spins
+            self._spinner.start()
+            self._emit(TreeStarted(time.monotonic()))
+            status = self._tick_until(deadline)
+        except BaseException:
+            self._end(Status.INVALID)
+            raise
+        finally:
+            self.tree.visitors.remove(self._visitor)
+        self._end(status)
+        if status is Status.INVALID and not self._stop_wanted:
+            raise TimeoutError(f"{self.tree.root.name} did not finish within {timeout:g} s")
+        return status
+
+    def _set_up(self) -> None:
+        self.tree.setup(timeout=Duration.INFINITE, node=self.node)
+
+    def _tick_until(self, deadline: float | None) -> Status:
+        """Tick until the tree has a status; INVALID when interrupted or out of time."""
+        wait = 0.0
+        while True:
+            with contextlib.suppress(queue.Empty):
+                self._wakes.get(timeout=wait) if wait > 0.0 else self._wakes.get_nowait()
+            self._awake = False
+            if self._spin_error is not None:
+                raise TreeError(f"the spin thread died: {self._spin_error!r}") from self._spin_error
+            self._spinner.check()
+            if self._stop_wanted or (deadline is not None and time.monotonic() >= deadline):
+                return Status.INVALID
+            self._flush()
+            if self._held():
+                wait = self.heartbeat
+            else:
+                status = self._tick()
+                if status in (Status.SUCCESS, Status.FAILURE):
+                    return status
+                wait = min([self.heartbeat, *self._dues()])
+            if deadline is not None:
+                wait = min(wait, max(0.0, deadline - time.monotonic()))
+
+    def _tick(self) -> Status:
+        """Tick; again at once while each tick changes a status."""
+        for _ in range(BURST):
+            self._visitor.begin()
+            with self._traffic.begun_by(self._mark):
+                self._guarded("tick", lambda: tick_once(self.tree))
+            changed = self._visitor.finish()
+            self._flush()
+            for node, status in changed:
+                message = node.feedback_message
+                self._emit(NodeChanged(time.monotonic(), path_of(node), node, status, message))
+            status = self.tree.root.status
+            if not changed or status is not Status.RUNNING or self._stop_wanted:
+                return status
+        return self.tree.root.status
+
+    def _dues(self) -> list[float]:
+        """The deadlines that running behaviours have of their own, as seconds from now."""
+        dues = []
+        for node in self._visitor.running:
+            due_in = getattr(node, "due_in", None)
+            due = due_in() if due_in is not None else None
+            if due is not None:
+                dues.append(max(due, 0.001))
+        return dues
+
+    def _held(self) -> bool:
+        """Whether the tree is paused; carries a change of that over to goals not sent yet."""
+        if self._pause_wanted != self._paused:
+            self._paused = self._pause_wanted
+            tickets = list(self._tickets)
+            (self._traffic.pause if self._paused else self._traffic.resume)(tickets)
+        return self._paused
+
+    def _end(self, status: Status) -> None:
+        """Stop what still runs, drain the tree's goals, and tell."""
+        root = self.tree.root
+        if self._paused:
+            self._traffic.resume(list(self._tickets))
+            self._paused = False
+        self._flush()  # a goal may have begun in a tick that raised
+        if any(node.status is Status.RUNNING for node in root.iterate()):  # not the root, then
+            try:
+                root.stop(Status.INVALID)
+            except Exception:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
+                for node in root.iterate():
+                    if isinstance(node, ActionBehaviour):
+                        node.terminate(Status.INVALID)
+        _drain(self._tickets, self._hurry)
+        self._flush()
+        for node, changed in self._visitor.finish(interrupted=True):
+            message = node.feedback_message
+            self._emit(NodeChanged(time.monotonic(), path_of(node), node, changed, message))
+        self._tickets = {ticket for ticket in self._tickets if not ticket.accounted_for}
+        self._emit(TreeFinished(time.monotonic(), status))
+
+    def _hurry(self) -> bool:
+        self._flush()
+        return self._abandoned
+
+    def _guarded(self, doing: str, step: Any) -> None:
+        try:
+            step()
+        except Exception as error:
+            culprit = culprit_of(error)
+            where = f"{'/'.join(path_of(culprit))}" if culprit is not None else self.tree.root.name
+            raise TreeError(f"{where}: {doing} raised {type(error).__name__}: {error}") from error
+
+    # Who wakes and who is told
+
+    def _wake(self) -> None:
+        if not self._awake:
+            self._awake = True
+            self._wakes.put(None)
+
+    def _spin_died(self, error: BaseException) -> None:
+        self._spin_error = error
+        self._wake()
+
+    def _note(self, change: Change | None) -> None:
+        """Take note of a change of any goal of our node; called under the lock of the traffic."""
+        if change is not None:
+            self._changes.append(change)
+        self._wake()
+
+    def _flush(self) -> None:
+        while self._changes:
+            change = self._changes.popleft()
+            leaf = change.ticket.owner
+            if not self._is_ours(change.ticket):
+                continue  # another tree on the same node
+            self._tickets.add(change.ticket)
+            self._emit(
+                GoalChanged(
+                    time.monotonic(),
+                    leaf,
+                    change.state.value,
+                    change.ticket.attempt,
+                    change.outcome,
+                    change.end,
+                    change.reason,
+                    change.ticket.goal.id.hex(),
+                )
+            )
+            if change.ticket.accounted_for:
+                self._tickets.discard(change.ticket)
+
+    def _is_ours(self, ticket: Ticket) -> bool:
+        """Whether the goal is this tree's: begun in a tick of it, wherever its leaf is by now."""
+        if ticket in self._tickets or ticket.begun_by is self._mark:
+            return True
+        return root_of(ticket.owner) is self.tree.root
+
+    def _emit(self, event: Event) -> None:
+        for observer in list(self._observers):
+            try:
+                observer(event)
+            except Exception as error:  # noqa: BLE001 - the run goes on without it
+                self._observers.remove(observer)
+                self.node.get_logger().error(f"an observer raised and was removed: {error!r}")
+
+
+def _traffic_of(node: Any) -> Any:
+    from bt_actions.ros.traffic import Traffic
+
+    return Traffic.of(node)
+
+
+def _drain(tickets: set[Ticket], hurry: Any) -> None:
+    from bt_actions.ros.traffic import drain
+
+    drain(list(tickets), hurry)

@@ -1,0 +1,112 @@
+"""What is known of one action server, seen from outside: is it there, alone, and still the same?
+
+Fed with what discovery shows (readiness and the GIDs of the status topic's publishers) and with
+the answers to probes. No ROS, no thread, no clock of its own; it sends nothing: `wants_probe`
+says that a probe is due.
+
+Two publishers on the status topic are not yet two servers: after a server was killed, its ghost
+stays in discovery until the lease runs out (20 s with Fast DDS as it comes). A probe is a question
+that every live server answers once. Two answers: two servers. One answer and then silence: a
+ghost and its successor.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+GID = bytes
+
+PROBE_EVERY = 0.5
+"""Seconds between probes while it is open who is alive."""
+SETTLED_AFTER = 1.0
+"""Seconds of silence after a probe's first answer until a second one is not expected any more,"""
+SLOWEST_START = 3.0
+"""and seconds within which a server that has just come in sight answers (0.15 to 2.7 measured)."""
+PROBES_KEPT = 20
+"""Probes whose answers are counted; of those before, none is expected any more."""
+LEASE = 25.0
+"""Seconds after which no ghost is left: a server that is still shown is there."""
+NOT_READY_FOR = 1.0
+"""Seconds without readiness, though the status topic is there, until the server counts as gone."""
+
+
+class Server(Enum):
+    """What answers under the name."""
+
+    ABSENT = "absent"
+    READY = "ready"
+    SETTLING = "settling"
+    """More than one is shown, and it is not known yet which of them live."""
+    AMBIGUOUS = "ambiguous"
+
+
+class ServerWatch:
+    """The picture of one server, kept from observations at any times the caller likes."""
+
+    def __init__(self) -> None:
+        self.gids: frozenset[GID] = frozenset()
+        self.alone = False
+        """More GIDs than one are shown, but only one server answers."""
+        self._ready = False
+        self._unready_since: float | None = None
+        self._crowded_since: float | None = None
+        self._probed_at = float("-inf")
+        self._answers: dict[int, tuple[int, float]] = {}  # probe: answers, time of the first
+        self._both_answered = False
+
+    def observe(self, now: float, ready: bool, gids: frozenset[GID]) -> None:
+        """Take what discovery shows at `now` (seconds, steady clock)."""
+        if ready:
+            self._unready_since = None
+        elif self._unready_since is None:
+            self._unready_since = now
+        self._ready = ready
+        if gids != self.gids:
+            self._both_answered = self.alone = False
+            self._answers.clear()
+            self._crowded_since = now if len(gids) > 1 else None
+            self.gids = gids
+        since = self._crowded_since
+        if since is not None and not self._both_answered and now - since >= SLOWEST_START:
+            self.alone = any(
+                count == 1 and now - first >= SETTLED_AFTER
+                for count, first in self._answers.values()
+            )
+
+    def probe_answered(self, now: float, probe: int) -> None:
+        """Take one answer to the probe numbered `probe`."""
+        count, first = self._answers.get(probe, (0, now))
+        self._answers[probe] = (count + 1, first)
+        if len(self._answers) > PROBES_KEPT:
+            del self._answers[next(iter(self._answers))]
+        if count + 1 > 1 and self._crowded_since is not None:
+            self._both_answered = True
+            self.alone = False
+
+    def state(self, now: float) -> Server:
+        """Return what answers under the name, as far as is known at `now`."""
+        if not self._ready or not self.gids:
+            return Server.ABSENT
+        if self._crowded_since is None:
+            return Server.READY
+        if self._both_answered or now - self._crowded_since > LEASE:
+            return Server.AMBIGUOUS
+        return Server.READY if self.alone else Server.SETTLING
+
+    def wants_probe(self, now: float) -> bool:
+        """Whether a probe is due; the caller sends one when this says so."""
+        open_question = self._crowded_since is not None and not self._both_answered
+        if not open_question or now - self._probed_at < PROBE_EVERY:
+            return False
+        self._probed_at = now
+        return True
+
+    def gone(self, now: float, sent_to: frozenset[GID]) -> bool:
+        """Whether none of the servers that a goal was sent to is there any more."""
+        if not sent_to & self.gids:
+            return True
+        return self._unready_since is not None and now - self._unready_since >= NOT_READY_FOR
+
+    def changed(self, sent_to: frozenset[GID]) -> bool:
+        """Whether a server is shown that was not there when the goal was sent."""
+        return bool(self.gids - sent_to)

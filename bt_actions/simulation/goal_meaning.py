@@ -1,0 +1,50 @@
+"""What a goal means to the server that serves it. Subclasses fill it in; nothing here moves."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+from bt_actions.simulation.execution import Finish, Motion
+
+# Messages are Any in this package: rosidl gives them no common base.
+
+
+class GoalMeaning(ABC):
+    """The part of a simulated server that knows its action type.
+
+    What these methods raise refuses or aborts the goal; it never reaches the executor.
+    """
+
+    action_type: Any
+
+    @abstractmethod
+    def refusal(self, goal: Any) -> str | None:
+        """Return why `goal` is refused, or None."""
+
+    @abstractmethod
+    def begin(self, goal: Any) -> Motion:
+        """Set out for `goal`."""
+
+    @abstractmethod
+    def feedback(self, motion: Motion) -> Any:
+        """Return the feedback message."""
+
+    @abstractmethod
+    def result(self, motion: Motion, finish: Finish, reason: str) -> Any:
+        """Return the result message of a goal that has ended."""
+
+    def failure(self, motion: Motion) -> str | None:
+        """Return why a goal that is done is to be aborted nevertheless, or None."""
+        return None
+
+    def halt(self, motion: Motion) -> None:  # noqa: B027 - nothing moves everywhere
+        """Stand still: the goal has ended before it was done, or the server has died."""
+
+    def drop_part(self) -> None:  # noqa: B027 - not every server has a part
+        """Let the part fall, where there is one: the fault drop_part strikes."""
+
+    def state(self, motion: Motion) -> Mapping[str, float]:
+        """Return what the journal says of a step."""
+        return {"progress": round(motion.progress, 4)}

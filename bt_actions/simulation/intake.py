@@ -1,0 +1,126 @@
+"""Goal requests on their way to a decision: counted, struck by faults, written down. No ROS.
+
+A request is known by its message until rclpy asks for the decision, because rclpy then tells
+nothing else, and by its goal's id from the decision to the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from bt_actions.simulation.fault_plan import FaultPlan, GoalFaults
+from bt_actions.simulation.faults import FaultKind
+from bt_actions.simulation.journal import Event
+
+
+class Fate(Enum):
+    """What becomes of a goal request."""
+
+    ANSWER = "answer"
+    LATER = "later"
+    """Answered when its delay is over."""
+    SILENT = "silent"
+    """Accepted, but the answer is lost; after its delay, if it has one."""
+    LOST = "lost"
+    DIE = "die"
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A goal that was asked for."""
+
+    goal_id: str
+    number: int
+    faults: GoalFaults
+
+    @property
+    def fate(self) -> Fate:
+        """What becomes of it."""
+        if self.faults.dies("accept"):
+            return Fate.DIE
+        if FaultKind.DROP_GOAL in self.faults:
+            return Fate.LOST
+        if FaultKind.DROP_ACCEPT in self.faults:
+            return Fate.SILENT
+        return Fate.LATER if FaultKind.DELAY_ACCEPT in self.faults else Fate.ANSWER
+
+    @property
+    def delay(self) -> float:
+        """Seconds until it is answered."""
+        return self.faults.number(FaultKind.DELAY_ACCEPT) or 0.0
+
+
+class Intake:
+    """Counts the goals of one server and decides on them."""
+
+    def __init__(
+        self,
+        server: str,
+        plan: FaultPlan,
+        *,
+        record: Callable[..., None],
+        warn: Callable[[str], None],
+    ) -> None:
+        """`record` writes into the journal, `warn` into the log."""
+        self.count = 0
+        self._server = server
+        self._plan = plan
+        self._record = record
+        self._warn = warn
+        self._undecided: dict[int, Request] = {}
+        self._accepted: dict[str, Request] = {}
+
+    def receive(self, goal: object, goal_id: str) -> Request:
+        """Take in a request for `goal`, whose message lives until the decision."""
+        self.count += 1
+        faults = self._plan.strike(self._server, self.count)
+        request = Request(goal_id, self.count, faults)
+        more = {"faults": str(faults)} if faults else {}
+        self._record(goal_id, Event.RECEIVED, number=request.number, **more)
+        if request.fate not in {Fate.DIE, Fate.LOST}:
+            self._undecided[id(goal)] = request
+        return request
+
+    def decide(self, goal: Any, refusal: Callable[[Any], str | None]) -> bool:
+        """Return whether `goal` is accepted."""
+        request = self._undecided.pop(id(goal), None)
+        if request is None:
+            return False
+        if FaultKind.REJECT in request.faults:
+            reason: str | None = "fault: reject"
+        else:
+            try:
+                reason = refusal(goal)
+            except Exception as error:  # noqa: BLE001 - it would end the executor's spin
+                reason = f"it could not be checked: {error!r}"
+        if reason:
+            self._reject(request, reason)
+            return False
+        self._accepted[request.goal_id] = request
+        return True
+
+    def answered(self, goal: object, goal_id: str) -> bool:
+        """Clean up after a request; return whether its goal was accepted and not started."""
+        request = self._undecided.pop(id(goal), None)
+        if request is not None:
+            self._reject(request, "its id is already in use")
+        return goal_id in self._accepted
+
+    def start(self, goal_id: str) -> Request | None:
+        """Return the request of an accepted goal, once."""
+        request = self._accepted.pop(goal_id, None)
+        if request is not None:
+            self._record(goal_id, Event.ACCEPTED, number=request.number)
+        return request
+
+    def clear(self) -> None:
+        """Forget all requests; the count goes on."""
+        self._undecided.clear()
+        self._accepted.clear()
+
+    def _reject(self, request: Request, reason: str) -> None:
+        self._warn(f"{self._server}: goal {request.number} refused: {reason}")
+        self._record(request.goal_id, Event.REJECTED, reason=reason)

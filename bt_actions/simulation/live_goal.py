@@ -1,0 +1,143 @@
+"""One accepted goal on its server: carries out what its execution decides, and writes it down."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from action_msgs.msg import GoalStatus
+from rclpy.action.server import RCLError, ServerGoalHandle
+
+from bt_actions.simulation.execution import CancelAnswer, Execution, Finish, Happened
+from bt_actions.simulation.goal_meaning import GoalMeaning
+from bt_actions.simulation.journal import Event
+
+_EVENTS = {
+    GoalStatus.STATUS_SUCCEEDED: Event.SUCCEEDED,
+    GoalStatus.STATUS_CANCELED: Event.CANCELED,
+    GoalStatus.STATUS_ABORTED: Event.ABORTED,
+}
+
+
+class Owner(Protocol):
+    """What a live goal asks of its server."""
+
+    def record(self, goal_id: str, event: Event, **more: object) -> None:
+        """Write a line into the journal."""
+
+    def ended(self, goal: LiveGoal, result: Any) -> None:
+        """The goal has reached its terminal state."""
+
+    def die(self, reason: str) -> None:
+        """A fault kills the server."""
+
+    def restart(self, seconds: float) -> None:
+        """A fault takes the server away for so many seconds."""
+
+
+class LiveGoal:
+    """A goal from its acceptance to its end. Used under the lock of its server's stepper."""
+
+    def __init__(
+        self,
+        owner: Owner,
+        meaning: GoalMeaning,
+        goal_id: str,
+        handle: ServerGoalHandle,
+        run: Execution,
+        *,
+        step_period: float,
+    ) -> None:
+        """`run` decides, `meaning` makes the messages, `owner` is told."""
+        self.goal_id = goal_id
+        self.handle = handle
+        self.run = run
+        self._owner = owner
+        self._meaning = meaning
+        self._step_period = step_period
+
+    def __repr__(self) -> str:
+        return f"<LiveGoal {self.goal_id[:8]} {self.run!r}>"
+
+    def step(self, now: float) -> bool:
+        """Move for one step of simulated time; return whether it still moves."""
+        try:
+            happened = self.run.step(now, self._step_period)
+        except Exception as error:  # noqa: BLE001 - the goal must end whatever its motion does
+            happened = self.run.give_up(f"it could not go on: {error!r}")
+        self._owner.record(self.goal_id, Event.STEP, **self._meaning.state(self.run.motion))
+        self._carry_out(happened)
+        return self.run.moving
+
+    def poll(self, now: float) -> None:
+        """End, where a cancel's time has come."""
+        self._carry_out(self.run.poll(now))
+
+    def cancel(self, now: float) -> bool:
+        """Say whether a request to cancel is granted; it is carried out by `poll`."""
+        accepted = self.run.cancel(now) is CancelAnswer.ACCEPT
+        event = Event.CANCEL_ACCEPTED if accepted else Event.CANCEL_REJECTED
+        self._owner.record(self.goal_id, event)
+        return accepted
+
+    def replace(self) -> None:
+        """Abort: a newer goal takes its place."""
+        self._carry_out(self.run.replace())
+
+    def give_up(self, reason: str) -> None:
+        """Abort, because the server cannot go on."""
+        self._carry_out(self.run.give_up(reason))
+
+    def abandon(self, reason: str) -> None:
+        """Stop without an end that any client hears of: the server has died."""
+        self.run.give_up(reason)
+        self._meaning.halt(self.run.motion)
+
+    def _carry_out(self, happened: Happened) -> None:
+        if happened.drop_part:
+            self._meaning.drop_part()
+        if happened.feedback:
+            self._send_feedback(happened.feedback)
+        if happened.finish is not None:
+            self._finish(happened.finish, happened.reason)
+        if happened.restart_after is not None:
+            self._owner.restart(happened.restart_after)
+        elif happened.die:
+            self._owner.die("fault: die")
+
+    def _send_feedback(self, times: int) -> None:
+        try:
+            message = self._meaning.feedback(self.run.motion)
+            for _ in range(times):
+                self.handle.publish_feedback(message)
+        except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
+            self.give_up(f"it has no feedback: {error!r}")
+
+    def _finish(self, finish: Finish, reason: str) -> None:
+        motion = self.run.motion
+        try:
+            if finish is Finish.COMPLETED and (why := self._meaning.failure(motion)):
+                finish, reason = Finish.FAULT, why
+            if finish is not Finish.COMPLETED:
+                self._meaning.halt(motion)
+            result = self._meaning.result(motion, finish, reason)
+            if not isinstance(result, self._meaning.action_type.Result):
+                raise TypeError(f"{result!r} is no {self._meaning.action_type.Result.__name__}")
+        except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
+            finish, reason = Finish.FAULT, f"it has no result: {error!r}"
+            result = self._meaning.action_type.Result()
+        event = self._change_state(finish)
+        more = {"reason": reason} if reason else {}
+        self._owner.record(self.goal_id, event, **self._meaning.state(motion), **more)
+        self._owner.ended(self, result)
+
+    def _change_state(self, finish: Finish) -> Event:
+        try:
+            if finish is Finish.COMPLETED:
+                self.handle.succeed()
+            elif finish is Finish.CANCELED:
+                self.handle.canceled()
+            else:
+                self.handle.abort()
+        except RCLError:  # not a state from which this one can be reached: it has ended already
+            return _EVENTS.get(self.handle.status, Event.ABORTED)
+        return _EVENTS.get(self.handle.status, Event.ABORTED)

@@ -1,0 +1,87 @@
+"""Keeps back answers to result requests, as the faults drop_result and delay_result say. No ROS."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Protocol
+
+from bt_actions.simulation.fault_plan import GoalFaults
+from bt_actions.simulation.faults import FaultKind
+
+
+class Alarm(Protocol):
+    """Rings: what this needs of a Stepper."""
+
+    def now(self) -> float:
+        """Return the time in seconds of a steady clock."""
+
+    def call_at(self, when: float, callback: Callable[[float], None]) -> None:
+        """Call `callback` at `when`."""
+
+
+class _Kept:
+    def __init__(self, faults: GoalFaults) -> None:
+        dropped = FaultKind.DROP_RESULT in faults
+        count = faults.number(FaultKind.DROP_RESULT)
+        self.to_drop = 0.0 if not dropped else math.inf if count is None else count
+        self.delay = faults.number(FaultKind.DELAY_RESULT) or 0.0
+        self.ended: float | None = None
+        self.waiting: list[Any] = []
+
+
+class ResultFaults:
+    """Knows the goals whose results are lost or late, from their acceptance until forgotten."""
+
+    def __init__(self, alarm: Alarm, answer: Callable[[Any], None]) -> None:
+        """`answer` is called with a request once its time has come."""
+        self._alarm = alarm
+        self._answer = answer
+        self._goals: dict[str, _Kept] = {}
+
+    def expect(self, goal_id: str, faults: GoalFaults) -> None:
+        """A goal was accepted."""
+        if FaultKind.DROP_RESULT in faults or FaultKind.DELAY_RESULT in faults:
+            self._goals[goal_id] = _Kept(faults)
+
+    def on_request(self, goal_id: str, taken: Any) -> bool:
+        """Return whether to answer a result request now; if not, it is lost or comes later."""
+        kept = self._goals.get(goal_id)
+        if kept is None:
+            return True
+        if kept.to_drop > 0:
+            kept.to_drop -= 1
+            return False
+        if not kept.delay:
+            return True
+        if kept.ended is None:
+            kept.waiting.append(taken)
+            return False
+        due = kept.ended + kept.delay
+        if self._alarm.now() >= due:
+            return True
+        self._answer_at(due, taken)
+        return False
+
+    def ended(self, goal_id: str, now: float, remembered: float) -> None:
+        """A goal has ended; its server remembers it for so many seconds."""
+        kept = self._goals.get(goal_id)
+        if kept is None:
+            return
+        kept.ended = now
+        for taken in kept.waiting:
+            self._answer_at(now + kept.delay, taken)
+        kept.waiting.clear()
+        forget = now + kept.delay + remembered
+        self._alarm.call_at(forget, partial(self._forget, goal_id))
+
+    def _answer_at(self, when: float, taken: Any) -> None:
+        self._alarm.call_at(when, lambda now: self._answer(taken))
+
+    def _forget(self, goal_id: str, now: float) -> None:
+        self._goals.pop(goal_id, None)
+
+    def clear(self) -> None:
+        """The server has died."""
+        self._goals.clear()

@@ -1,0 +1,155 @@
+"""Simulated robots on one node: as many as there are namespaces, with one timer and no thread.
+
+It neither spins nor owns the node. A fault that kills a server destroys that server where the
+process is shared with a tree, and kills the process where it is the simulation's own.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from types import TracebackType
+from typing import Self
+
+from rclpy.node import Node
+
+from bt_actions.simulation.fault_plan import FaultPlan
+from bt_actions.simulation.faults import Fault
+from bt_actions.simulation.journal import Journal
+from bt_actions.simulation.robot_cell import RobotCell
+from bt_actions.simulation.server import RESULT_TIMEOUT, SimulatedServer
+from bt_actions.simulation.stepper import Stepper
+from bt_actions.simulation.world import World, WorldEvent
+
+BATTERY_PERIOD = 1.0
+"""The battery's charge is published that often, wall seconds."""
+
+
+class Simulation:
+    """Robots that serve `move_robot` and `gripper_control` and carry a part between stations."""
+
+    def __init__(
+        self,
+        node: Node,
+        *,
+        namespaces: Sequence[str] = ("",),
+        speed: float = 1.0,
+        step_period: float = 0.1,
+        faults: Iterable[Fault | str] = (),
+        seed: int | None = None,
+        journal: str | os.PathLike[str] | None = None,
+        in_process: bool = True,
+        result_timeout: float = RESULT_TIMEOUT,
+        on_event: Callable[[str, WorldEvent], None] | None = None,
+    ) -> None:
+        """Serve one robot for each of `namespaces`; "" is the node's own.
+
+        `speed` is simulated seconds in one wall second, `step_period` in simulated seconds. Without
+        a `seed` one is chosen; it is logged when a fault depends on it. `in_process` False says
+        that the process is the simulation's own, to be killed by the fault `die`. `on_event` is
+        told what happens to the parts, with the namespace, on the executor's thread; once it has
+        raised it is told no more.
+
+        Raises FaultError for a fault that is written wrong or fits no server, ValueError for any
+        other bad setting, OSError for a journal that cannot be opened.
+        """
+        names = tuple(dict.fromkeys(namespaces))
+        if not names:
+            raise ValueError("a simulation needs at least one namespace")
+        self.node = node
+        self._faults = FaultPlan.of(faults, seed)
+        self._on_event: Callable[[str, WorldEvent], None] | None = on_event
+        self._log = node.get_logger()
+        self._journal = Journal(journal, on_error=self._log.error)
+        self._cells: dict[str, RobotCell] = {}
+        self._speed = speed
+        self._stepper = Stepper(node, speed=speed, step_period=step_period)
+        try:
+            for namespace in names:
+                self._cells[namespace] = RobotCell(
+                    node,
+                    namespace,
+                    on_event=partial(self._tell, namespace),
+                    stepper=self._stepper,
+                    faults=self._faults,
+                    journal=self._journal,
+                    result_timeout=result_timeout,
+                    on_death=None if in_process else self._kill_process,
+                )
+            self._faults.check(server.name for server in self.servers)
+        except BaseException:
+            self.close()
+            raise
+        if self._faults.uses_chance:
+            self._log.info(f"simulation: faults are drawn with seed {self.seed}")
+        self._publish_batteries(self._stepper.now())
+
+    def __repr__(self) -> str:
+        return f"<Simulation {len(self._cells)} robots, speed {self._speed:g}>"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def seed(self) -> int:
+        """What the dice of the faults depend on: the same seed, the same faults."""
+        return self._faults.seed
+
+    @property
+    def servers(self) -> list[SimulatedServer]:
+        """All action servers."""
+        return [server for cell in self._cells.values() for server in cell.servers]
+
+    def world(self, namespace: str = "") -> World:
+        """Return the robot, gripper and part of a namespace, as it was given.
+
+        Raises KeyError for one that is not simulated.
+        """
+        return self._cells[namespace].world
+
+    def describe(self) -> str:
+        """Say where the part is in one sentence; where there are several robots, one line each."""
+        with self._stepper.lock:
+            sentences = [(cell.namespace, cell.world.describe()) for cell in self._cells.values()]
+        if len(sentences) == 1:
+            return sentences[0][1]
+        return "\n".join(f"{namespace}: {sentence}" for namespace, sentence in sentences)
+
+    def close(self) -> None:
+        """Destroy servers, timer and topics; the node stays. Goals get no answer any more.
+
+        Safe while the executor spins and, better, after it has stopped; before `destroy_node`.
+        """
+        self._stepper.close()
+        for cell in self._cells.values():
+            cell.close()
+        self._journal.close()
+
+    def _tell(self, namespace: str, event: WorldEvent) -> None:
+        if self._on_event is None:
+            return
+        try:
+            self._on_event(namespace, event)
+        except Exception as error:  # noqa: BLE001 - a faulty listener must not end a goal
+            self._on_event = None
+            self._log.error(f"simulation: on_event raised {error!r} and is told no more")
+
+    def _publish_batteries(self, now: float) -> None:
+        for cell in self._cells.values():
+            cell.publish_battery(BATTERY_PERIOD * self._speed)
+        self._stepper.call_at(now + BATTERY_PERIOD, self._publish_batteries)
+
+    def _kill_process(self) -> None:
+        for server in self.servers:
+            server.record_death("the process was killed")
+        os.kill(os.getpid(), signal.SIGKILL)

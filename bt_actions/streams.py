@@ -1,0 +1,24 @@
+"""Gives a process whose standard output or standard error is closed (`>&-`) one that goes nowhere.
+
+py_trees cannot be imported without `sys.stdout`, and a closed descriptor would be given to the
+next socket, to be printed on. Imports nothing of this package: it comes first.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+__all__ = ["open_closed_streams"]
+
+
+def open_closed_streams() -> None:
+    """Open the null device in place of each standard stream that is closed."""
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is not None:
+            continue
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        if nowhere != number:
+            os.dup2(nowhere, number)
+            os.close(nowhere)
+        setattr(sys, name, os.fdopen(number, "w", encoding="utf-8", errors="replace"))

@@ -1,0 +1,48 @@
+"""'Did you mean': the closest of the known words, for every message that names an unknown one."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = ["closest", "did_you_mean", "listing"]
+
+_LONGEST = 60
+_MOST = 60
+
+
+def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
+    """The known word that `word` most likely stands for, or None when nothing is near.
+
+    `cutoff` is how alike two words must be, 0 to 1.
+    """
+    if not 0 < len(word) <= _LONGEST:
+        return None
+    wanted = _folded(word)
+    slack = max(2, len(word) // 3)
+    near = [name for name in known if name != word and abs(len(name) - len(word)) <= slack]
+    if len(near) > _MOST:  # comparing takes its time
+        near = [name for name in near if name[:1] == word[:1]][:_MOST]
+    folded = {_folded(name): name for name in near}
+    if wanted in folded:
+        return folded[wanted]
+    matches = difflib.get_close_matches(wanted, folded, n=1, cutoff=cutoff)
+    return folded[matches[0]] if matches else None
+
+
+def _folded(word: str) -> str:
+    return word.casefold().replace("-", "_").replace(" ", "_")
+
+
+def listing(names: Iterable[str], limit: int = 12) -> str:
+    """``a, b and c``, cut where there are many."""
+    known = list(names)
+    if len(known) > limit:
+        return f"{', '.join(known[:limit])} and {len(known) - limit} more"
+    return ", ".join(known)
+
+
+def did_you_mean(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
+    """``"; did you mean 'distance'?"``, or nothing."""
+    near = closest(word, known, cutoff=cutoff)
+    return f"; did you mean {near!r}?" if near else ""

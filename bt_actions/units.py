@@ -1,0 +1,67 @@
+"""Numbers with a unit, as people write them: ``500 ms``, ``2 min``, ``90 deg``. No ROS here."""
+
+from __future__ import annotations
+
+import math
+import re
+
+__all__ = ["DURATION_UNITS", "parse_angle", "parse_duration"]
+
+DURATION_UNITS = {
+    "ns": 1e-9,
+    "us": 1e-6,
+    "ms": 1e-3,
+    "s": 1.0,
+    "sec": 1.0,
+    "min": 60.0,
+    "h": 3600.0,
+}
+"""Seconds in each unit that a duration may carry."""
+_ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
+_WITH_UNIT = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(\S*)\s*")
+
+
+def parse_duration(value: object) -> float:
+    """Seconds, from ``"500 ms"`` or a bare number of seconds; never negative, always finite.
+
+    Raises ValueError with a text for the person who wrote it.
+    """
+    seconds = _parse(value, DURATION_UNITS, "a duration", "5 s")
+    if seconds < 0:
+        raise ValueError(f"a duration is not negative: {value}")
+    return seconds
+
+
+def parse_angle(value: object) -> float:
+    """Radians, from ``"90 deg"``, ``"1.57 rad"`` or a bare number of radians.
+
+    Raises ValueError with a text for the person who wrote it.
+    """
+    return _parse(value, _ANGLE_UNITS, "an angle", "90 deg")
+
+
+def _parse(value: object, units: dict[str, float], what: str, example: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"{what} is needed, such as {example!r}, not {_show(value)}")
+    if isinstance(value, str):
+        match = _WITH_UNIT.fullmatch(value) if len(value) <= 60 else None
+        if match is None:
+            raise ValueError(f"{what} is needed, such as {example!r}, not {_show(value)}")
+        unit = match[2]
+        if unit and unit not in units:
+            known = ", ".join(units)
+            raise ValueError(f"unknown unit {unit!r} in {_show(value)}: one of {known}")
+        number = float(match[1]) * units.get(unit, 1.0)
+    else:
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"{what} is finite: {_show(value)}")
+    return number
+
+
+def _show(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

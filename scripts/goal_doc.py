@@ -1,0 +1,100 @@
+"""Writes docs/goal.md from the transition table in bt_actions/goal.py.
+
+`python scripts/goal_doc.py` writes it; with `--check` it exits 1, and says so, when what is there
+is stale.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+from bt_actions.goal import TABLE, Row
+from bt_actions.goal_terms import Command, Event, State
+
+PATH = Path(__file__).resolve().parent.parent / "docs" / "goal.md"
+
+HEAD = """\
+# The life of a goal
+
+<!-- Made by scripts/goal_doc.py from TABLE in bt_actions/goal.py. Do not edit. -->
+
+One goal on one action server, from wish to end. What happens is told to `Goal.on` as an event, or
+found out by `Goal.poll` when a deadline has passed; what to do comes back as commands. Every pair
+of state and event is decided. What is not in these tables came too late, or twice, to mean
+anything: it is counted and dropped.
+
+An arrow for SERVER_LOST into CANCELING may surprise: the leaf is free at once, and the goal is kept
+in mind, because a server that was only out of reach may come back with the goal still running.
+"""
+STATES = {
+    State.QUEUED: "It waits for its resources.",
+    State.WAITING_FOR_SERVER: "It holds its resources, and waits for a server to send to.",
+    State.SENDING: "The request is out, and not answered.",
+    State.EXECUTING: "The server has accepted it.",
+    State.CANCELING: "It is not wanted any more, or nobody knows where it is; its end is awaited.",
+    State.DONE: "There is nothing left to do for it.",
+}
+
+
+def rows(state: State) -> dict[Event, Row]:
+    """Return the decisions of one state, without what is dropped."""
+    return {event: TABLE[state, event] for event in Event if not TABLE[state, event].drops}
+
+
+def says(row: Row) -> str:
+    """Return a step in words, as they stand in a table."""
+    return row.says if row.says[1].isupper() else row.says[0].lower() + row.says[1:]
+
+
+def diagram() -> str:
+    """Return the diagram: an arrow for each pair of states, with the events that take it."""
+    arrows: dict[tuple[State, State], list[Event]] = defaultdict(list)
+    for state in State:
+        for event, row in rows(state).items():
+            for to in sorted(row.to, key=list(State).index):
+                if to is not state:
+                    arrows[state, to].append(event)
+    lines = ["stateDiagram-v2", "    direction TB", f"    [*] --> {State.QUEUED.value}"]
+    for (state, to), events in arrows.items():
+        label = "<br/>".join(event.name for event in events)
+        lines.append(f"    {state.value} --> {to.value}: {label}")
+    lines.append(f"    {State.DONE.value} --> [*]")
+    return "\n".join(["```mermaid", *lines, "```"])
+
+
+def table(state: State) -> str:
+    """Return the decisions of one state as a table."""
+    lines = ["| event | what is done | next |", "|---|---|---|"]
+    for event, row in rows(state).items():
+        following = " or ".join(to.value for to in State if to in row.to)
+        lines.append(f"| {event.name} | {says(row)} | {following} |")
+    return "\n".join(lines)
+
+
+def page() -> str:
+    """Return the whole page."""
+    parts = [HEAD, diagram(), "## States"]
+    for state in State:
+        parts += [f"### {state.value}", STATES[state], table(state)]
+    parts += ["## Events", "| event | meaning |\n|---|---|"]
+    parts[-1] += "".join(f"\n| {event.name} | {event.value} |" for event in Event)
+    parts += ["## Commands", "| command | what the caller does |\n|---|---|"]
+    parts[-1] += "".join(f"\n| {command.name} | {command.value} |" for command in Command)
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def main() -> None:
+    """Write the page, or check it."""
+    fresh = page()
+    if sys.argv[1:] == ["--check"]:
+        if not PATH.exists() or PATH.read_text(encoding="utf-8") != fresh:
+            sys.exit(f"{PATH} is stale: run `python scripts/goal_doc.py`")
+        return
+    PATH.parent.mkdir(exist_ok=True)
+    PATH.write_text(fresh, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

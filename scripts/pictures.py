@@ -1,0 +1,80 @@
+"""Draws the pictures in README.md and docs/ with `bt-actions render`'s own functions.
+
+`python scripts/pictures.py` draws them; with `--check` it exits 1, and says so, when one is stale.
+
+Where Graphviz puts things depends on the fonts of the machine, so a picture is not compared byte by
+byte: it is fresh when it was made from the dot source that the tree has now (its hash stands in the
+picture), and when what it shows, all but coordinates, is what is drawn now.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from bt_actions import load_tree
+from bt_actions.render import dot
+from bt_actions.render.graphviz import draw
+
+ROOT = Path(__file__).resolve().parent.parent
+PICTURES = {ROOT / "docs/images/pick_and_place.svg": ROOT / "trees/pick_and_place.yaml"}
+"""Each picture, and the tree that it shows."""
+
+_PLACED = {"cx", "cy", "d", "height", "points", "rx", "ry", "transform", "viewBox", "width"}
+_PLACED |= {"x", "y"}
+
+
+def source(picture: Path) -> str:
+    """The dot source of a picture."""
+    return dot(load_tree(PICTURES[picture]))
+
+
+def drawn(picture: Path) -> str:
+    """A picture, with a note of what it was made from."""
+    tree = PICTURES[picture].relative_to(ROOT)
+    note = f"<!-- Made by `make docs` from {tree}. Do not edit. dot: {_digest(picture)} -->"
+    image = draw(source(picture), "svg").decode()
+    return re.sub(r"(?=<svg )", f"{note}\n", image, count=1)
+
+
+def seen(image: str) -> list[tuple[str, str, tuple[tuple[str, str], ...]]]:
+    """What an SVG shows: its elements with their texts and attributes, but not where they are."""
+    return [
+        (
+            element.tag,
+            (element.text or "").strip(),
+            tuple(sorted(item for item in element.items() if item[0] not in _PLACED)),
+        )
+        for element in ET.fromstring(image).iter()
+    ]
+
+
+def is_fresh(picture: Path) -> bool:
+    """Whether a picture shows its tree as it is drawn now."""
+    if not picture.is_file():
+        return False
+    image = picture.read_text(encoding="utf-8")
+    return f"dot: {_digest(picture)} " in image and seen(image) == seen(drawn(picture))
+
+
+def _digest(picture: Path) -> str:
+    return hashlib.sha256(source(picture).encode()).hexdigest()[:16]
+
+
+def main() -> int:
+    """Draw the pictures, or check them."""
+    stale = [picture for picture in PICTURES if not is_fresh(picture)]
+    for picture in stale:
+        if "--check" in sys.argv[1:]:
+            print(f"{picture} is stale: run `make docs`", file=sys.stderr)
+        else:
+            picture.parent.mkdir(parents=True, exist_ok=True)
+            picture.write_text(drawn(picture), encoding="utf-8")
+    return 1 if stale and "--check" in sys.argv[1:] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

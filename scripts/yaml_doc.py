@@ -1,0 +1,223 @@
+"""Writes docs/yaml.md and docs/rules.md from the model of the tree language.
+
+`python scripts/yaml_doc.py` writes them; with `--check` it exits 1, and says so, when one is stale.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from bt_actions.document.model import (
+    ACTION_KEYS,
+    ALIAS,
+    INPUT,
+    KINDS,
+    OUTPUT,
+    RETRY,
+    SERVICE_TIMEOUT,
+    TIMEOUT,
+    TOP_KEYS,
+    TOPIC,
+    Group,
+    Kind,
+)
+from bt_actions.document.pages import PAGES
+from bt_actions.document.rules import RULES
+from bt_actions.document.shapes import Key, Record
+from bt_actions.units import DURATION_UNITS
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+EXAMPLES = ROOT / "examples"
+
+HEAD = f"""\
+# Trees in YAML
+
+<!-- Made by scripts/yaml_doc.py from bt_actions/document/model.py. Do not edit. -->
+
+A tree is a YAML file. `bt-actions check` finds what is wrong with it before a robot moves,
+`bt-actions format` puts it in canonical form, and `bt-actions schema` prints a JSON Schema for
+completion in editors. The files on this page are in [examples/](../examples).
+
+@fetch
+
+## Rules
+
+- A node is a mapping with **exactly one key that is a kind or the name of an action** that the tree
+  declares. The order of keys is free. For composites, decorators and actions the kind's value is
+  the node's name; it holds no colon. For the others it is what they do, and `name:` is optional.
+- `timeout` and `retry` are settings of an action, and kinds only beside `child:`.
+- Unknown keys, keys that are there twice and values of the wrong form are errors.
+- Scalars are those of YAML 1.2: `on` and `yes` are texts. Files are read with libyaml, which
+  PyYAML's wheels hold.
+- Durations carry a unit ({", ".join(f"`{unit}`" for unit in DURATION_UNITS)}); a bare number is
+  seconds. Where a limit can be left out, `none` says so.
+
+## Values
+
+| written | means |
+|---|---|
+| `$name`, `$name.field.0` | the value, with its type |
+| `Part $(name)` | a text with the value in it |
+| `= $a + 1` | computed when it is needed |
+| `$$` | a dollar sign |
+| `"@points.yaml"` | what the file holds, beside the tree: for large values (.yaml, .yml, .json) |
+
+A tree sees only its own names: inputs, outputs, topics, and what its nodes `save`, `set` or loop
+over. A subtree gets what `with` passes and gives back outputs by `save`. A variable that has no
+value yet makes a goal INVALID_GOAL and a check FAILURE, and says so.
+
+Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, `int8` to `int64`,
+`uint8` to `uint64`, any `package/msg/Name`, and lists of them: `float64[]`, `float64[3]`,
+`float64[<=3]`. A whole number is a fine float; a fraction is no whole number.
+
+Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
+`abs`, `min` and `max`, and `true` and `false`. In `expect`, `save` and `when` the bare name
+`result` is the result; in `until` and `save` of `wait_for_message`, `message` is the message.
+
+In the fields of a message:
+
+| field | may be written |
+|---|---|
+| builtin_interfaces/Time | `now`, seconds, or `{{sec, nanosec}}` |
+| builtin_interfaces/Duration | `500 ms`, seconds, or `{{sec, nanosec}}` |
+| geometry_msgs/Quaternion | `{{yaw: 90 deg}}`, with `roll` and `pitch`, or `{{x, y, z, w}}` |
+| a number with constants | `STATUS_MOVING`, `MoveRobot.Feedback.STATUS_MOVING`, `pkg/msg/X.NAME` |
+
+@messages
+
+## Silencing a warning
+
+`# bt: ignore[BT301] why`, on the line, or alone on a line above it. Errors cannot be silenced. The
+rules are in [rules.md](rules.md), and `bt-actions explain BT301` prints one.
+
+"""
+ALIAS_HEAD = """\
+### An action by its name
+
+The key is a name under `actions`, its value the node's name.
+
+```yaml
+%s
+```
+"""
+ALIAS_EXAMPLE = "move: To the part\ngoal: {distance: 2.0}\nretry: 3"
+IMPORT = "`actions`, `topics` and `defaults` from files beside this one, or installed ones."
+DEFAULTS = """\
+`timeout`, `retry` and `busy` for all actions. They merge key by key, and the nearest wins: the
+node's own, the action's under `actions`, the tree's `defaults`, those that it imports."""
+NAMESPACE = """\
+Names of actions, services and topics are relative where they begin without a slash. Before one go
+the namespaces of the node, of the trees and subtrees around it, and its own."""
+TITLES = {
+    Group.COMPOSITE: "Composites",
+    Group.DECORATOR: "Decorators",
+    Group.LEAF: "Leaves",
+}
+
+
+def table(keys: Iterable[Key]) -> list[str]:
+    """A table of keys."""
+    lines = ["| key | value | meaning | default |", "|---|---|---|---|"]
+    for key in keys:
+        words = key.shape.words.rstrip(",").replace("|", "\\|")
+        default = "**required**" if key.required else (key.default or "")
+        lines.append(f"| `{key.name}` | {words} | {key.doc} | {default} |")
+    return [*lines, ""]
+
+
+def example(name: str) -> str:
+    """A tree in examples/, which a test runs."""
+    text = (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
+    return f"```yaml\n{text}```"
+
+
+def record(title: str, text: str, shape: Record) -> list[str]:
+    """A section about a mapping that stands in several places."""
+    return [f"### {title}", "", text, "", *table(shape.keys.values())]
+
+
+def part(title: str, text: str, *names: str) -> list[str]:
+    """A section about a part of a file, with examples."""
+    return [f"### {title}", "", text, "", *(line for name in names for line in (example(name), ""))]
+
+
+def section(kind: Kind) -> list[str]:
+    """The section of a kind."""
+    value = "the node's name" if kind.named_by_value else kind.value.words.rstrip(",")
+    return [
+        f"### `{kind.name}`", "", kind.doc, "", f"`{kind.name}:` is {value}.", "",
+        "```yaml", kind.example, "```", "", *(table(kind.keys.values()) if kind.keys else []),
+    ]  # fmt: skip
+
+
+def yaml_page() -> str:
+    """docs/yaml.md."""
+    head = re.sub(
+        r"^@(\w+)$", lambda match: example(match[1]), HEAD.rstrip("\n"), flags=re.MULTILINE
+    )
+    lines = [head, "", "## The file", "", *table(TOP_KEYS.values())]
+    lines += record("`inputs`", "Each is a mapping, or just its type.", INPUT)
+    lines += record("`outputs`", "Each is a mapping, or just its type.", OUTPUT)
+    lines += record(
+        "`actions`",
+        "Settings merge key by key: `defaults`, then the action's here, then the node's.", ALIAS,
+    )  # fmt: skip
+    lines += record("`topics`", "The latest message of a topic, read as a variable.", TOPIC)
+    lines += [example("topics"), ""]
+    lines += part("`import`", IMPORT, "words", "imports")
+    lines += part("`defaults`", DEFAULTS, "defaults")
+    lines += part("`namespace`", NAMESPACE, "namespaces")
+    lines += record("`timeout` of an action", "`30 s` is short for `{result: 30 s}`.", TIMEOUT)
+    lines += record("`retry` of an action", "`3` is short for `{attempts: 3}`.", RETRY)
+    text = "`5 s` is short for `{response: 5 s}`."
+    lines += record("`timeout` of a service", text, SERVICE_TIMEOUT)
+    for group, title in TITLES.items():
+        lines += [f"## {title}", ""]
+        if group is Group.LEAF:
+            lines += [*(ALIAS_HEAD % ALIAS_EXAMPLE).split("\n"), *table(ACTION_KEYS.values())]
+        for kind in KINDS.values():
+            if kind.group is group:
+                lines += section(kind)
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def rules_page() -> str:
+    """docs/rules.md."""
+    lines = [
+        "# The rules of `bt-actions check`", "",
+        "<!-- Made by scripts/yaml_doc.py from bt_actions/document/pages.py. Do not edit. -->", "",
+        "| code | | |", "|---|---|---|",
+        *(f"| [{rule.code}](#{rule.code.lower()}) | {rule.severity} | {rule.title} |"
+          for rule in RULES.values()), "",
+    ]  # fmt: skip
+    for code, page in PAGES.items():
+        rule = RULES[code]
+        lines += [f"## {code}", "", f"*{rule.severity}*: {rule.title}", "", page.text, ""]
+        for word, example in (("Wrong", page.wrong), ("Right", page.right)):
+            if example:
+                lines += [f"{word}:", "", "```yaml", example.rstrip("\n"), "```", ""]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+PAGES_BY_PATH = {DOCS / "yaml.md": yaml_page, DOCS / "rules.md": rules_page}
+
+
+def main() -> int:
+    """Write the pages, or check them."""
+    stale = False
+    for path, make in PAGES_BY_PATH.items():
+        if "--check" in sys.argv[1:]:
+            if not path.is_file() or path.read_text(encoding="utf-8") != make():
+                print(f"{path} is stale: run `python scripts/yaml_doc.py`", file=sys.stderr)
+                stale = True
+        else:
+            path.write_text(make(), encoding="utf-8")
+    return 1 if stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

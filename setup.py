@@ -1,0 +1,22 @@
+"""What setup.cfg cannot say in a way that colcon understands; all other metadata is there."""
+
+from pathlib import Path
+
+from setuptools import Distribution, setup
+
+SHARE = "share/bt_actions"
+TREES = sorted(map(str, Path("trees").rglob("*.y*ml")))
+
+# setuptools leaves data files out of an editable install, because it asks the distribution for
+# `has_data` (command/editable_wheel.py, _run_install), a name that only this line gives it.
+Distribution.has_data = Distribution.has_data_files
+
+setup(
+    # In setup.cfg it becomes an object that colcon-python-setup-py cannot read back.
+    python_requires=">=3.11,<3.13",
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/bt_actions"]),
+        (SHARE, ["package.xml"]),
+        *((f"{SHARE}/{Path(tree).parent}", [tree]) for tree in TREES),
+    ],
+)

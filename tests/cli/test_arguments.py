@@ -1,0 +1,145 @@
+"""What the command line takes, and how it says no. No process, no ROS."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bt_actions import cli
+from bt_actions.cli.common import BadInput
+from bt_actions.cli.values import goal_fields, nested, value
+
+CHECKOUT = Path(__file__).parents[2]
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Call `bt-actions`; return the one line of its refusal."""
+    try:
+        code = cli.main(arguments)
+    except SystemExit as error:
+        code = int(error.code or 0)
+    said = capsys.readouterr()
+    assert code == 2
+    assert said.out == ""
+    assert said.err.count("\n") == 1, said.err
+    return said.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["rum"], "no command 'rum'; did you mean 'run'?"),
+        (["xyzzy"], "no command 'xyzzy'; there are run, send"),
+        (["run", "t", "--tiemout", "3"], "no option --tiemout; did you mean '--timeout'?"),
+        (["run", "t", "--time=3"], "no option --time; did you mean '--timeout'?"),
+        (["run", "t", "u"], "unexpected argument 'u'"),
+        (["run"], "the following arguments are required: TREE"),
+        (["run", "t", "--timeout", "0"], "'0' is no positive number of seconds"),
+        (["run", "t", "--timeout", "inf"], "'inf' is no positive number of seconds"),
+        (["run", "t", "--executor", "both"], "invalid choice: 'both'"),
+        (["run", "t", "--namespace", "r-1"], "'r-1' is no ROS namespace"),
+        (["run", "t", "--set", "x"], "--set 'x': expected name=value"),
+        (["run", "pick_and_place", "--set", "pick_at=[1"], "--set pick_at=[1"),
+        (["run", "pick_and_place", "--set", "pick_at=far"], "--set pick_at=far"),
+        (["run", "pick_and_place", "--set", "pick=1"], "has no input 'pick'"),
+        (["run", "no_such_tree"], "there is no tree 'no_such_tree'"),
+        (["run", "t", "--speed", "2"], "--speed is about the simulation; it needs --sim"),
+        (["run", "t", "--fault", "a:1:abort"], "--fault is about the simulation"),
+        (["run", "t", "--check-part", "5"], "--check-part is about the simulation"),
+        (["run", "t", "--sim", "--fault", "nonsense"], "--fault"),
+        (["render", "t", "-o", "t.pdf"], "t.pdf: cannot tell the format"),
+        (["send", "a", "NoSuchAction"], "no installed package has an action 'NoSuchAction'"),
+        (["send", "a", "MoveRobot", "distnce=1"], "no field 'distnce'; did you mean 'distance'?"),
+        (["send", "a", "MoveRobot", "distance=far"], "distance"),
+        (["send", "a", "MoveRobot", "distance"], "field 'distance': expected name=value"),
+        (["completion", "tcsh"], "invalid choice: 'tcsh'"),
+        (["--nonsense"], "--nonsense"),
+    ],
+)
+def test_a_wrong_argument_is_refused_on_one_line_that_says_what_is_meant(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert message in refused(capsys, *arguments)
+
+
+def test_without_arguments_the_help_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 2
+    assert "commands:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", sorted(cli.COMMANDS))
+def test_each_command_has_a_help_text_with_an_example(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main([command, "--help"])
+    assert exit_.value.code == 0
+    assert f"  bt-actions {command}" in capsys.readouterr().out
+
+
+def test_the_version_is_the_package_s(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(["--version"])
+    assert exit_.value.code == 0
+    assert capsys.readouterr().out.startswith("bt-actions 0.")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["completion", "bash"]])
+def test_help_and_completion_load_nothing_slow(arguments: list[str]) -> None:
+    code = (
+        "import sys\n"
+        "from bt_actions.cli import main\n"
+        "try: main(sys.argv[1:])\n"
+        "except SystemExit: pass\n"
+        "slow = {'rclpy', 'rich', 'pygraphviz'} & set(sys.modules)\n"
+        "sys.exit(f'loaded {slow}' if slow else 0)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=CHECKOUT
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1", 1),
+        ("2.5", 2.5),
+        ("-1e3", -1000.0),
+        ("true", True),
+        ("yes", "yes"),
+        ("on", "on"),
+        ("null", None),
+        ("", ""),
+        ("to the shelf", "to the shelf"),
+        ("hello: world # 1", "hello: world # 1"),
+        ("[1, 2.5, x]", [1, 2.5, "x"]),
+        ("{x: 1, y: [true]}", {"x": 1, "y": [True]}),
+        ("'1'", "1"),
+        ('"a b"', "a b"),
+        ("a=b", "a=b"),
+        ("&x", "&x"),
+    ],
+)
+def test_a_value_is_read_as_a_tree_file_has_it(text: str, expected: object) -> None:
+    read = value(text, "field")
+    assert read == expected
+    assert type(read) is type(expected)
+
+
+def test_of_two_values_for_one_field_the_last_counts() -> None:
+    assert goal_fields(["a=1", "a=2", "b=x=y"]) == {"a": 2, "b": "x=y"}
+
+
+def test_dotted_fields_become_nested_ones() -> None:
+    given = {"pose.position.x": 1.0, "pose.position.y": 2.0, "name": "a"}
+    assert nested(given) == {"pose": {"position": {"x": 1.0, "y": 2.0}}, "name": "a"}
+
+
+@pytest.mark.parametrize("given", [{"a": 1, "a.b": 2}, {"a.b": 2, "a": 1}])
+def test_a_field_cannot_have_a_value_and_parts(given: dict[str, object]) -> None:
+    with pytest.raises(BadInput, match="field"):
+        nested(given)

@@ -1,0 +1,194 @@
+"""What ends a run from outside, and the exit code: real signals, a runner that plays a script."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import threading
+from collections.abc import Iterator
+
+import pytest
+from py_trees.common import Status
+
+from bt_actions.cli.common import Exit
+from bt_actions.cli.drive import SAME_WISH, Drive, Ended
+from bt_actions.cli.report import Report
+from bt_actions.cli.signals import Signals
+from bt_actions.cli.views import LineView
+from bt_actions.cli.words import Closing
+from bt_actions.events import Event
+from bt_actions.policy import End, Outcome
+from bt_actions.runner import GoalReport
+from tests.cli.fakes import FakeAction, FakeRunner, Story
+
+
+class Run:
+    """One drive over a fake runner, and what was written."""
+
+    def __init__(self, runner: FakeRunner, timeout: float | None = None) -> None:
+        self.leaf = FakeAction("Move")
+        self.report = Report(self.leaf)
+        self.out = io.StringIO()
+        self.runner = runner
+        self.timeout = timeout
+        self.code: Exit | None = None
+
+    def go(self, *kicks: object) -> Ended:
+        with Signals() as signals:
+            drive = Drive(
+                self.runner,
+                self.report,
+                LineView(self.report, self.out),
+                signals,
+                timeout=self.timeout,
+            )
+            ended = drive.run()
+            self.code = drive.finish(Closing(ended.code, ended.cause))
+        return ended
+
+
+@pytest.fixture
+def story() -> Story:
+    return Story()
+
+
+def executing(run: Run, story: Story) -> list[Event]:
+    return [story.start(), story.goal(run.leaf, "EXECUTING")]
+
+
+def canceled(run: Run, story: Story) -> list[Event]:
+    done = story.goal(run.leaf, "DONE", outcome=Outcome.CANCELED, end=End.CANCELED)
+    return [done, story.finish(Status.INVALID)]
+
+
+@pytest.mark.parametrize(
+    ("status", "code"), [(Status.SUCCESS, Exit.SUCCESS), (Status.FAILURE, Exit.FAILURE)]
+)
+def test_the_status_of_the_tree_is_the_exit_code(status: Status, code: Exit, story: Story) -> None:
+    assert Run(FakeRunner([story.start(), story.finish(status)])).go().code is code
+
+
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [
+        (signal.SIGINT, Exit.SIGINT),
+        (signal.SIGTERM, Exit.SIGTERM),
+        (signal.SIGHUP, Exit.SIGHUP),
+    ],
+)
+def test_a_signal_interrupts_and_the_drained_run_has_its_code(
+    number: signal.Signals, code: Exit, story: Story
+) -> None:
+    run = Run(FakeRunner(waits=True))
+    run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
+    kill_when(run.runner.playing, number)
+    ended = run.go()
+    assert (ended.code, ended.abandoned) == (code, False)
+    assert run.runner.interrupted.is_set()
+    assert f"interrupted by {number.name}: canceling 1 goal; Ctrl-C again" in run.out.getvalue()
+    assert f"STOPPED after 1.50 s, interrupted by {number.name}" in run.out.getvalue()
+
+
+def kill_when(event: threading.Event, number: signal.Signals) -> None:
+    def kill() -> None:
+        event.wait()
+        os.kill(os.getpid(), number)
+
+    threading.Thread(target=kill, daemon=True).start()
+
+
+def test_the_handlers_of_before_are_back_after_a_run(story: Story) -> None:
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    Run(FakeRunner([story.finish(Status.SUCCESS)])).go()
+    after = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    assert after == before
+
+
+@pytest.fixture
+def ignored_hangup() -> Iterator[None]:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("ignored_hangup")
+def test_under_nohup_a_hangup_stays_ignored() -> None:
+    with Signals() as signals:
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert signals.wait(0.0) == ([], set())
+
+
+def test_the_timeout_interrupts_with_124(story: Story) -> None:
+    run = Run(FakeRunner(waits=True), timeout=0.05)
+    run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
+    assert run.go().code is Exit.TIMEOUT
+    assert "--timeout 0.05 s expired: canceling 1 goal" in run.out.getvalue()
+
+
+def test_a_goal_whose_end_is_unknown_wins_over_every_other_code(story: Story) -> None:
+    lost = GoalReport("Move", "/move_robot", "0123456789abcdef", Outcome.CANCELED, "no answer")
+    for waits, timeout in ((False, None), (True, 0.05)):
+        run = Run(FakeRunner(waits=waits, unaccounted=[lost]), timeout=timeout)
+        run.runner.after = [story.finish(Status.SUCCESS)]
+        assert run.go().code is Exit.UNKNOWN
+        last = run.out.getvalue().splitlines()[-1]
+        assert last == "not accounted for: Move on /move_robot, goal 0123456789abcdef: no answer"
+
+
+def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
+    story: Story,
+) -> None:
+    run = Run(FakeRunner(waits=True, never_drains=True))
+    run.runner.before = executing(run, story)
+    stop = threading.Event()
+
+    def keep_killing() -> None:  # as an impatient user does
+        run.runner.playing.wait()
+        while not stop.wait(SAME_WISH / 2):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    impatient = threading.Thread(target=keep_killing)
+    impatient.start()
+    with Signals():  # so that a signal after the end does not hit the test
+        ended = run.go()
+        stop.set()
+        impatient.join()
+    run.runner.released.set()
+    assert (ended.code, ended.abandoned) == (Exit.UNKNOWN, True)
+    assert run.out.getvalue().splitlines()[-1] == (
+        "not accounted for: Move on move_robot, executing when left"
+    )
+    assert "  CANCELED, end UNKNOWN  " in run.out.getvalue()
+
+
+def test_one_wish_that_arrives_twice_is_one_wish(story: Story) -> None:
+    run = Run(FakeRunner(waits=True))
+    run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
+    kill_when(run.runner.playing, signal.SIGINT)
+    kill_when(run.runner.interrupted, signal.SIGINT)  # as a wrapper passes it on
+    assert not run.go().abandoned
+
+
+def test_an_exception_in_the_tree_is_a_failure_and_is_handed_back(story: Story) -> None:
+    error = RuntimeError("a bug")
+    ended = Run(FakeRunner([story.start()], error=error)).go()
+    assert (ended.code, ended.error) == (Exit.FAILURE, error)
+
+
+def test_a_view_that_fails_is_given_up_and_the_run_goes_on(
+    story: Story, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class FullDisk(io.StringIO):
+        def write(self, text: str) -> int:
+            raise OSError(28, "No space left on device")
+
+    run = Run(FakeRunner())
+    run.out = FullDisk()
+    run.runner.before = [*executing(run, story), story.finish(Status.SUCCESS)]
+    ended = run.go()
+    assert ended.code is Exit.SUCCESS
+    assert run.code is Exit.FAILURE, "a success that nobody could be told is none"
+    said = capsys.readouterr().err
+    assert said.count("nothing more can be shown") == 1
+    assert "No space left on device" in said

@@ -1,0 +1,207 @@
+"""The report: what became of each action, and whose failure made the tree fail."""
+
+from __future__ import annotations
+
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Failure
+from py_trees.common import Status
+from py_trees.composites import Selector, Sequence
+from py_trees.decorators import Inverter
+
+from bt_actions.cli.report import Report, Row, summary, table
+from bt_actions.cli.words import goal_text
+from bt_actions.document import Place
+from bt_actions.events import Event
+from bt_actions.policy import End, Outcome
+from tests.cli.fakes import FakeAction, Story
+
+
+@pytest.fixture
+def leaf() -> FakeAction:
+    return FakeAction("Move")
+
+
+@pytest.fixture
+def story() -> Story:
+    return Story(step=1.0)
+
+
+def told(root: Behaviour, *events: Event) -> Report:
+    report = Report(root)
+    for event in events:
+        report.observe(event)
+    return report
+
+
+def row_of(leaf: FakeAction, *events: Event) -> Row:
+    return told(leaf, *events).row(leaf)
+
+
+def test_attempts_are_counted_over_the_retries_of_a_visit(leaf: FakeAction, story: Story) -> None:
+    row = row_of(
+        leaf,
+        story.goal(leaf, "EXECUTING"),
+        story.goal(leaf, "DONE", outcome=Outcome.ABORTED, end=End.ABORTED, reason="a fault"),
+        story.goal(leaf, "EXECUTING", attempt=2),
+        story.goal(leaf, "DONE", attempt=2, outcome=Outcome.SUCCEEDED, end=End.SUCCEEDED),
+    )
+    assert (row.attempts, row.outcome, row.end, row.reason) == (
+        2,
+        Outcome.SUCCEEDED,
+        End.SUCCEEDED,
+        "",
+    )
+    assert row.duration == pytest.approx(3.0)
+
+
+def test_a_leaf_that_is_visited_again_adds_to_its_row(leaf: FakeAction, story: Story) -> None:
+    report = Report(leaf)
+    for visit in (1, 2, 3):
+        report.observe(story.goal(leaf, "SENDING", visit=visit))
+        report.observe(story.goal(leaf, "DONE", visit=visit, outcome=Outcome.SUCCEEDED))
+    assert [(row.attempts, row.visits) for row in report.rows] == [(3, 3)]
+    assert table(report)[1].split()[-6:-3] == ["3", "in", "3"], "which is no retry"
+    assert goal_text(report.rows[0]) == "SUCCEEDED"
+    assert report.rows[0].duration == pytest.approx(3.0)
+
+
+def test_an_end_that_nobody_waited_for_is_told(leaf: FakeAction, story: Story) -> None:
+    canceled = {"outcome": Outcome.CANCELED, "end": End.SUCCEEDED}
+    row = row_of(leaf, story.goal(leaf, "EXECUTING"), story.goal(leaf, "DONE", **canceled))
+    assert row.verdict == "CANCELED, end SUCCEEDED"
+
+
+def test_a_goal_that_was_not_sent_is_not_live(leaf: FakeAction, story: Story) -> None:
+    assert not row_of(leaf, story.goal(leaf, "WAITING_FOR_SERVER")).live
+    assert row_of(leaf, story.goal(leaf, "SENDING")).live
+
+
+def test_what_is_left_without_waiting_keeps_its_duration(leaf: FakeAction, story: Story) -> None:
+    row = row_of(leaf, story.goal(leaf, "SENDING"), story.goal(leaf, "EXECUTING"))
+    row.leave(row.begun + 7.0)
+    assert row.duration == pytest.approx(7.0)
+
+
+def test_late_news_of_an_older_goal_leave_the_newer_one_alone(
+    leaf: FakeAction, story: Story
+) -> None:
+    report = told(
+        leaf,
+        story.goal(leaf, "EXECUTING", visit=1),
+        story.goal(leaf, "CANCELING", visit=1, outcome=Outcome.CANCELED),
+        story.goal(leaf, "EXECUTING", visit=2),
+        story.goal(leaf, "CANCELING", visit=1, outcome=Outcome.CANCELED, end=End.UNKNOWN),
+    )
+    row = report.rows[0]
+    assert (row.attempts, row.visits, row.state, row.outcome) == (2, 2, "EXECUTING", None)
+    report.observe(story.goal(leaf, "DONE", visit=2, outcome=Outcome.SUCCEEDED))
+    assert row.live, "the older goal is still being canceled"
+    report.observe(story.goal(leaf, "DONE", visit=1, outcome=Outcome.CANCELED, end=End.CANCELED))
+    assert not row.live
+    assert (row.attempts, row.outcome) == (2, Outcome.SUCCEEDED)
+
+
+def test_a_goal_that_is_still_canceling_is_live_though_its_leaf_has_an_outcome(
+    leaf: FakeAction, story: Story
+) -> None:
+    report = told(
+        leaf,
+        story.goal(leaf, "EXECUTING"),
+        story.goal(leaf, "CANCELING", outcome=Outcome.CANCELED, end=End.UNKNOWN),
+    )
+    assert report.live == report.rows
+    report.observe(story.goal(leaf, "DONE", outcome=Outcome.CANCELED, end=End.CANCELED))
+    assert report.live == []
+    assert report.rows[0].duration == pytest.approx(1.0)
+
+
+def test_a_goal_whose_server_is_gone_is_accounted_for(leaf: FakeAction, story: Story) -> None:
+    lost = Outcome.SERVER_LOST
+    report = told(leaf, story.goal(leaf, "CANCELING", outcome=lost, end=End.SERVER_GONE))
+    assert report.live == []
+
+
+def test_an_action_that_runs_has_a_duration_too(leaf: FakeAction, story: Story) -> None:
+    report = told(leaf, story.start(), story.goal(leaf, "EXECUTING"), story.goal(leaf, "CANCELING"))
+    assert report.seconds(report.rows[0]) == pytest.approx(1.0)
+
+
+def test_the_leaf_s_own_judgement_wins_over_the_server_s(leaf: FakeAction, story: Story) -> None:
+    leaf.outcome = Outcome.UNEXPECTED_RESULT  # type: ignore[attr-defined]
+    leaf.reason = "not held"  # type: ignore[attr-defined]
+    row = row_of(
+        leaf,
+        story.goal(leaf, "DONE", outcome=Outcome.SUCCEEDED, end=End.SUCCEEDED),
+        story.node(leaf, Status.FAILURE),
+    )
+    assert (row.outcome, row.reason) == (Outcome.UNEXPECTED_RESULT, "not held")
+
+
+def fail(story: Story, leaf: FakeAction, reason: str = "") -> list[Event]:
+    return [
+        story.goal(leaf, "EXECUTING"),
+        story.goal(leaf, "DONE", outcome=Outcome.ABORTED, end=End.ABORTED, reason=reason),
+        story.node(leaf, Status.FAILURE),
+    ]
+
+
+def test_the_summary_names_path_attempts_outcome_reason_and_place(story: Story) -> None:
+    leaf = FakeAction("Move")
+    leaf.place = Place("trees/x.yaml", 14, 9)  # type: ignore[attr-defined]
+    root = Sequence("Deliver", memory=True, children=[leaf])
+    report = told(
+        root,
+        *fail(story, leaf, "a fault"),
+        story.goal(leaf, "DONE", attempt=2, outcome=Outcome.ABORTED, reason="a fault"),
+        story.node(root, Status.FAILURE),
+        story.finish(Status.FAILURE),
+    )
+    assert summary(report) == [
+        "Deliver / Move",
+        "  ABORTED after 2 attempts: a fault",
+        "  trees/x.yaml:14:9",
+    ]
+
+
+def test_of_a_fallback_each_child_that_failed_is_named_and_of_a_sequence_only_the_one(
+    story: Story,
+) -> None:
+    first, second, never, last = (FakeAction(name) for name in ("a", "b", "c", "d"))
+    main = Sequence("main", memory=True, children=[first, second, never])
+    wrapped = Inverter("not", last)
+    end = Failure("not delivered")
+    root = Selector("root", memory=True, children=[main, wrapped, end])
+    report = told(
+        root,
+        *story.succeed(first),
+        *fail(story, second),
+        story.node(main, Status.FAILURE),
+        *story.succeed(last),
+        story.node(wrapped, Status.FAILURE),
+        story.node(end, Status.FAILURE),
+        story.node(root, Status.FAILURE),
+        story.finish(Status.FAILURE),
+    )
+    assert [culprit.path[-1] for culprit in report.culprits()] == ["b", "d", "not delivered"]
+
+
+def test_a_tree_that_succeeded_has_no_culprits_though_a_leaf_failed(story: Story) -> None:
+    leaf = FakeAction("a")
+    root = Selector("root", memory=True, children=[leaf])
+    assert told(root, *fail(story, leaf), story.finish(Status.SUCCESS)).culprits() == []
+
+
+def test_the_table_has_a_line_for_each_action_and_fits_the_width(story: Story) -> None:
+    leaves = [FakeAction("A name that is long " * 3, server="/r1/" + "x" * 30), FakeAction("b")]
+    root = Sequence("root", memory=True, children=list(leaves))
+    report = told(root, *story.succeed(leaves[0]), *story.succeed(leaves[1]))
+    assert len(table(report)) == 3
+    assert table(report)[2].split() == ["b", "move_robot", "1", "SUCCEEDED", "2.00", "s"]
+    for width in (40, 60, 80):
+        assert max(len(line) for line in table(report, width)) <= max(width, 55)
+
+
+def test_actions_that_were_never_tried_are_not_in_the_table(story: Story) -> None:
+    root = Sequence("root", memory=True, children=[FakeAction("never")])
+    assert table(told(root, story.start(), story.finish(Status.FAILURE))) == []

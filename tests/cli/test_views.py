@@ -1,0 +1,419 @@
+"""Lines, JSON and the live drawing, from scripted events; a terminal emulator is the judge."""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import Any
+
+import pyte
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Success
+from py_trees.common import Status
+from py_trees.composites import Selector, Sequence
+from rich.console import Console
+
+from bt_actions.cli.choosing import choose
+from bt_actions.cli.common import Exit
+from bt_actions.cli.live import LiveView, suits
+from bt_actions.cli.report import Report
+from bt_actions.cli.views import JsonView, LineView, View
+from bt_actions.cli.words import Closing, fields_text, result_lines
+from bt_actions.events import Event
+from bt_actions.policy import End, Outcome
+from tests.cli.fakes import FakeAction, FakeProgress, Story
+
+
+@pytest.fixture
+def story() -> Story:
+    return Story()
+
+
+@pytest.fixture
+def leaves() -> list[FakeAction]:
+    return [FakeAction(f"Step {number}") for number in range(10)]
+
+
+@pytest.fixture
+def root(leaves: list[FakeAction]) -> Behaviour:
+    """A fallback over a sequence of ten actions, and another leaf."""
+    work = Sequence("Work", memory=True, children=list(leaves))
+    return Selector("Deliver", memory=True, children=[work, Success("Recover")])
+
+
+def feed(report: Report, view: View, *events: Event) -> None:
+    for event in events:
+        report.observe(event)
+        view.event(event)
+
+
+# Lines
+
+
+class Lines:
+    """A LineView with a clock that only moves when it is told to."""
+
+    def __init__(self, root: Behaviour, *, verbose: bool = False) -> None:
+        self.report, self.out, self.now = Report(root), io.StringIO(), 0.0
+        self.view = LineView(self.report, self.out, verbose=verbose, clock=lambda: self.now)
+
+    def feed(self, *events: Event) -> None:
+        feed(self.report, self.view, *events)
+
+    @property
+    def said(self) -> list[str]:
+        """The lines so far, without their times."""
+        return [line[12:] for line in self.out.getvalue().splitlines()]
+
+
+def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_its_end(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    lines = Lines(root)
+    lines.feed(story.start(), story.node(root, Status.RUNNING), *story.succeed(leaves[0]))
+    lines.feed(story.node(leaves[1], Status.RUNNING))
+    for state in ("QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING", "EXECUTING"):
+        lines.feed(story.goal(leaves[1], state))
+    aborted = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": "a fault"}
+    lines.feed(story.goal(leaves[1], "DONE", **aborted))  # type: ignore[arg-type]
+    assert lines.out.getvalue().splitlines() == [
+        "    0.50 s  RUNNING  Deliver",
+        "    2.00 s  goal     Deliver / Work / Step 0: executing on move_robot",
+        "    3.00 s  SUCCESS  Deliver / Work / Step 0",
+        "    5.50 s  goal     Deliver / Work / Step 1: executing on move_robot",
+        "    6.50 s  goal     Deliver / Work / Step 1: ABORTED: a fault",
+    ]
+
+
+def test_what_one_tick_ended_comes_before_what_it_began(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    lines = Lines(root, verbose=True)
+    begun, ended = story.node(leaves[0], Status.RUNNING), story.node(leaves[0], Status.SUCCESS)
+    lines.feed(story.start(), begun, story.goal(leaves[0], "EXECUTING"))
+    lines.feed(story.goal(leaves[0], "DONE", outcome=Outcome.SUCCEEDED, end=End.SUCCEEDED))
+    lines.feed(story.goal(leaves[1], "SENDING"), story.goal(leaves[1], "EXECUTING"))
+    lines.feed(ended, story.node(leaves[1], Status.RUNNING))
+    assert lines.said == [
+        "goal     Deliver / Work / Step 0: executing on move_robot",
+        "SUCCESS  Deliver / Work / Step 0",
+        "goal     Deliver / Work / Step 1: sending a goal to move_robot",
+        "goal     Deliver / Work / Step 1: executing on move_robot",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        ("QUEUED", "waiting for its turn on"),
+        ("WAITING_FOR_SERVER", "waiting for the server"),
+        ("SENDING", "sending a goal to"),
+    ],
+)
+def test_a_goal_that_waits_gets_a_line_when_it_waits_for_a_second(
+    state: str, words: str, root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    lines = Lines(root)
+    lines.feed(story.start(), story.node(leaves[0], Status.RUNNING), story.goal(leaves[0], state))
+    for lines.now in (0.5, 0.9, 1.0, 5.0):
+        lines.view.frame()
+        assert len(lines.said) == (lines.now >= 1.0)
+    assert lines.said == [f"goal     Deliver / Work / Step 0: {words} move_robot"]
+
+
+def test_the_last_line_is_what_went_wrong(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    report, out = Report(root), io.StringIO()
+    view = LineView(report, out)
+    feed(report, view, story.start(), *story.succeed(leaves[0]), story.finish(Status.SUCCESS))
+    view.finish(Closing(Exit.FAILURE, verdict="It lies there.", complaint="It should lie here."))
+    assert out.getvalue().splitlines()[-7:] == [
+        "Step 0  move_robot         1  SUCCEEDED    1.00 s",
+        "",
+        "It lies there.",
+        "",
+        "SUCCESS after 3.00 s",
+        "",
+        "It should lie here.",
+    ]
+
+
+# JSON
+
+
+def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    report, out = Report(root), io.StringIO()
+    view = JsonView(report, out)
+    feed(report, view, story.start(), *story.succeed(leaves[0]), story.finish(Status.SUCCESS))
+    view.say("a note")
+    view.finish(Closing(Exit.SUCCESS))
+    objects: list[dict[str, Any]] = [json.loads(line) for line in out.getvalue().splitlines()]
+    kinds = [each["event"] for each in objects]
+    assert kinds == ["started", "node", "goal", "goal", "goal", "node", "note", "finished"]
+    last = objects[-1]
+    assert (last["status"], last["exit_code"]) == ("SUCCESS", 0)
+    action = last["actions"][0]
+    assert {key: action[key] for key in ("name", "server", "attempts", "outcome", "duration")} == {
+        "name": "Step 0",
+        "server": "move_robot",
+        "attempts": 1,
+        "outcome": "SUCCEEDED",
+        "duration": 1.0,
+    }
+
+
+# The live drawing
+
+
+class Screen:
+    """A console whose output a terminal emulator shows."""
+
+    def __init__(self, height: int, width: int = 80, encoding: str = "utf-8") -> None:
+        self.raw = io.BytesIO()
+        file = io.TextIOWrapper(self.raw, encoding=encoding, write_through=True)
+        self.console = Console(
+            file=file,
+            force_terminal=True,
+            color_system="standard",
+            width=width,
+            height=height,
+            legacy_windows=False,
+            _environ={"TERM": "xterm"},
+        )
+        self._width, self._height = width, height
+
+    def lines(self) -> list[str]:
+        """What stands on the screen, from the top, without empty lines at the end."""
+        screen = pyte.HistoryScreen(self._width, self._height, history=10_000)
+        stream = pyte.ByteStream(screen)
+        stream.feed(self.raw.getvalue().replace(b"\n", b"\r\n"))
+        above = ["".join(line[x].data for x in range(self._width)) for line in screen.history.top]
+        shown = [line.rstrip() for line in [*above, *screen.display]]
+        while shown and not shown[-1]:
+            shown.pop()
+        return shown
+
+
+@pytest.mark.parametrize("height", [1, 3, 6, 12, 24, 50])
+def test_the_live_part_stays_under_a_third_of_the_screen(
+    height: int, root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    screen = Screen(height)
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    feed(report, view, story.start(), story.node(root, Status.RUNNING))
+    feed(report, view, story.node(root.children[0], Status.RUNNING))
+    feed(report, view, story.node(leaves[4], Status.RUNNING), story.goal(leaves[4], "EXECUTING"))
+    view.frame()
+    drawn = screen.lines()
+    assert 1 <= len(drawn) <= max(1, height / 3)
+    if height >= 12:
+        assert any("Step 4" in line for line in drawn), "what runs is shown first"
+    view.close()
+
+
+def test_it_shows_what_an_action_does_its_attempt_its_feedback_and_the_time_left(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    screen = Screen(60, width=120)
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    leaves[2].shown = FakeProgress(
+        attempt=2, attempts=3, feedback=move_feedback(), seconds_left=4.2, deadline="result"
+    )
+    feed(report, view, story.start(), story.node(leaves[2], Status.RUNNING))
+    feed(report, view, story.goal(leaves[2], "EXECUTING", attempt=2))
+    view.frame()
+    doing = "executing, attempt 2 of 3, 4.2 s left for the result, current_pose 1.50, status MOVING"
+    assert [line.strip() for line in screen.lines() if "2  ex" in line] == [f"▶ Step 2  {doing}"]
+    view.close()
+
+
+def move_feedback() -> object:
+    from robot_control_interfaces.action import MoveRobot
+
+    return MoveRobot.Feedback(current_pose=1.5, status=MoveRobot.Feedback.STATUS_MOVING)
+
+
+def test_finished_work_scrolls_by_once_and_the_drawing_is_gone_at_the_end(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    screen = Screen(24)
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    feed(report, view, story.start(), story.node(root, Status.RUNNING))
+    for leaf in leaves:
+        for event in story.succeed(leaf):
+            feed(report, view, event)
+            view.frame()
+    feed(report, view, story.node(root, Status.SUCCESS), story.finish(Status.SUCCESS))
+    view.finish(Closing(Exit.SUCCESS))
+    lines = screen.lines()
+    for leaf in leaves:
+        assert lines.count(f"✓ {leaf.name}  move_robot  SUCCEEDED  1.00 s") == 1
+    assert not any("more node" in line or "Ctrl-C" in line for line in lines)
+    assert lines[-1].startswith("SUCCESS after")
+
+
+def test_a_check_that_succeeds_again_and_again_scrolls_by_once(
+    root: Behaviour, story: Story
+) -> None:
+    screen = Screen(24)
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    check = root.children[1]
+    for _ in range(50):
+        feed(report, view, story.node(check, Status.SUCCESS), story.node(check, Status.INVALID))
+    feed(report, view, story.node(check, Status.FAILURE))
+    view.close()
+    assert screen.lines() == ["✓ Recover", "✗ Recover"]
+
+
+def test_a_terminal_that_knows_only_ascii_gets_only_ascii(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    screen = Screen(18, encoding="ascii")
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    feed(report, view, story.start(), story.node(root, Status.RUNNING))
+    feed(report, view, *story.succeed(leaves[0]), story.node(leaves[1], Status.RUNNING))
+    view.frame()
+    view.finish(Closing(Exit.SUCCESS))
+    assert any(line.startswith("+ Step 0") for line in screen.lines())
+
+
+def test_no_line_is_wider_than_the_terminal(leaves: list[FakeAction], story: Story) -> None:
+    screen = Screen(30, width=30)
+    root = Sequence("A long name " * 9, memory=True, children=list(leaves))
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    feed(report, view, story.start(), story.node(root, Status.RUNNING))
+    view.frame()
+    assert len(screen.lines()) <= 10
+    view.close()
+
+
+@pytest.mark.parametrize("running", [0, 4, 9])
+def test_the_room_up_to_a_third_of_the_screen_is_used(
+    running: int, root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    screen = Screen(30)
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    feed(report, view, story.start())
+    for node in (root, root.children[0], leaves[running]):
+        feed(report, view, story.node(node, Status.RUNNING))
+    view.frame()
+    assert len(screen.lines()) == 9, screen.lines()
+    view.close()
+
+
+def test_a_tree_that_fits_into_a_third_of_the_screen_is_shown_whole(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    screen = Screen(46)
+    view = LiveView(Report(root), screen.console)
+    view.frame()
+    assert len(screen.lines()) == 1 + 13
+    view.close()
+
+
+@pytest.mark.parametrize("height", [12, 18, 24, 40])
+def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(
+    height: int, story: Story
+) -> None:
+    sides, moves = [], []
+    for side in ("left", "right"):
+        move = FakeAction("To the part that lies far away")
+        move.shown = FakeProgress(seconds_left=12.0, deadline="result", feedback=move_feedback())
+        work = Sequence("Pick and place", memory=True, children=[FakeAction("Open"), move])
+        deliver = Selector("Deliver the part", memory=True, children=[work, Success("Recover")])
+        sides.append(Sequence(f"The {side} robot", memory=True, children=[deliver]))
+        moves.append(move)
+    root = Sequence("Both robots deliver", memory=True, children=list(sides))
+    screen = Screen(height, width=40)
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    feed(report, view, story.start())
+    for move in moves:
+        node: Behaviour | None = move
+        while node is not None:
+            feed(report, view, story.node(node, Status.RUNNING))
+            node = node.parent
+        feed(report, view, story.goal(move, "EXECUTING"))
+    view.frame()
+    drawn = screen.lines()
+    assert len(drawn) <= height / 3
+    assert max(map(len, drawn)) < 40
+    assert " s  Ctrl-C cancels" in drawn[0]
+    if height >= 18:
+        left, right = (next(n for n, d in enumerate(drawn) if s in d) for s in ("left", "right"))
+        first, second = [n for n, line in enumerate(drawn) if "To the" in line]
+        assert left <= first < right <= second, drawn
+        assert drawn[first].endswith("…")
+        if height >= 24:
+            assert "12 s left" in drawn[first]
+    view.close()
+
+
+@pytest.mark.parametrize("stopping", [False, True])
+def test_the_progress_line_survives_at_40_columns(
+    stopping: bool, root: Behaviour, story: Story
+) -> None:
+    screen = Screen(24, width=40)
+    view = LiveView(Report(root), screen.console)
+    if stopping:
+        view.say("interrupted")
+    view.frame()
+    keys = "again leaves" if stopping else "cancels"
+    assert any(line.endswith(f"0.0 s  Ctrl-C {keys}") for line in screen.lines())
+    view.close()
+
+
+@pytest.mark.parametrize(
+    ("environment", "drawn"),
+    [({"TERM": "xterm"}, True), ({"TERM": "dumb"}, False), ({"TERM": "unknown"}, False)],
+)
+def test_a_dumb_terminal_is_not_drawn_on(environment: dict[str, str], drawn: bool) -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, _environ=environment)
+    assert suits(console) is drawn
+
+
+def test_choosing_what_to_show_costs_the_same_in_a_tree_of_100000_nodes() -> None:
+    work = Sequence("work", memory=True)
+    for number in range(100_000):
+        work.children.append(leaf := Success(str(number)))
+        leaf.parent = work
+    nodes = [work, *work.children]
+    position: dict[object, int] = {node.id: number for number, node in enumerate(nodes)}
+    shown, hidden = choose(nodes, position, [work, work.children[50_000]], 8)
+    assert [node.name for node in shown] == [
+        "work",
+        "50000",
+        "50001",
+        "50002",
+        "50003",
+        "50004",
+        "50005",
+    ]
+    assert hidden == len(nodes) - 7
+
+
+# Messages in words
+
+
+def test_a_message_in_words_shows_constants_by_name() -> None:
+    from robot_control_interfaces.action import Gripper, MoveRobot
+
+    result = MoveRobot.Result(final_pose=2.0, status=MoveRobot.Result.STATUS_FAULT, message="hot")
+    assert fields_text(result) == "final_pose 2.00, status FAULT, message hot"
+    assert fields_text(Gripper.Feedback(stalled=True)).startswith("position 0.00, stalled true")
+    assert "  status: 3  # FAULT" in result_lines(result)
+
+
+def test_without_a_result_there_are_no_lines() -> None:
+    assert result_lines(None) == []

@@ -1,0 +1,196 @@
+"""What tests with real rclpy share: a domain of their own, a node, and servers in other processes.
+
+Nothing of ROS is imported before a test asks for it, so the other tests stay fast.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import itertools
+import os
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from bt_actions.behaviours.action import ActionBehaviour
+    from tests.support.processes import Host, HostFactory, Journal, Process
+
+DOMAINS = range(70, 90)
+OUR_OWN = ("bt_actions-alarm", "bt_actions-log")
+"""Threads that outlive what they were started for, and end by themselves."""
+_names = itertools.count(1)
+
+
+@pytest.fixture(scope="session")
+def domain() -> Iterator[int]:
+    """A ROS domain that no other test worker on this machine uses at this time."""
+    with contextlib.ExitStack() as stack:
+        for number in DOMAINS:
+            path = Path(tempfile.gettempdir()) / f"bt_actions-test-domain-{number}"
+            claim = stack.enter_context(path.open("w"))
+            try:
+                fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            environment = {
+                "ROS_DOMAIN_ID": str(number),
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            }
+            before = {name: os.environ.get(name) for name in environment}
+            os.environ.update(environment)
+            yield number
+            for name, value in before.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value
+            return
+        raise RuntimeError("all ROS domains for tests are taken")
+
+
+@pytest.fixture(scope="session")
+def context(domain: int) -> Iterator[Any]:
+    """A context of the tests' own; it outlives them, because discovery takes its time."""
+    from rclpy.context import Context
+
+    context = Context()
+    context.init(domain_id=domain)
+    yield context
+    context.shutdown()
+
+
+@pytest.fixture(scope="session")
+def session_node(context: Any) -> Iterator[Any]:
+    """A node that nobody spins; TreeRunners borrow it."""
+    from rclpy.node import Node
+
+    node = Node("tests", context=context)
+    yield node
+    node.destroy_node()
+
+
+@pytest.fixture(scope="session")
+def session_host(
+    domain: int, session_node: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Host]:
+    """A process of servers that lives as long as the tests: never to be killed."""
+    from tests.support.processes import Host
+
+    host = Host(tmp_path_factory.mktemp("journals"))
+    yield host
+    host.close()
+
+
+@pytest.fixture
+def host(session_host: Host, no_leaks: None) -> Host:
+    """The shared process of servers."""
+    return session_host
+
+
+@pytest.fixture
+def node(session_node: Any, no_leaks: None) -> Any:
+    """The shared node."""
+    return session_node
+
+
+@pytest.fixture
+def new_host(domain: int, tmp_path: Path, no_leaks: None) -> Iterator[HostFactory]:
+    """Start processes of servers that may be killed; their leases are short unless asked for."""
+    from tests.support.processes import Host
+
+    hosts: list[Host] = []
+
+    def start(*, short_lease: bool = True) -> Host:
+        hosts.append(Host(tmp_path, short_lease=short_lease))
+        return hosts[-1]
+
+    yield start
+    for each in hosts:
+        each.close()
+
+
+@pytest.fixture
+def start_program(domain: int, no_leaks: None) -> Iterator[Callable[..., Process]]:
+    """Start a Python program as a process of its own."""
+    from tests.support.processes import Process
+
+    processes: list[Process] = []
+
+    def start(*arguments: str) -> Process:
+        processes.append(Process(arguments))
+        return processes[-1]
+
+    yield start
+    for each in processes:
+        each.close()
+
+
+@pytest.fixture
+def name() -> str:
+    """The name of an action that no other test uses."""
+    return f"/t{os.getpid()}_{next(_names)}/move"
+
+
+@pytest.fixture
+def serve(host: Host, name: str) -> Iterator[Callable[..., Journal]]:
+    """Open the server of this test, with faults; it is closed in the end."""
+    opened: list[str] = []
+
+    def serve(*faults: str, name: str = name, **script: Any) -> Journal:
+        opened.append(name)
+        return host.open(name, *faults, **script)
+
+    yield serve
+    for each in opened:
+        host.close_server(each)
+
+
+@pytest.fixture
+def no_leaks(domain: int) -> Iterator[None]:
+    """Fail a test that leaves a thread, an open goal or a resource behind.
+
+    Goals of servers that are gone stay open on purpose, in case the server returns.
+    """
+    from bt_actions.ros import alarm
+    from bt_actions.ros.line import Line
+    from bt_actions.ros.shared import resources_of
+    from tests.support.waiting import until
+
+    def open_goals() -> list[Any]:
+        lines = [line for line in alarm.minded() if isinstance(line, Line)]
+        goals = [ticket.goal for line in lines for ticket in list(line.goals.values())]
+        return [goal for goal in goals if not goal.lost]
+
+    def threads() -> set[threading.Thread]:
+        return {t for t in threading.enumerate() if t.name not in OUR_OWN}
+
+    before = threads()
+    yield
+    until(lambda: not open_goals(), 8.0, what="no goal is open any more")
+    until(lambda: not len(resources_of(domain)), what="no resource is held any more")
+    until(lambda: threads() <= before, what="no thread is left")
+
+
+@pytest.fixture(params=["multi", "single"])
+def executor(request: pytest.FixtureRequest) -> str:
+    """Both executors."""
+    return str(request.param)
+
+
+@pytest.fixture
+def run(node: Any) -> Callable[..., ActionBehaviour]:
+    """Run a tree on the shared node to its end; returns its root."""
+    from bt_actions import TreeRunner
+
+    def run(root: Any, *, executor: str = "multi", timeout: float = 15.0) -> Any:
+        with TreeRunner(root, node=node, executor=executor) as runner:
+            runner.run(timeout=timeout)
+        return root
+
+    return run

@@ -1,0 +1,253 @@
+"""`check`, `explain`, `schema` and `format` on the command line, and the forms of a report."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from bt_actions.cli import build_parser, main
+from bt_actions.document import check_source, source_of
+from bt_actions.document.model import KINDS, TOP_KEYS
+from bt_actions.document.reports import as_github, as_json, as_sarif, as_text
+from bt_actions.document.schema import json_schema
+
+WRONG = """\
+tree: t
+actions:
+  move: {type: robot_control_interfaces/action/MoveRobot, server: move_robot, timeout: 30 s}
+root:
+  sequence: S
+  children:
+    - move: A
+      goal: {distnace: 2.0}
+    - check: $x = 1
+"""
+TEXT = """\
+t.yaml:8:14: error[BT203]: MoveRobot.Goal has no field 'distnace'; did you mean 'distance'?
+ 8 |       goal: {distnace: 2.0}
+   |              ^^^^^^^^
+t.yaml:9:17: error[BT114]: '=' alone compares nothing: write '=='
+ 9 |     - check: $x = 1
+   |                 ^
+2 errors; `bt-actions explain CODE` says more
+"""
+
+
+def findings() -> list[Any]:
+    return list(check_source(source_of(WRONG.encode(), "t.yaml")))
+
+
+def test_the_text_reads_like_a_compiler_s() -> None:
+    assert as_text(findings()) == TEXT
+    assert as_text([]) == ""
+
+
+def test_json_is_a_list_of_objects() -> None:
+    first = json.loads(as_json(findings()))[0]
+    assert first == {
+        "file": "t.yaml", "line": 8, "column": 14, "end_line": 8, "end_column": 22,
+        "code": "BT203", "severity": "error",
+        "message": "MoveRobot.Goal has no field 'distnace'; did you mean 'distance'?",
+    }  # fmt: skip
+
+
+def test_github_gets_workflow_commands() -> None:
+    assert as_github(findings()[:1]) == (
+        "::error file=t.yaml,line=8,col=14,endLine=8,endColumn=22,title=BT203::"
+        "MoveRobot.Goal has no field 'distnace'; did you mean 'distance'?\n"
+    )
+
+
+def test_sarif_names_rule_level_and_region() -> None:
+    log = json.loads(as_sarif(findings()))
+    run = log["runs"][0]
+    assert log["version"] == "2.1.0"
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == ["BT114", "BT203"]
+    result = run["results"][0]
+    assert (result["ruleId"], result["ruleIndex"], result["level"]) == ("BT203", 1, "error")
+    assert result["locations"][0]["physicalLocation"] == {
+        "artifactLocation": {"uri": "t.yaml"},
+        "region": {"startLine": 8, "startColumn": 14, "endLine": 8, "endColumn": 22},
+    }
+
+
+@pytest.fixture
+def wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "t.yaml"
+    path.write_text(WRONG)
+    return path
+
+
+@pytest.mark.usefixtures("wrong")
+def test_check_exits_with_1_when_something_was_found(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "t.yaml"]) == 1
+    assert capsys.readouterr().out == TEXT
+
+
+def test_check_exits_with_0_when_all_is_well(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "pick_and_place", "recover"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_check_exits_with_2_when_a_file_cannot_be_read(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["check", "recover", "no_such.yaml"]) == 2
+    assert "no_such.yaml:1:1: error[BT100]: there is no" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["check", "run", "render", "format"])
+def test_without_libyaml_no_command_guesses_what_a_tree_says(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("yaml.__with_libyaml__", False)
+    assert main([command, "trees/recover.yaml"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("bt-actions: trees are read with libyaml, and PyYAML is installed")
+
+
+@pytest.mark.usefixtures("wrong")
+def test_check_tells_what_two_trees_share_only_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["check", "--format", "github", "t.yaml", "t.yaml"]) == 1
+    assert capsys.readouterr().out.count("::error") == 2
+
+
+class _Stdin:
+    def __init__(self, data: bytes) -> None:
+        self.buffer = io.BytesIO(data)
+
+
+def test_check_reads_standard_input(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", _Stdin(WRONG.encode()))
+    assert main(["check", "--no-types", "-"]) == 1
+    assert capsys.readouterr().out.startswith("<stdin>:9:17: error[BT114]")
+
+
+def test_explain_prints_a_page_or_the_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", "bt203"]) == 0
+    assert capsys.readouterr().out.startswith("BT203: a message has no such field (error)")
+    assert main(["explain"]) == 0
+    assert "BT301  warning  no result timeout\n" in capsys.readouterr().out
+    assert main(["explain", "BT2033"]) == 2
+    assert "no rule 'BT2033'; did you mean 'BT203'?" in capsys.readouterr().err
+
+
+def test_format_rewrites_files_and_check_changes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text("root: {success: A}\ntree: t\n")
+    assert main(["format", "--check", str(path)]) == 1
+    assert path.read_text() == "root: {success: A}\ntree: t\n"
+    assert main(["format", str(path)]) == 0
+    assert path.read_text() == "tree: t\nroot: {success: A}\n"
+    assert main(["format", "--check", str(path)]) == 0
+    assert "would change" in capsys.readouterr().err
+
+
+def test_format_leaves_alone_what_it_cannot_format(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text("root: [\n")
+    assert main(["format", str(path)]) == 2
+    assert "error[BT102]" in capsys.readouterr().err
+    assert path.read_text() == "root: [\n"
+
+
+def test_the_schema_is_made_of_the_model(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert schema == json_schema()
+    assert set(schema["anyOf"][0]["properties"]) == set(TOP_KEYS)
+    for name, kind in KINDS.items():
+        own = schema["$defs"][name]
+        assert set(own["properties"]) == {name, *kind.keys}
+        assert own["properties"][name]["description"]
+    references = set(_references(schema))
+    assert {ref.removeprefix("#/$defs/") for ref in references} <= set(schema["$defs"])
+
+
+def _references(value: object) -> list[str]:
+    if isinstance(value, dict):
+        own = [str(value["$ref"])] if "$ref" in value else []
+        return own + [ref for inner in value.values() for ref in _references(inner)]
+    if isinstance(value, list):
+        return [ref for inner in value for ref in _references(inner)]
+    return []
+
+
+def test_the_problem_matcher_in_the_repository_reads_what_check_writes() -> None:
+    path = Path(__file__).resolve().parents[2] / ".github" / "bt-actions-matcher.json"
+    pattern = json.loads(path.read_text())["problemMatcher"][0]["pattern"][0]
+    match = re.match(pattern["regexp"], TEXT.splitlines()[0])
+    assert match is not None
+    found = {name: match[number] for name, number in pattern.items() if name != "regexp"}
+    assert found == {
+        "file": "t.yaml", "line": "8", "column": "14", "severity": "error", "code": "BT203",
+        "message": "MoveRobot.Goal has no field 'distnace'; did you mean 'distance'?",
+    }  # fmt: skip
+
+
+def test_the_hooks_for_pre_commit_are_commands_that_exist() -> None:
+    path = Path(__file__).resolve().parents[2] / ".pre-commit-hooks.yaml"
+    for hook in yaml.safe_load(path.read_text()):
+        command, *arguments = hook["entry"].split()
+        assert command == "bt-actions"
+        build_parser().parse_args([*arguments, "tree.yaml"])
+
+
+@pytest.mark.parametrize(
+    ("code", "answer"),
+    [
+        ("BT999", "`bt-actions explain` lists them"),
+        ("xyz", "`bt-actions explain` lists them"),
+        ("203", "did you mean 'BT203'?"),
+    ],
+)
+def test_an_unknown_rule_suggests_nothing_unrelated(
+    code: str, answer: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["explain", code]) == 2
+    assert capsys.readouterr().err == f"bt-actions: there is no rule {code!r}; {answer}\n"
+
+
+def test_a_root_that_is_misspelt_is_one_error_that_names_it() -> None:
+    [finding] = check_source(source_of(b"tree: t\nrot: {success: A}\n", "t.yaml"))
+    assert finding.message == "unknown key 'rot'; did you mean 'root'?"
+    found = check_source(source_of(b"tree: t\nxyzzy: {success: A}\n", "t.yaml"))
+    assert any("root" in (finding.hint or "").split(", ") for finding in found)
+
+
+@pytest.mark.parametrize("width", [40, 80, 200])
+@pytest.mark.parametrize("before", [0, 30, 300])
+def test_a_long_source_line_is_cut_with_the_caret_under_what_is_meant(
+    width: int, before: int
+) -> None:
+    text = f"tree: t\nroot: {{success: '{'a' * before}', childen: {'b' * 500}}}\n"
+    found = check_source(source_of(text.encode(), "t.yaml"))
+    finding = next(finding for finding in found if finding.code == "BT107")
+    _, source, carets = finding.text(width).splitlines()[:3]
+    assert max(len(source), len(carets)) <= width
+    assert source[carets.index("^") : carets.rindex("^") + 1] == "childen"
+
+
+@pytest.mark.parametrize("name", ["a folder", "a device"])
+def test_the_place_of_what_is_no_file_stands_there_once(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path if name == "a folder" else Path("/dev/null")
+    assert main(["run", str(path)]) == 2
+    assert capsys.readouterr().err.count(f"{path}:1:1: error[BT100]: ") == 1

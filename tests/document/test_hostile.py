@@ -1,0 +1,212 @@
+"""Whatever the file holds: findings, in bounded time and memory, and no traceback."""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+import tracemalloc
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bt_actions.document import DocumentError, Finding, check_file, check_source, source_of
+from bt_actions.document.source import MAX_BYTES, MAX_ERRORS
+from tests.document.test_wrong_documents import CASES
+
+TREES = Path(__file__).parents[2] / "trees"
+
+
+def check_bytes(data: bytes) -> list[Finding]:
+    try:
+        return check_source(source_of(data, "tree.yaml"))
+    except DocumentError as error:
+        return list(error.findings)
+
+
+def only(findings: list[Finding]) -> str:
+    (finding,) = findings
+    return finding.headline()
+
+
+def test_a_directory_is_no_tree(tmp_path: Path) -> None:
+    assert only(check_file(tmp_path)).endswith(
+        ":1:1: error[BT100]: this is a directory, not a tree"
+    )
+
+
+def test_a_file_that_is_not_there_is_told_with_what_is_installed() -> None:
+    (finding,) = check_file("no_such_tree")
+    assert (finding.code, finding.file) == ("BT100", "no_such_tree")
+    assert finding.hint is not None
+    assert "pick_and_place" in finding.hint
+
+
+def test_a_device_is_no_tree() -> None:
+    assert "this is no regular file" in only(check_file("/dev/zero"))
+
+
+def test_a_huge_file_is_refused_without_being_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.yaml"
+    with path.open("wb") as stream:
+        os.truncate(stream.fileno(), 1024**3)  # sparse: takes no room on the disk
+    started = time.monotonic()
+    tracemalloc.start()
+    said = only(check_file(path))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert "this is larger than 32 MiB" in said
+    assert peak < 4 * MAX_BYTES
+    assert time.monotonic() - started < 5
+
+
+def test_what_is_no_utf_8_is_told_with_its_place() -> None:
+    assert only(check_bytes(b"tree: t\nroot: {success: \xff}\n")) == (
+        "tree.yaml:2:17: error[BT101]: byte 0xff is no UTF-8"
+    )
+
+
+def test_a_byte_order_mark_is_left_out() -> None:
+    assert check_bytes(b"\xef\xbb\xbftree: t\nroot: {success: A}\n") == []
+
+
+@pytest.mark.parametrize("char", ["\x00", "\x1b", "\ufffe", "\x7f"])
+def test_a_control_character_is_told_with_its_place(char: str) -> None:
+    text = f"tree: t\nroot: {{success: {char}}}\n"
+    assert only(check_bytes(text.encode())).startswith("tree.yaml:2:17: error[BT101]: the char")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 10_000,
+        "{a: " * 10_000,
+        "".join(" " * depth + "a:\n" for depth in range(3_000)),
+        "- " * 10_000,
+        "tree: t\nroot: " + "{invert: a, child: " * 10_000,
+    ],
+    ids=["lists", "mappings", "blocks", "dashes", "nodes"],
+)
+def test_ten_thousand_levels_of_nesting_are_one_finding(text: str) -> None:
+    assert "error[BT105]: nested deeper than 200 levels" in only(check_bytes(text.encode()))
+
+
+def test_the_deepest_tree_that_is_allowed_is_checked() -> None:
+    text = "tree: t\nroot: " + "{invert: a, child: " * 198 + "{success: A}" + "}" * 198 + "\n"
+    assert check_bytes(text.encode()) == []
+
+
+def test_a_billion_laughs_are_one_finding() -> None:
+    lines = ["a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]"]
+    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 12)]
+    started = time.monotonic()
+    assert "error[BT105]: this is, or unfolds to, more than 2,000,000 nodes" in only(
+        check_bytes("\n".join(lines).encode())
+    )
+    assert time.monotonic() - started < 5
+
+
+def test_a_text_of_very_many_nodes_is_one_finding() -> None:
+    text = "tree: t\nroot: [" + "1," * 2_100_000 + "]\n"
+    assert "error[BT105]: this is, or unfolds to, more than" in only(check_bytes(text.encode()))
+
+
+def test_trees_that_unfold_without_bound_are_one_finding(tmp_path: Path) -> None:
+    (tmp_path / "t0.yaml").write_text("tree: t0\nroot: {success: A}\n")
+    for n in range(1, 9):
+        child = f"    - {{subtree: t{n - 1}.yaml}}\n"
+        text = f"tree: t{n}\nroot:\n  sequence: S\n  children:\n{child * 9}"
+        (tmp_path / f"t{n}.yaml").write_text(text)
+    findings = check_file(tmp_path / "t8.yaml")
+    assert {finding.code for finding in findings} == {"BT105"}
+
+
+@pytest.mark.parametrize("line", [
+    "    - sucess{0}: A\n",
+    "    - {{success: A, nmae{0}: B}}\n",
+    "    - check: $variable{0} > 1\n",
+    "    - set: {{x{0}: = $y{0} + 1}}\n",
+])  # fmt: skip
+def test_a_document_full_of_errors_is_answered_in_bounded_time(line: str) -> None:
+    body = "".join(line.format(n) for n in range(5_000))
+    text = f"tree: t\nroot:\n  sequence: S\n  children:\n{body}"
+    started = time.monotonic()
+    findings = check_bytes(text.encode())
+    assert len(findings) == MAX_ERRORS
+    assert max(len(finding.hint or "") for finding in findings) < 300
+    assert time.monotonic() - started < 30
+
+
+def test_a_long_line_is_shown_cut() -> None:
+    (finding,) = check_bytes(b"tree: t\nroot: {success: A, x" + b"x" * 100_000 + b": 1}\n")
+    assert len(str(finding)) < 200_000
+    assert max(len(line) for line in str(finding).splitlines()[1:]) < 200
+
+
+def _words(findings: list[Finding]) -> None:
+    for finding in findings:
+        assert finding.line >= 1
+        assert finding.column >= 1
+        assert (finding.end_line, finding.end_column) > (finding.line, finding.column)
+        assert str(finding)
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.binary(max_size=60) | st.text(max_size=60).map(str.encode))
+def test_any_bytes_are_answered_with_findings(data: bytes) -> None:
+    _words(check_bytes(data))
+
+
+_PIECES = st.sampled_from(
+    ["tree: t\n", "root:\n", "  sequence: S\n", "  children:\n", "    - success: A\n", "    - ",
+     "inputs: {a: float64}\n", "  check: $a > 1\n", "{", "}", "[", "]", ": ", ", ", "&x ", "*x",
+     "<<: ", "$", "$a", "= ", "'", '"', "\n", "  ", "#", "!!int ", "| ", "\t", "---\n", "?", "ä",
+     "null", "1e999", ".nan", "- - ", "for_each: F\n", "in: [1]\n", "set: {a: 1}\n", "wait: 1 s\n"]
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=500)
+@given(st.lists(_PIECES, max_size=20).map("".join))
+def test_any_pieces_of_trees_are_answered_with_findings(text: str) -> None:
+    _words(check_bytes(text.encode()))
+
+
+def _mutated(text: str, chance: random.Random) -> str:
+    lines = text.splitlines(keepends=True)
+    for _ in range(chance.randint(1, 4)):
+        at = chance.randrange(len(lines)) if lines else 0
+        way = chance.randrange(6)
+        if not lines:
+            break
+        if way == 0:
+            del lines[at]
+        elif way == 1:
+            lines.insert(at, chance.choice(lines))
+        elif way == 2:
+            lines[at] = chance.choice(["  ", " ", "- ", "\t"]) + lines[at]
+        elif way == 3:
+            lines[at] = lines[at].lstrip()
+        else:
+            line = lines[at]
+            place = chance.randrange(len(line) + 1)
+            insert = chance.choice(
+                ["", "{", "}", ":", "$", "'", '"', "#", "[", "&a", "*a", "\n", "0"]
+            )
+            lines[at] = line[:place] + insert + line[place + (way == 5) :]
+    return "".join(lines)
+
+
+def test_mutated_trees_are_answered_with_findings() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in sorted(TREES.glob("*.yaml"))]
+    texts += [case.text for case in CASES]
+    seed = random.randrange(10**9)
+    chance = random.Random(seed)
+    until = time.monotonic() + 5
+    while time.monotonic() < until:
+        text = _mutated(chance.choice(texts), chance)
+        try:
+            _words(check_bytes(text.encode()))
+        except Exception as error:
+            raise AssertionError(f"seed {seed}: {error!r} for\n{text}") from error

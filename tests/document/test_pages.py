@@ -1,0 +1,41 @@
+"""Each rule has a page, and its examples are what they say."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from bt_actions.document import RULES, Severity, check_file
+from bt_actions.document.pages import PAGES, page
+
+NOT_SHOWN = {"BT100", "BT101"}
+"""What is wrong with a file, and not with its text."""
+
+
+def codes(folder: Path, name: str, text: str) -> dict[str, Severity]:
+    shutil.copy(Path(__file__).with_name("needs_input.yaml"), folder)
+    (folder / name).write_text(text, encoding="utf-8")
+    return {finding.code: finding.severity for finding in check_file(folder / name)}
+
+
+def test_each_rule_has_a_page_and_each_page_a_rule() -> None:
+    assert list(PAGES) == list(RULES)
+
+
+@pytest.mark.parametrize("code", sorted(set(PAGES) - NOT_SHOWN))
+def test_the_wrong_example_breaks_the_rule_and_no_other(code: str, tmp_path: Path) -> None:
+    assert set(codes(tmp_path, "wrong.yaml", PAGES[code].wrong)) == {code}
+
+
+@pytest.mark.parametrize("code", sorted(set(PAGES) - NOT_SHOWN))
+def test_the_right_example_is_clean(code: str, tmp_path: Path) -> None:
+    assert codes(tmp_path, "right.yaml", PAGES[code].right) == {}
+
+
+def test_a_page_shows_title_text_and_examples() -> None:
+    text = page("BT203")
+    assert text.startswith("BT203: a message has no such field (error)\n")
+    assert "    goal: {distnace: 2.0}" in text
+    assert "Right:" in text

@@ -1,0 +1,77 @@
+"""MoveRobot and Gripper in py_trees' own XML trees, by their ports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
+
+from bt_actions import Outcome, TreeRunner
+from bt_actions.behaviours.ports import GripperWithPorts, MoveRobotWithPorts
+
+XML = """\
+<root main_tree_to_execute="Fetch">
+  <BehaviorTree ID="Fetch">
+    <Sequence name="Fetch">
+      <Gripper name="Open" position="100.0" timeout="10"/>
+      <MoveRobot name="There" distance="2.0" final_pose="{at}" timeout="30.0" attempts="2"/>
+      <Gripper name="Grasp" position="0.0" timeout="10"/>
+      <MoveRobot name="Again" distance="{at}" timeout="30"/>
+    </Sequence>
+  </BehaviorTree>
+</root>
+"""
+
+
+def parse(folder: Path, text: str = XML) -> Behaviour:
+    path = folder / "tree.xml"
+    path.write_text(text)
+    return parse_behaviour_tree_xml(str(path))
+
+
+def test_the_tags_stand_for_our_leaves_with_their_settings(tmp_path: Path) -> None:
+    root = parse(tmp_path)
+    opened, there, _, _ = root.children
+    assert isinstance(opened, GripperWithPorts)
+    assert isinstance(there, MoveRobotWithPorts)
+    assert (opened.action_name, opened.timeouts.result) == ("gripper_control", 10.0)
+    assert (there.retry.attempts, there.timeouts.result) == (2, 30.0)
+
+
+def test_an_xml_tree_runs_and_passes_results_from_port_to_port(
+    tmp_path: Path, context: Any, no_leaks: None
+) -> None:
+    from rclpy.node import Node
+
+    from bt_actions.simulation.simulation import Simulation
+
+    root = parse(tmp_path)
+    node = Node("xml_trees", context=context, namespace=f"/x{id(root)}")
+    with Simulation(node, speed=30.0) as simulation, TreeRunner(root, node=node) as runner:
+        runner.run(timeout=30)
+        assert root.status is Status.SUCCESS
+        assert simulation.world().part.held_by is not None
+    again = root.children[3]
+    assert again.result.final_pose == pytest.approx(2.0, abs=0.02)  # type: ignore[attr-defined]
+    node.destroy_node()
+
+
+def test_a_port_without_data_makes_the_goal_invalid(
+    tmp_path: Path, context: Any, no_leaks: None
+) -> None:
+    from rclpy.node import Node
+
+    from bt_actions.simulation.simulation import Simulation
+
+    text = XML.replace('distance="2.0"', 'distance="{nowhere}"')
+    root = parse(tmp_path, text)
+    node = Node("xml_trees", context=context, namespace=f"/x{id(root)}")
+    with Simulation(node, speed=30.0), TreeRunner(root, node=node) as runner:
+        runner.run(timeout=30)
+    there = root.children[1]
+    assert there.outcome is Outcome.INVALID_GOAL  # type: ignore[attr-defined]
+    node.destroy_node()

@@ -1,0 +1,389 @@
+"""The rules that every history must keep, checked at each step from what is true in the world.
+
+A rule is broken with `Violation`, whose text is the rule. The judge changes nothing, and looks into
+no goal's private parts: what it needs of the past it writes down itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from bt_actions.goal import PATIENCE
+from bt_actions.goal_terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
+from bt_actions.policy import Busy, End, Outcome
+
+if TYPE_CHECKING:
+    from bt_actions.attempts import AttemptRecord
+    from tests.machine.callers import Caller, Leaf, Ticket
+    from tests.machine.world import Job
+
+JUST = 1e-6
+"""Seconds by which sums of floats may differ."""
+_CLAIMS = {
+    Outcome.SUCCEEDED: End.SUCCEEDED,
+    Outcome.ABORTED: End.ABORTED,
+    Outcome.CANCELED_BY_OTHER: End.CANCELED,
+}
+
+
+class Violation(AssertionError):
+    """A rule was broken."""
+
+
+class Before(NamedTuple):
+    """A goal before a step."""
+
+    state: State
+    outcome: Outcome | None
+    reason: str
+    accepted: bool
+    end: End
+    lost: bool
+
+
+@dataclass(eq=False, slots=True)
+class Ledger:
+    """What the judge has written down of one goal."""
+
+    since: float
+    """When its state began, steady clock."""
+    ros: float
+    forward: float = 0.0
+    """How far the node's clock has gone forward, as the goal saw it."""
+    begun_at: float = 0.0
+    heard_at: float = 0.0
+    """Values of `forward`: at acceptance, and at the last feedback."""
+    polled_at: float = 0.0
+    slow: float = 0.0
+    """The longest time between two polls: a caller that is slow makes deadlines late."""
+    sends: int = 0
+    releases: int = 0
+    cancels: int = 0
+    unwanted: bool = False
+    """Interrupted, or replaced, before it had an outcome."""
+    replaced: bool = False
+    refused: bool = False
+    denied: bool = False
+    """The last answer to a cancel request was: unknown goal."""
+    excuse: str = ""
+    """Why it may run beside another goal on its resource."""
+    crowded: bool = False
+    """Its request reached two live servers."""
+    jobs: tuple[Job, ...] = ()
+
+
+class Judge:
+    """Sees every step of a caller."""
+
+    caller: Caller
+
+    def begins(self, ticket: Ticket) -> None:
+        now = self.caller.world.now
+        ticket.ledger = Ledger(now.steady, now.ros, polled_at=now.steady)
+
+    def before(self, ticket: Ticket) -> Before:
+        goal, now = ticket.goal, self.caller.world.now
+        ledger = ticket.ledger
+        if now.ros > ledger.ros:
+            ledger.forward += now.ros - ledger.ros
+        ledger.ros = now.ros
+        return Before(goal.state, goal.outcome, goal.reason, goal.accepted, goal.end, goal.lost)
+
+    def after(
+        self,
+        ticket: Ticket,
+        before: Before,
+        event: Event | None,
+        detail: Any,
+        commands: tuple[Command, ...],
+    ) -> None:
+        goal, ledger = ticket.goal, ticket.ledger
+        now = self.caller.world.now
+        if goal.state is not before.state:
+            if event is None:
+                self._not_early(ticket, before.state)
+            elif event is Event.GRANTED:
+                self._in_turn(ticket)
+            ledger.since = now.steady
+        if goal.accepted and not before.accepted:
+            ledger.begun_at = ledger.heard_at = ledger.forward
+        if event is Event.FEEDBACK:
+            ledger.heard_at = ledger.forward
+        if before.outcome is None:
+            if event is Event.INTERRUPTED and before.state is not State.DONE:
+                ledger.unwanted = True
+            if event is Event.REPLACED and before.state is not State.QUEUED:
+                ledger.unwanted = ledger.replaced = True
+        if event is Event.REJECTED:
+            ledger.refused = True
+        if event is Event.CLOSED and before.state is not State.DONE:
+            ledger.excuse = ledger.excuse or "the process ended"
+        if goal.lost:
+            ledger.excuse = ledger.excuse or "its server was lost"
+        if event is Event.CANCEL_ANSWERED:
+            ledger.denied = detail == CANCEL_UNKNOWN_GOAL
+        if goal.end is End.NEVER_STARTED is not before.end and event is None:
+            self._hold(ledger.denied, "a suspect is judged when its server denies it, not sooner")
+            ledger.excuse = ledger.excuse or "it was judged never to have started"
+        self._commands(ticket, before, commands)
+        self._outcome(ticket, before)
+        self._deadlines_are_kept_in_mind(ticket)
+        if goal.accepted and not before.accepted and before.state is State.CANCELING:
+            self._hold(Command.CANCEL in commands, "what turns up unwanted is canceled at once")
+        if before.lost and not goal.lost and goal.live:
+            self._hold(Command.CANCEL in commands, "a lost goal that is back is canceled at once")
+
+    def _commands(self, ticket: Ticket, before: Before, commands: tuple[Command, ...]) -> None:
+        goal, ledger = ticket.goal, ticket.ledger
+        if before.state is State.DONE:
+            self._hold(not commands and goal.state is State.DONE, "nothing is sent after DONE")
+        for command in commands:
+            if command is Command.SEND:
+                ledger.sends += 1
+                waited = before.state is State.WAITING_FOR_SERVER
+                self._hold(waited and goal.holding, "a goal is sent only while it holds resources")
+            elif command is Command.RELEASE:
+                ledger.releases += 1
+                known = goal.end is not End.UNKNOWN or goal.state is State.DONE
+                self._hold(known, "the resource is kept until the end is known")
+            else:
+                self._hold(ledger.sends == 1, "only a goal that was sent is asked about")
+                ledger.cancels += command is Command.CANCEL
+        self._hold(ledger.sends <= 1, "a goal is sent once")
+        self._hold(ledger.releases <= 1, "resources are given back once")
+        if goal.state is State.DONE:
+            self._hold(ledger.releases == 1, "a goal that is DONE has given its resources back")
+            self._hold(goal.outcome is not None, "a goal that is DONE has an outcome")
+            self._hold(goal.due_in(self.caller.world.now) is None, "DONE waits for nothing")
+
+    def _outcome(self, ticket: Ticket, before: Before) -> None:
+        goal, ledger = ticket.goal, ticket.ledger
+        if before.outcome is not None:
+            same = goal.outcome is before.outcome and goal.reason == before.reason
+            self._hold(same, "an outcome is decided once")
+            return
+        if goal.outcome is None:
+            return
+        if ledger.unwanted:
+            self._hold(goal.outcome is Outcome.CANCELED, "what was given up ends as CANCELED")
+        if goal.outcome in (Outcome.ABORTED, Outcome.CANCELED_BY_OTHER):
+            self._hold(not self._preempted(ticket), "what a newer goal replaced ends as CANCELED")
+        if goal.outcome in _CLAIMS:
+            true = {job.status for job in ledger.jobs}
+            claimed = [status for status, end in ENDS.items() if end is _CLAIMS[goal.outcome]]
+            self._hold(claimed[0] in true, f"{goal.outcome} is what the server said")
+        if goal.outcome is Outcome.SERVER_LOST and goal.lost:
+            in_reach = [
+                job
+                for job in ledger.jobs
+                if job.live and job.server.shown and job.server.matched and not job.server.cut
+            ]
+            self._hold(ledger.crowded or not in_reach, "SERVER_LOST: the server is out of reach")
+        if goal.outcome is Outcome.CANCELED_BY_OTHER:
+            self._hold(not ledger.cancels, "CANCELED_BY_OTHER is what we did not ask for")
+        if goal.outcome is Outcome.REJECTED:
+            refused = ledger.refused and not before.accepted
+            self._hold(refused, "REJECTED is what the server said, and it had not accepted")
+
+    def _preempted(self, ticket: Ticket) -> bool:
+        """Whether a server has accepted a newer goal in place of this one, in truth."""
+        return any(
+            newer.goal.busy is Busy.REPLACE
+            and int(newer.goal.id) > int(ticket.goal.id)
+            and newer.goal.state in (State.SENDING, State.EXECUTING)
+            and newer.goal.resources & ticket.goal.resources
+            and newer.ledger.jobs
+            for newer in self.caller.tickets
+        )
+
+    def _deadlines_are_kept_in_mind(self, ticket: Ticket) -> None:
+        goal, limits, ledger = ticket.goal, ticket.goal.timeouts, ticket.ledger
+        if goal.state is State.DONE or goal.due_in(self.caller.world.now) is not None:
+            return
+        state = goal.state
+        if state is State.QUEUED:
+            excused = limits.queue is None
+        elif state is State.WAITING_FOR_SERVER:
+            excused = limits.server is None
+        elif state is State.SENDING:
+            excused = limits.accept is None
+        elif state is State.EXECUTING and ledger.replaced:
+            excused = limits.cancel is None
+        elif state is State.EXECUTING:
+            excused = limits.result is None and limits.feedback is None
+        else:
+            settled = goal.outcome is not None and goal.end is not End.UNKNOWN
+            excused = settled or (goal.suspect and goal.waited_for and not goal.holding)
+        self._hold(excused, f"no deadline is forgotten ({state.value})")
+
+    def polled(self, ticket: Ticket) -> None:
+        """Check that no deadline has passed without effect."""
+        goal, limits, ledger = ticket.goal, ticket.goal.timeouts, ticket.ledger
+        now = self.caller.world.now.steady
+        ledger.slow = max(ledger.slow, now - ledger.polled_at)
+        ledger.polled_at = now
+        if goal.outcome is not None:
+            return
+        here = now - ledger.since
+        state = goal.state
+        if state is State.QUEUED:
+            self._within(here, limits.queue, "queue")
+        elif state is State.WAITING_FOR_SERVER:
+            self._within(here, limits.server, "server")
+        elif state is State.SENDING:
+            self._within(here, limits.accept, "accept")
+        elif state is State.EXECUTING and not ledger.replaced:
+            self._within(ledger.forward - ledger.begun_at, limits.result, "result")
+            self._within(ledger.forward - ledger.heard_at, limits.feedback, "feedback")
+        elif state is State.CANCELING:
+            accept = limits.accept or limits.cancel or PATIENCE
+            here -= 2 * ledger.slow
+            if not goal.accepted:
+                self._within(here, 2 * accept, "accept")
+            elif limits.cancel is not None:
+                self._within(here, 2 * accept + limits.cancel, "cancel")
+
+    def _not_early(self, ticket: Ticket, state: State) -> None:
+        """Check that a deadline that took effect had passed."""
+        limits, ledger = ticket.goal.timeouts, ticket.ledger
+        here = self.caller.world.now.steady - ledger.since
+        if state is State.EXECUTING:
+            if not ledger.replaced and ticket.goal.state is not State.DONE:
+                running = ledger.forward - ledger.begun_at + JUST
+                silent = ledger.forward - ledger.heard_at + JUST
+                passed = (limits.result is not None and running >= limits.result) or (
+                    limits.feedback is not None and silent >= limits.feedback
+                )
+                self._hold(passed, "a running goal is stopped only after its time")
+        elif state is not State.CANCELING:
+            limit = {
+                State.QUEUED: limits.queue,
+                State.WAITING_FOR_SERVER: limits.server,
+                State.SENDING: limits.accept,
+            }[state]
+            in_time = limit is not None and here + JUST >= limit
+            self._hold(in_time, f"no deadline strikes early ({state.value})")
+
+    def _in_turn(self, ticket: Ticket) -> None:
+        """Check that nobody is overtaken in the queue."""
+        if ticket.goal.busy is not Busy.WAIT:
+            return
+        for line in self.caller.lines.values():
+            for other in line.tickets.values():
+                earlier = int(other.goal.id) < int(ticket.goal.id)
+                if earlier and other.goal.state is State.QUEUED and other is not ticket:
+                    overlap = other.goal.resources & ticket.goal.resources
+                    self._hold(not overlap, "first come, first served")
+
+    def nobody_waits_in_vain(self) -> None:
+        """Check that who queues has somebody who holds, or waits longer, for the same."""
+        waiting: list[Ticket] = []
+        for line in self.caller.lines.values():
+            waiting += (t for t in line.tickets.values() if t.goal.state is State.QUEUED)
+        waiting.sort(key=lambda ticket: int(ticket.goal.id))
+        wanted: set[str] = set()
+        for ticket in waiting:
+            names = ticket.goal.resources
+            why = names & wanted or self.caller.resources.holders(names)
+            self._hold(why, f"what is free goes to who waits longest: {ticket}")
+            wanted |= names
+
+    def _within(self, passed: float, limit: float | None, name: str) -> None:
+        self._hold(limit is None or passed < limit + JUST, f"timeout.{name} takes effect")
+
+    def interrupted_again(self, ticket: Ticket) -> None:
+        """Interrupt once more and see that nothing changes."""
+        goal, now = ticket.goal, self.caller.world.now
+        before = (self.before(ticket), goal.due_in(now))
+        commands = goal.on(Event.INTERRUPTED, now)
+        same = before == (self.before(ticket), goal.due_in(now))
+        self._hold(same and not commands, "interrupting twice is interrupting once")
+
+    # Leaves and servers
+
+    def noted(self, leaf: Leaf, ticket: Ticket, record: AttemptRecord, again: bool) -> None:
+        """A leaf has taken note of an outcome."""
+        if again and leaf.attempts is not None:
+            self._hold(record.end is not End.UNKNOWN, "a retry waits until the end is known")
+            self._hold(not ticket.ledger.unwanted, "what was given up is not tried again")
+            in_bounds = len(leaf.attempts.history) < leaf.plan.retry.attempts
+            self._hold(in_bounds, "attempts counts all tries")
+
+    def sent(self, ticket: Ticket, reached: int) -> None:
+        """A goal request has left for so many live servers."""
+        if reached > 1:
+            ticket.ledger.crowded = True
+
+    def accepted_on_server(self, job: Job) -> None:
+        """A server begins to execute a goal: is it alone on its resources?"""
+        ticket = self._ticket(job)
+        ticket.ledger.jobs += (job,)
+        for other in self.caller.world.jobs:
+            if other is job or not other.live or other.goal_id == job.goal_id:
+                continue
+            rival = self._ticket(other)
+            if rival.goal.resources & ticket.goal.resources:
+                older, newer = sorted((rival, ticket), key=lambda t: int(t.goal.id))
+                asked_for = newer.goal.busy in (Busy.REPLACE, Busy.SHARE) or (
+                    older.goal.busy in (Busy.REPLACE, Busy.SHARE)
+                )
+                excused = any(t.ledger.excuse or t.ledger.crowded for t in (rival, ticket))
+                self._hold(asked_for or excused, f"{rival} and {ticket} are never live together")
+
+    def _ticket(self, job: Job) -> Ticket:
+        return self.caller.tickets[int(job.goal_id)]
+
+    # The end
+
+    def settled(self) -> bool:
+        """Whether every goal is DONE, or given up with its end known."""
+        return all(
+            ticket.goal.state is State.DONE
+            or (ticket.goal.outcome is not None and ticket.goal.end is not End.UNKNOWN)
+            or (ticket.goal.suspect and ticket.goal.waited_for and not ticket.goal.holding)
+            for ticket in self.caller.tickets
+        )
+
+    def at_the_end(self) -> None:
+        """Compare what is reported with what is true, after every server had its chance."""
+        caller = self.caller
+        for ticket in caller.tickets:
+            goal = ticket.goal
+            done = goal.state is State.DONE or goal.end is not End.UNKNOWN
+            done |= goal.suspect and goal.waited_for and not goal.holding  # and reported so
+            self._hold(goal.outcome is not None and done, f"every goal ends: {ticket} {goal!r}")
+            self._hold(not goal.holding, f"every resource is given back: {ticket} {goal!r}")
+            self._the_end_is_true(ticket)
+        self._hold(len(caller.resources) == 0, "no resource is leaked")
+
+    def _the_end_is_true(self, ticket: Ticket) -> None:
+        goal, ledger = ticket.goal, ticket.ledger
+        closed, jobs = self.caller.closed, ledger.jobs
+        if not closed and not ledger.crowded:
+            running = [job for job in jobs if job.live]
+            self._hold(not running, f"no goal is left running: {ticket} {goal!r}")
+        said = f"the end is what the server says: {ticket} {goal!r}, {[j.status for j in jobs]}"
+        if goal.end in ENDS.values():
+            self._hold(any(ENDS.get(job.status) is goal.end for job in jobs), said)
+        elif goal.end is End.NEVER_STARTED:
+            # Forgotten, or out of reach for good since it turned up: nobody can know better.
+            unknowable = all(
+                job.goal_id not in job.server.jobs or not job.server.alive for job in jobs
+            )
+            self._hold(closed or ledger.crowded or unknowable, said)
+        elif goal.end is End.SERVER_GONE:
+            # Where the answer to the request was lost, too, nothing more can be known.
+            unreachable = [not j.server.alive or j.goal_id not in j.server.jobs for j in jobs]
+            self._hold(closed or ledger.crowded or all(unreachable), said)
+        else:
+            forgot = any(job.goal_id not in job.server.jobs for job in jobs)
+            dead = any(not job.server.alive for job in jobs)
+            asked = goal.suspect and goal.waited_for  # a request that was never answered
+            cause = closed or ledger.crowded or forgot or dead or asked
+            self._hold(cause, f"UNKNOWN with a cause: {said}")
+
+    @staticmethod
+    def _hold(kept: Any, rule: str) -> None:
+        if not kept:
+            raise Violation(rule)

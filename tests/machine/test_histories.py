@@ -1,0 +1,71 @@
+"""Random histories keep the rules (judge.py).
+
+BT_SEED says where to begin (a failure prints the seed that shows it again at once), and
+BT_HISTORIES how many to play.
+"""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from bt_actions.goal import TABLE, Goal
+from bt_actions.goal_terms import Event, State
+from bt_actions.policy import End, Outcome
+from tests.machine.conftest import THOROUGH
+from tests.machine.histories import broken, first_broken, play, random_history, shrink, tell
+
+FIRST = int(os.environ.get("BT_SEED", "1"))
+COUNT = int(os.environ.get("BT_HISTORIES", "50000" if THOROUGH else "5000"))
+
+
+@pytest.mark.timeout(600)
+def test_no_history_breaks_a_rule() -> None:
+    seed = first_broken(range(FIRST, FIRST + COUNT))
+    if seed is not None:
+        shortest = tell(shrink(random_history(seed)))
+        pytest.fail(f"BT_SEED={seed} shows it again; the shortest history found:\n{shortest}")
+
+
+def test_the_histories_come_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every decision of the table, every outcome and every end: or silence proves nothing."""
+    unreached = {key for key, row in TABLE.items() if not row.drops}
+    unreached -= {  # a caller that is in order tells none of these
+        (State.QUEUED, Event.INVALID),
+        (State.CANCELING, Event.SEND_FAILED),
+        (State.DONE, Event.REPLACED),
+    }
+    unseen: set[object] = {*Outcome, *End} - {Outcome.UNEXPECTED_RESULT}  # which a leaf decides
+
+    def on(goal: Goal, event: Event, *details: object) -> object:
+        unreached.discard((goal.state, event))
+        return original(goal, event, *details)
+
+    original = Goal.on
+    monkeypatch.setattr(Goal, "on", on)
+    for seed in range(6_000):
+        for ticket in play(random_history(seed)).caller.tickets:
+            unseen -= {ticket.goal.outcome, ticket.goal.end}
+        if not unreached and not unseen:
+            return
+    assert (unreached, unseen) == (set(), set())
+
+
+def test_a_seed_tells_the_same_history_each_time() -> None:
+    assert random_history(7) == random_history(7)
+    assert random_history(7) != random_history(8)
+    assert tell(random_history(7)) == tell(random_history(7))
+
+
+def test_a_broken_history_shrinks_to_one_that_is_still_broken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("bt_actions.goal.Goal._release", lambda self: None)
+    seed = first_broken(range(100))
+    assert seed is not None
+    found = random_history(seed)
+    short = shrink(found)
+    assert len(short.moves) <= 2 < len(found.moves)
+    assert broken(short) == "a goal that is DONE has given its resources back"
+    assert "BROKEN" in tell(short)

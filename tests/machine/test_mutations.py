@@ -1,0 +1,273 @@
+"""The generator of histories finds every one of these wrong machines: so it would find it in ours.
+
+Each mutation is one plausible mistake, made on purpose and undone after the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from bt_actions.attempts import Attempts
+from bt_actions.goal import TABLE, Goal, Row
+from bt_actions.goal_terms import Command, Event, State
+from bt_actions.policy import Busy, End, Outcome
+from bt_actions.resources import Answer, Resources
+from tests.machine.callers import Caller
+from tests.machine.histories import broken, first_broken, random_history
+
+ENOUGH = 15_000
+"""Histories in which each mistake must be found; CI plays 50,000 on the right machine."""
+
+Patch = pytest.MonkeyPatch
+MUTATIONS: dict[str, Callable[[Patch], None]] = {}
+
+
+def mutation(make: Callable[[Patch], None]) -> Callable[[Patch], None]:
+    """File a mutation under what it does wrong."""
+    MUTATIONS[make.__name__.replace("_", " ")] = make
+    return make
+
+
+def decide(patch: Patch, state: State, event: Event, step: Callable[..., State]) -> None:
+    """Replace one row of the table."""
+    patch.setitem(TABLE, (state, event), Row(step, frozenset(State)))
+
+
+def ignore(patch: Patch, event: Event, *states: State) -> None:
+    """Drop an event in some states, as if nobody had thought of it."""
+    for state in states:
+        decide(patch, state, event, lambda goal, now, detail: goal.state)
+
+
+@mutation
+def forgets_the_cancel_before_acceptance(patch: Patch) -> None:
+    def accepted(goal: Goal, now: Any, detail: Any) -> State:
+        state = Goal._turned_up(goal, now, detail)
+        goal._commands = [c for c in goal._commands if c is not Command.CANCEL]
+        return state
+
+    decide(patch, State.CANCELING, Event.ACCEPTED, accepted)
+
+
+@mutation
+def begins_though_it_was_interrupted(patch: Patch) -> None:
+    decide(patch, State.CANCELING, Event.ACCEPTED, Goal._begin)
+
+
+@mutation
+def takes_a_late_answer_for_the_attempt_that_runs_now(patch: Patch) -> None:
+    def addressee(caller: Caller, line: Any, message: Any) -> Any:
+        for leaf in caller.leaves:
+            if message.name.startswith(f"{leaf.name}.") and leaf.ticket is not None:
+                return leaf.ticket if leaf.ticket.goal.sent else None
+        return line.tickets.get(message.goal_id)
+
+    patch.setattr(Caller, "addressee", addressee)
+
+
+@mutation
+def retries_before_the_end_is_known(patch: Patch) -> None:
+    patch.setattr(Attempts, "_worth_it", lambda self, record: record.outcome in self.retry.outcomes)
+
+
+@mutation
+def settles_twice(patch: Patch) -> None:
+    def settle(goal: Goal, outcome: Outcome, reason: str) -> None:
+        goal.outcome, goal.reason = outcome, reason
+
+    patch.setattr(Goal, "_settle", settle)
+
+
+@mutation
+def keeps_the_resource(patch: Patch) -> None:
+    patch.setattr(Goal, "_release", lambda self: None)
+
+
+@mutation
+def releases_when_the_leaf_stops_waiting(patch: Patch) -> None:
+    def cancel_due(goal: Goal, now: Any, detail: Any) -> State:
+        goal._release()
+        return Goal._cancel_due(goal, now, detail)
+
+    decide(patch, State.CANCELING, Event.CANCEL_DUE, cancel_due)
+
+
+@mutation
+def releases_when_the_cancel_is_sent(patch: Patch) -> None:
+    def interrupted(goal: Goal, now: Any, detail: Any) -> State:
+        goal._release()
+        return Goal._interrupted(goal, now, detail)
+
+    decide(patch, State.EXECUTING, Event.INTERRUPTED, interrupted)
+
+
+@mutation
+def cancels_after_done(patch: Patch) -> None:
+    def again(goal: Goal, now: Any, detail: Any) -> State:
+        goal._commands.append(Command.CANCEL)
+        return State.DONE
+
+    decide(patch, State.DONE, Event.INTERRUPTED, again)
+
+
+@mutation
+def cancels_again_at_each_interruption(patch: Patch) -> None:
+    decide(patch, State.CANCELING, Event.INTERRUPTED, Goal._interrupted)
+
+
+@mutation
+def ignores_that_the_server_was_lost(patch: Patch) -> None:
+    ignore(patch, Event.SERVER_LOST, State.SENDING, State.EXECUTING, State.CANCELING)
+
+
+@mutation
+def forgets_a_lost_goal(patch: Patch) -> None:
+    def lose(goal: Goal, now: Any, detail: Any) -> State:
+        Goal._lose(goal, now, detail)
+        return State.DONE
+
+    decide(patch, State.EXECUTING, Event.SERVER_LOST, lose)
+
+
+@mutation
+def lets_a_lost_goal_run_on_when_its_server_is_back(patch: Patch) -> None:
+    ignore(patch, Event.SERVER_RETURNED, State.CANCELING)
+
+
+@mutation
+def reports_success_though_it_was_interrupted(patch: Patch) -> None:
+    decide(patch, State.CANCELING, Event.RESULT, Goal._finished)
+
+
+@mutation
+def calls_a_failed_goal_succeeded(patch: Patch) -> None:
+    def finished(goal: Goal, now: Any, detail: Any) -> State:
+        return Goal._finished(goal, now, (4, detail[1]))
+
+    decide(patch, State.EXECUTING, Event.RESULT, finished)
+
+
+@mutation
+def believes_that_an_unanswered_goal_never_started(patch: Patch) -> None:
+    def verdict(goal: Goal, now: Any) -> State:
+        goal._denied_at = goal._denied_since = now.steady
+        return original(goal, now)
+
+    original = Goal._verdict
+    patch.setattr(Goal, "_verdict", verdict)
+
+
+@mutation
+def asks_to_cancel_only_once(patch: Patch) -> None:
+    def ask(goal: Goal, now: Any) -> None:
+        goal._commands.append(Command.CANCEL)
+
+    patch.setattr(Goal, "_ask", ask)
+
+
+@mutation
+def never_asks_for_the_result(patch: Patch) -> None:
+    def on(goal: Goal, event: Event, now: Any, detail: Any = None) -> tuple[Command, ...]:
+        commands = original(goal, event, now, detail)
+        return tuple(c for c in commands if c is not Command.ASK_RESULT)
+
+    original = Goal.on
+    patch.setattr(Goal, "on", on)
+
+
+@mutation
+def runs_on_beside_the_goal_that_replaced_it(patch: Patch) -> None:
+    ignore(patch, Event.REPLACED, State.SENDING, State.EXECUTING, State.CANCELING)
+
+
+@mutation
+def takes_preemption_for_a_failure(patch: Patch) -> None:
+    patch.setattr(Caller, "_rival_sent", lambda self, ticket: False)
+
+
+@mutation
+def gives_a_replaced_goal_its_feedback_deadline_back(patch: Patch) -> None:
+    def feedback(goal: Goal, now: Any, detail: Any) -> State:
+        goal._arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
+        return State.EXECUTING
+
+    decide(patch, State.EXECUTING, Event.FEEDBACK, feedback)
+
+
+@mutation
+def does_not_hear_feedback(patch: Patch) -> None:
+    ignore(patch, Event.FEEDBACK, State.EXECUTING)
+
+
+@mutation
+def loses_time_when_the_clock_jumps_back(patch: Patch) -> None:
+    patch.setattr(Goal, "_follow_ros_clock", lambda self, now: None)
+
+
+@mutation
+def grants_what_is_taken(patch: Patch) -> None:
+    def request(table: Any, holder: Any, names: frozenset[str], busy: Busy) -> Answer:
+        table._held[holder] = names
+        return Answer.GRANTED
+
+    patch.setattr(Resources, "request", request)
+
+
+@mutation
+def lets_a_later_one_overtake_in_the_queue(patch: Patch) -> None:
+    def release(table: Any, holder: Any) -> list[Any]:
+        table._queue = dict(reversed(table._queue.items()))
+        return original(table, holder)
+
+    original = Resources.release
+    patch.setattr(Resources, "release", release)
+
+
+@mutation
+def forgets_who_waits(patch: Patch) -> None:
+    def release(table: Any, holder: Any) -> list[Any]:
+        table._held.pop(holder, None)
+        table._queue.pop(holder, None)
+        return []
+
+    patch.setattr(Resources, "release", release)
+
+
+@mutation
+def says_gone_for_every_end(patch: Patch) -> None:
+    def close(goal: Goal, now: Any, detail: Any) -> State:
+        state = Goal._finished_while_canceling(goal, now, detail)
+        goal.end = End.SERVER_GONE
+        return state
+
+    decide(patch, State.CANCELING, Event.RESULT, close)
+
+
+def forget(deadline: Event) -> Callable[[Patch], None]:
+    """Return the mutation that never arms this deadline."""
+
+    def make(patch: Patch) -> None:
+        def arm(goal: Goal, event: Event, seconds: float | None, now: Any) -> None:
+            if event is not deadline:
+                original(goal, event, seconds, now)
+
+        original = Goal._arm
+        patch.setattr(Goal, "_arm", arm)
+
+    return make
+
+
+for _deadline in (event for event in Event if event.name.endswith("_DUE")):
+    MUTATIONS[f"forgets {_deadline.name}"] = forget(_deadline)
+
+
+@pytest.mark.parametrize("wrong", MUTATIONS)
+def test_the_generator_finds_a_machine_that(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    MUTATIONS[wrong](monkeypatch)
+    seed = first_broken(range(ENOUGH))
+    assert seed is not None, f"{ENOUGH} histories do not show that it {wrong}"
+    monkeypatch.undo()
+    assert broken(random_history(seed)) is None, "the right machine passes the same history"

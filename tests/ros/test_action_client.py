@@ -1,0 +1,411 @@
+"""The action client: it loses no answer, and it can be read without an executor."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import uuid
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from robot_control_interfaces.action import Gripper as GripperAction
+from robot_control_interfaces.action import MoveRobot as MoveRobotAction
+
+from bt_actions import Gripper, MoveRobot
+from bt_actions.ros import action_client
+from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.traffic import Traffic
+from tests.support.processes import Host
+from tests.support.waiting import holds_for, until
+
+TIMES = 20
+KINDS = ("goal", "result", "cancel")
+
+
+class Heard:
+    """A listener that takes note."""
+
+    def __init__(self) -> None:
+        self.goals: list[tuple[bytes, bool]] = []
+        self.results: list[tuple[bytes, int, Any]] = []
+        self.cancels: list[tuple[bytes, int]] = []
+        self.feedback: list[tuple[bytes, Any]] = []
+        self.statuses: list[dict[bytes, int]] = []
+        self.probes: list[int] = []
+
+    def goal_answered(self, goal_id: bytes, accepted: bool) -> None:
+        self.goals.append((goal_id, accepted))
+
+    def result_came(self, goal_id: bytes, status: int, result: Any) -> None:
+        self.results.append((goal_id, status, result))
+
+    def cancel_answered(self, goal_id: bytes, code: int) -> None:
+        self.cancels.append((goal_id, code))
+
+    def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
+        self.feedback.append((goal_id, feedback))
+
+    def statuses_came(self, statuses: dict[bytes, int]) -> None:
+        self.statuses.append(statuses)
+
+    def probe_answered(self, probe: int) -> None:
+        self.probes.append(probe)
+
+    def answers(self, kind: str) -> list[Any]:
+        return {"goal": self.goals, "result": self.results, "cancel": self.cancels}[kind]
+
+
+class LateFiling:
+    """rclpy's low-level client, which returns from sending when the answer may have arrived.
+
+    The number of a request is filed when sending returns. Here that is when the answer has been
+    taken by the executor, or after `patience` seconds where it cannot be taken.
+    """
+
+    def __init__(self, handle: Any, kind: str, patience: float) -> None:
+        self._handle = handle
+        self._kind = kind
+        self._patience = patience
+        self._taken = threading.Event()
+
+    def __getattr__(self, name: str) -> Any:
+        method = getattr(self._handle, name)
+        if name == f"send_{self._kind}_request":
+            return self._sending(method)
+        if name == f"take_{self._kind}_response":
+            return self._taking(method)
+        return method
+
+    def __enter__(self) -> Any:
+        return self._handle.__enter__()
+
+    def __exit__(self, *error: Any) -> None:
+        self._handle.__exit__(*error)
+
+    def _sending(self, send: Callable[[Any], int]) -> Callable[[Any], int]:
+        def sending(request: Any) -> int:
+            self._taken.clear()
+            number = send(request)
+            self._taken.wait(self._patience)
+            return number
+
+        return sending
+
+    def _taking(self, take: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        def taking(kind: Any) -> Any:
+            answer = take(kind)
+            if answer[1] is not None:
+                self._taken.set()
+            return answer
+
+        return taking
+
+
+@pytest.fixture
+def heard() -> Heard:
+    return Heard()
+
+
+@pytest.fixture
+def client(node: Node, host: Host, name: str, heard: Heard) -> Iterator[ActionClient]:
+    """A client of a server that is there."""
+    client = ActionClient(node, MoveRobotAction, name, heard)
+    host.open(name)
+    until(client.server_is_ready)
+    yield client
+    client.destroy()
+    host.close_server(name)
+
+
+@contextlib.contextmanager
+def spinning(node: Node, executor: Any) -> Iterator[None]:
+    """Spin `node` on another thread."""
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        executor.shutdown()
+        thread.join()
+        if isinstance(executor, MultiThreadedExecutor):
+            executor._executor.shutdown(wait=True)
+        node.executor = None
+
+
+def single(node: Node) -> Any:
+    return spinning(node, SingleThreadedExecutor(context=node.context))
+
+
+def filed(client: ActionClient) -> int:
+    """Return how many requests are kept until their answers come."""
+    return sum(map(len, (client._goal_requests, client._result_requests, client._cancel_requests)))
+
+
+def request(client: ActionClient, kind: str) -> bytes:
+    """Send a request that is answered at once, and return the goal's id."""
+    goal_id = uuid.uuid4().bytes
+    if kind == "goal":
+        client.send(goal_id, MoveRobotAction.Goal(distance=0.0))
+    elif kind == "result":
+        client.ask_result(goal_id)
+    else:
+        client.cancel(goal_id)
+    return goal_id
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_answer_that_arrives_before_its_request_is_filed_is_not_lost(
+    client: ActionClient, node: Node, heard: Heard, kind: str
+) -> None:
+    client._client_handle = LateFiling(client._client_handle, kind, patience=0.02)
+    with single(node):
+        asked = [request(client, kind) for _ in range(TIMES)]
+        until(lambda: len(heard.answers(kind)) == TIMES)
+    assert [answer[0] for answer in heard.answers(kind)] == asked
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_the_lock_every_such_answer_is_lost(
+    client: ActionClient, node: Node, heard: Heard, kind: str
+) -> None:
+    """Shows that the test above would see it: rclpy #1123, which the lock is there for."""
+    client._client_handle = LateFiling(client._client_handle, kind, patience=5.0)
+    client._lock = contextlib.nullcontext()  # type: ignore[assignment]
+    with single(node):
+        for _ in range(TIMES):
+            request(client, kind)
+        assert holds_for(lambda: not heard.answers(kind), 0.1)
+
+
+@pytest.mark.parametrize("executor", [SingleThreadedExecutor, MultiThreadedExecutor])
+def test_every_answer_reaches_its_goal_when_several_threads_send(
+    client: ActionClient, node: Node, heard: Heard, executor: Any
+) -> None:
+    asked: list[bytes] = []
+
+    def send() -> None:
+        for _ in range(TIMES):
+            asked.append(request(client, "result"))
+            until(lambda: len(asked) - len(heard.results) < 4)
+
+    with spinning(node, executor(context=node.context)):
+        threads = [threading.Thread(target=send) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        until(lambda: len(heard.results) == 4 * TIMES)
+    assert sorted(result[0] for result in heard.results) == sorted(asked)
+
+
+def test_answers_are_taken_without_an_executor(client: ActionClient, heard: Heard) -> None:
+    goal_id = uuid.uuid4().bytes
+    client.send(goal_id, MoveRobotAction.Goal(distance=0.2))
+    until(lambda: heard.goals, meanwhile=client.pump)
+    assert heard.goals == [(goal_id, True)]
+    client.ask_result(goal_id)
+    until(lambda: heard.results, meanwhile=client.pump)
+    [(answered, status, result)] = heard.results
+    assert (answered, status, result.final_pose) == (goal_id, 4, 0.2)
+    assert heard.feedback[0][0] == goal_id
+    until(lambda: heard.statuses[-1].get(goal_id) == 4, meanwhile=client.pump)
+
+
+def test_answers_are_taken_when_the_context_is_no_longer_valid(
+    domain: int, host: Host, name: str, heard: Heard
+) -> None:
+    """rclpy's SIGINT handler invalidates it; the goals must be canceled all the same."""
+    context = Context()
+    context.init(domain_id=domain)
+    node = Node("dying", context=context)
+    client = ActionClient(node, MoveRobotAction, name, heard)
+    journal = host.open(name)
+    until(client.server_is_ready)
+    goal_id = uuid.uuid4().bytes
+    client.send(goal_id, MoveRobotAction.Goal(distance=5.0))
+    until(lambda: heard.goals, meanwhile=client.pump)
+    context.shutdown()
+    client.cancel(goal_id)
+    client.ask_result(goal_id)
+    until(lambda: heard.results, meanwhile=client.pump)
+    assert heard.results[0][:2] == (goal_id, 5)
+    assert journal.ends() == ["canceled"]
+    client.destroy()
+    node.destroy_node()
+    host.close_server(name)
+
+
+def test_what_is_forgotten_is_not_told_and_not_kept(client: ActionClient, heard: Heard) -> None:
+    for kind in KINDS:
+        client.forget(request(client, kind))
+    client.probe(7, uuid.uuid4().bytes)
+    client.forget(7)
+    last = request(client, "cancel")
+    until(lambda: heard.cancels, meanwhile=client.pump)
+    assert heard.cancels == [(last, 2)]
+    assert not heard.goals
+    assert not heard.results
+    assert not heard.probes
+    assert filed(client) == 0
+
+
+def test_nothing_stays_filed_for_answered_requests(client: ActionClient, heard: Heard) -> None:
+    goal_id = request(client, "goal")
+    client.ask_result(goal_id)
+    client.cancel(uuid.uuid4().bytes)
+    done = lambda: heard.goals and heard.cancels and any(s == 4 for _, s, _ in heard.results)  # noqa: E731
+    until(
+        done,
+        meanwhile=lambda: (client.pump(), client.ask_result(goal_id) if heard.results else None),
+    )
+    client.forget(goal_id)
+    assert filed(client) == 0
+
+
+def test_a_probe_is_answered_by_a_live_server_once(client: ActionClient, heard: Heard) -> None:
+    client.probe(3, uuid.uuid4().bytes)
+    until(lambda: heard.probes, meanwhile=client.pump)
+    request(client, "cancel")
+    until(lambda: heard.cancels, meanwhile=client.pump)
+    assert heard.probes == [3]
+
+
+def test_a_refused_cancel_is_told_as_refused(
+    node: Node, host: Host, name: str, heard: Heard
+) -> None:
+    """rclpy's servers answer "no error" with an empty list, which is read as the refusal it is."""
+    client = ActionClient(node, MoveRobotAction, name, heard)
+    host.open(name, "1:reject_cancel")
+    until(client.server_is_ready)
+    goal_id = uuid.uuid4().bytes
+    client.send(goal_id, MoveRobotAction.Goal(distance=0.5))
+    until(lambda: heard.goals, meanwhile=client.pump)
+    client.cancel(goal_id)
+    until(lambda: heard.cancels, meanwhile=client.pump)
+    assert heard.cancels == [(goal_id, 1)]
+    client.destroy()
+    host.close_server(name)
+
+
+def test_a_listener_that_raises_does_not_end_the_spin(
+    client: ActionClient, node: Node, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(goal_id: bytes, code: int) -> None:
+        raise RuntimeError("on purpose")
+
+    with monkeypatch.context() as patch, single(node):
+        patch.setattr(heard, "cancel_answered", fails)
+        request(client, "cancel")
+        request(client, "result")
+        until(lambda: heard.results)
+        patch.undo()
+        request(client, "cancel")
+        until(lambda: heard.cancels)
+
+
+def test_a_destroyed_client_is_silent_and_refuses_to_send(
+    client: ActionClient, heard: Heard
+) -> None:
+    request(client, "result")
+    client.destroy()
+    client.destroy()
+    client.pump()
+    assert not heard.results
+    with pytest.raises(Exception, match=r"(?i)destroy|invalid|pointer"):
+        request(client, "goal")
+
+
+def test_an_rclpy_without_the_methods_that_are_needed_is_named_at_once(
+    node: Node, name: str, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(action_client, "_USED_OF_HANDLE", ("send_goal_request", "send_smoke"))
+    with pytest.raises(RuntimeError, match="no send_smoke"):
+        ActionClient(node, MoveRobotAction, name, heard)
+
+
+@pytest.mark.parametrize("moment", ["__enter__", "get_num_entities", "add_to_wait_set", "is_ready"])
+def test_a_client_that_is_destroyed_in_the_executors_hands_does_not_end_the_spin(
+    client: ActionClient, node: Node, monkeypatch: pytest.MonkeyPatch, moment: str
+) -> None:
+    """`shutdown` of a leaf, while another thread spins the user's node."""
+    real = getattr(ActionClient, moment)
+
+    def destroyed_first(self: ActionClient, *arguments: Any) -> Any:
+        client.destroy()
+        return real(self, *arguments)
+
+    monkeypatch.setattr(ActionClient, moment, destroyed_first)
+    alive = threading.Event()
+    executor = SingleThreadedExecutor(context=node.context)
+    with spinning(node, executor):
+        until(lambda: client._closed, meanwhile=lambda: executor.create_task(alive.clear))
+        executor.create_task(alive.set)
+        assert alive.wait(2.0)
+
+
+@pytest.mark.parametrize("times", [200])
+def test_clients_come_and_go_under_a_spinning_executor(
+    node: Node, name: str, heard: Heard, times: int
+) -> None:
+    alive = threading.Event()
+    executor = MultiThreadedExecutor(2, context=node.context)
+    with spinning(node, executor):
+        for number in range(times):
+            ActionClient(node, MoveRobotAction, f"{name}_{number % 5}", heard).destroy()
+        executor.create_task(alive.set)
+        assert alive.wait(5.0)
+
+
+# Shared per node, name and type
+
+
+def clients_of(node: Node) -> list[ActionClient]:
+    return [waitable for waitable in node.waitables if isinstance(waitable, ActionClient)]
+
+
+def test_leaves_with_the_same_action_share_one_client(node: Node, name: str) -> None:
+    before = len(clients_of(node))
+    leaves = [MoveRobot(f"m{i}", 1.0, action_name=name) for i in range(10)]
+    for leaf in leaves:
+        leaf.setup(node=node)
+        leaf.setup(node=node)
+    assert len(clients_of(node)) == before + 1
+    for leaf in leaves[:-1]:
+        leaf.shutdown()
+    assert len(clients_of(node)) == before + 1
+    leaves[-1].shutdown()
+    assert len(clients_of(node)) == before
+
+
+def test_a_relative_name_is_the_same_action_as_the_full_one(node: Node, name: str) -> None:
+    leaves = [MoveRobot("a", 1.0, action_name=name), MoveRobot("b", 1.0, action_name=name[1:])]
+    for leaf in leaves:
+        leaf.setup(node=node)
+    assert leaves[1].server == name
+    assert leaves[0]._line is leaves[1]._line
+    for leaf in leaves:
+        leaf.shutdown()
+
+
+def test_two_types_under_one_name_are_an_error_that_names_both(node: Node, name: str) -> None:
+    first, second = MoveRobot("a", 1.0, action_name=name), Gripper("b", 1.0, action_name=name)
+    first.setup(node=node)
+    with pytest.raises(TypeError, match=rf"{name}.*MoveRobot.*Gripper"):
+        second.setup(node=node)
+    first.shutdown()
+    second.setup(node=node)  # the name is free again
+    second.shutdown()
+
+
+def test_each_node_has_clients_of_its_own(node: Node, context: Context, name: str) -> None:
+    other = Node("other", context=context)
+    lines = [Traffic.of(each).line(GripperAction, name) for each in (node, other)]
+    assert lines[0].client is not lines[1].client
+    for line in lines:
+        line.traffic.leave(line)
+    other.destroy_node()

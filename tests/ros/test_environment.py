@@ -1,0 +1,66 @@
+"""Settings of the middleware: ours where the user has none."""
+
+from pathlib import Path
+
+import pytest
+
+from bt_actions.ros.environment import SHORT_LEASE, Reach, prepare
+
+
+@pytest.fixture(autouse=True)
+def _clean(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in (
+        "FASTRTPS_DEFAULT_PROFILES_FILE",
+        "FASTDDS_DEFAULT_PROFILES_FILE",
+        "ROS_AUTOMATIC_DISCOVERY_RANGE",
+        "ROS_LOCALHOST_ONLY",
+        "ROS_STATIC_PEERS",
+    ):
+        monkeypatch.setenv(name, "")
+    monkeypatch.chdir(tmp_path)
+
+
+def _get(name: str) -> str:
+    import os
+
+    return os.environ.get(name, "")
+
+
+def test_the_short_lease_is_given_where_the_user_has_no_profile() -> None:
+    prepare()
+    assert _get("FASTRTPS_DEFAULT_PROFILES_FILE") == str(SHORT_LEASE)
+    assert SHORT_LEASE.exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"]
+)
+def test_a_profile_of_the_user_is_never_overridden(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(name, "/theirs.xml")
+    prepare()
+    assert _get(name) == "/theirs.xml"
+    assert str(SHORT_LEASE) not in (
+        _get("FASTRTPS_DEFAULT_PROFILES_FILE"),
+        _get("FASTDDS_DEFAULT_PROFILES_FILE"),
+    )
+
+
+def test_a_profile_in_the_working_directory_is_the_users_too(tmp_path: Path) -> None:
+    (tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml").write_text("<dds/>")
+    prepare()
+    assert _get("FASTRTPS_DEFAULT_PROFILES_FILE") == ""
+
+
+def test_a_simulation_stays_on_this_machine_and_nothing_else_does() -> None:
+    prepare()
+    assert _get("ROS_AUTOMATIC_DISCOVERY_RANGE") == ""
+    prepare(Reach.MACHINE)
+    assert _get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
+
+
+def test_a_range_that_the_user_chose_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    prepare(Reach.PROCESS)
+    assert _get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "SUBNET"

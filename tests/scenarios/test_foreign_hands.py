@@ -1,0 +1,366 @@
+"""Our leaves in a user's node, executor and loop, which end in every way there is.
+
+The programs are those of tests/support/foreign.py, each a process of its own, all started at once.
+Whatever they do, the server's journal shows that the goal was canceled, and only once executed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import py_trees
+import pytest
+from py_trees.common import Status
+
+from bt_actions import End, MoveRobot, Outcome, Timeouts
+from tests.support.processes import PATIENCE, Host, Journal, Process
+from tests.support.trees import state, together
+from tests.support.waiting import until
+
+END_BY_THEMSELVES = [
+    "shut_down_and_destroy_on_the_next_line",
+    "destroy_while_another_thread_spins",
+    "shut_down_in_a_timer",
+    "shut_down_in_a_timer_of_a_multithreaded_executor",
+    "tick_tock",
+    "never_shut_down",
+    "just_end",
+    "end_with_a_spinning_daemon_thread",
+    "crash",
+    "crash_in_a_timer",
+    "exit_in_a_timer",
+    "crash_beside_a_runner",
+    "end_beside_a_runner",
+]
+TELL = END_BY_THEMSELVES[:5]
+CODES = {
+    "crash": {1},
+    "crash_in_a_timer": {1},
+    "exit_in_a_timer": {7},
+    "crash_beside_a_runner": {1},
+}
+# rclpy 7.1 aborts the process that ends beside a daemon thread in spin(), with or without us.
+CODES["end_with_a_spinning_daemon_thread"] = {0, -signal.SIGABRT}
+END_BY_A_SIGNAL = [
+    "loop_until_a_signal",
+    "spin_until_a_signal",
+    "spin_until_a_signal_and_clean_up",
+    "tick_tock_until_a_signal",
+]
+RUNNERS = ["wait_for_a_runner", "run_and_clean_up"]
+"""These have a context of their own, so rclpy's signal handlers are not there."""
+CRASHED = {-signal.SIGSEGV, -signal.SIGABRT, -signal.SIGBUS}
+
+
+@dataclass
+class Program:
+    process: Process
+    journal: Journal
+
+
+@pytest.fixture(scope="module")
+def programs(session_host: Host) -> Iterator[dict[str, Program]]:
+    """All programs, started at once: they spend their time with starting."""
+    names = [*END_BY_THEMSELVES, "tick_in_a_timer_until_done", "just_end_soon"]
+    names += [f"{each} {number}" for each in END_BY_A_SIGNAL for number in ("INT", "TERM")]
+    names += [f"{each} INT" for each in RUNNERS]
+    started: dict[str, Program] = {}
+    with contextlib.ExitStack() as stack:
+        for number, name in enumerate(names):
+            action = f"/f{os.getpid()}_{number}/move"
+            faults = ["1:reject_cancel"] if name == "just_end_soon" else []
+            journal = session_host.open(action, *faults, step_period=0.25)
+            process = Process(["-m", "tests.support.foreign", name.split()[0], action])
+            stack.callback(process.close)
+            stack.callback(session_host.close_server, action)
+            started[name] = Program(process, journal)
+        yield started
+
+
+@pytest.mark.parametrize("name", END_BY_THEMSELVES)
+def test_a_program_that_ends_leaves_no_goal(programs: dict[str, Program], name: str) -> None:
+    process, journal = programs[name].process, programs[name].journal
+    process.line("executing", within=60.0)
+    if name in TELL:
+        assert process.line("end") == "end CANCELED CANCELED", process
+    code = process.wait()
+    assert journal.ends() == ["canceled"], process
+    assert journal.events().count("cancel_requested") >= 1
+    assert code in CODES.get(name, {0}), process
+    assert "Traceback" not in str(process) or name.startswith("crash")
+
+
+@pytest.mark.parametrize("number", ["INT", "TERM"])
+@pytest.mark.parametrize("name", END_BY_A_SIGNAL)
+def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
+    programs: dict[str, Program], name: str, number: str
+) -> None:
+    process, journal = (programs[f"{name} {number}"].process, programs[f"{name} {number}"].journal)
+    process.line("executing", within=60.0)
+    sent = process.send(signal.Signals[f"SIG{number}"])
+    journal.wait_for("canceled", within=10.0)
+    code = process.wait()
+    assert time.monotonic() - sent < PATIENCE
+    assert code not in CRASHED, process
+    assert journal.ends() == ["canceled"], process
+
+
+@pytest.mark.parametrize("name", RUNNERS)
+def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
+    programs: dict[str, Program], name: str
+) -> None:
+    process, journal = programs[f"{name} INT"].process, programs[f"{name} INT"].journal
+    process.line("executing", within=60.0)
+    process.send(signal.SIGINT)
+    code = process.wait()
+    assert code in (130, -signal.SIGINT), process
+    assert journal.ends() == ["canceled"], process
+
+
+def test_a_program_may_just_succeed(programs: dict[str, Program]) -> None:
+    program = programs["tick_in_a_timer_until_done"]
+    assert program.process.line("end") == "end SUCCEEDED SUCCEEDED"
+    assert program.process.wait() == 0, program.process
+    assert program.journal.events() == ["received", "accepted", "succeeded"]
+    assert program.process.errors == []
+
+
+def test_a_goal_that_cannot_be_canceled_at_exit_is_reported(programs: dict[str, Program]) -> None:
+    program = programs["just_end_soon"]
+    program.process.line("executing", within=60.0)
+    assert program.process.wait() == 0
+    assert "not accounted for" in str(program.process)
+    assert "cannot account for it" in str(program.process)
+    assert program.journal.ends() == [None]
+
+
+# In this process
+
+
+@pytest.fixture
+def spin(node: Any) -> Iterator[Any]:
+    """Spin the node for a moment, on this thread."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    yield lambda: executor.spin_once(timeout_sec=0.005)
+    executor.shutdown()
+    node.executor = None
+
+
+@pytest.fixture
+def journal(host: Host, name: str) -> Iterator[Journal]:
+    """A server without faults, and what it writes."""
+    yield host.open(name)
+    host.close_server(name)
+
+
+def test_setup_twice_for_the_same_node_is_fine(
+    journal: Journal, name: str, node: Any, spin: Any
+) -> None:
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    tree = py_trees.trees.BehaviourTree(leaf)
+    tree.setup(node=node)
+    tree.setup(node=node)
+    until(lambda: leaf.status is Status.SUCCESS, meanwhile=lambda: (spin(), tree.tick()))
+    tree.setup(node=node)
+    tree.shutdown()
+    tree.shutdown()
+    assert journal.ends() == ["succeeded"]
+
+
+def test_setup_again_after_shutdown_is_fine(
+    journal: Journal, name: str, node: Any, spin: Any
+) -> None:
+    leaf = MoveRobot("m", 0.5, action_name=name)
+    tree = py_trees.trees.BehaviourTree(leaf)
+    tree.setup(node=node)
+    until(lambda: state(leaf) == "EXECUTING", meanwhile=lambda: (spin(), tree.tick()))
+    tree.shutdown()
+    assert journal.ends() == ["canceled"]
+    tree.setup(node=node)
+    until(lambda: leaf.status is Status.SUCCESS, meanwhile=lambda: (spin(), tree.tick()))
+    tree.shutdown()
+    assert journal.ends() == ["canceled", "succeeded"]
+    assert leaf.outcome is Outcome.SUCCEEDED
+    assert [record.attempt for record in leaf.history] == [1]
+
+
+@pytest.mark.parametrize("accept", [5.0, 0.5], ids=["in time", "as a suspect"])
+def test_a_goal_left_behind_by_a_visit_before_is_drained_too(
+    host: Host, name: str, node: Any, spin: Any, accept: float
+) -> None:
+    """Interrupted before its acceptance, visited again, and shut down"""
+    journal = host.open(name, "1:delay_accept=2")
+    leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=accept))
+    tree = py_trees.trees.BehaviourTree(leaf)
+    tree.setup(node=node)
+    until(lambda: state(leaf) == "SENDING", meanwhile=lambda: (spin(), tree.tick()))
+    journal.wait_for("received")
+    leaf.stop(Status.INVALID)
+    tree.tick()
+    leaf.stop(Status.INVALID)
+    assert not leaf.drained
+    tree.shutdown()
+    assert leaf.drained
+    assert journal.ends() == ["canceled"]
+    host.close_server(name)
+
+
+def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
+    host: Host, name: str, node: Any, spin: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C while the exit hook waits for a goal that cannot be canceled."""
+    from bt_actions.ros import traffic
+
+    said: list[str] = []
+
+    def interrupted(tickets: Any) -> None:
+        raise KeyboardInterrupt
+
+    host.open(name, "1:reject_cancel")
+    leaf = MoveRobot("m", 9.0, action_name=name)
+    leaf.setup(node=node)
+    until(lambda: state(leaf) == "EXECUTING", meanwhile=lambda: (spin(), leaf.tick_once()))
+    with monkeypatch.context() as patch:
+        patch.setattr(traffic, "_closing", False)
+        patch.setattr(traffic, "drain", interrupted)
+        patch.setattr(traffic.log, "error", said.append)
+        traffic._close_at_exit()
+    [line] = said
+    assert "cannot account for it" in line
+    host.cancel_all(name)
+    leaf.shutdown()
+    host.close_server(name)
+
+
+def test_a_tick_after_shutdown_says_what_is_wrong(
+    journal: Journal, name: str, node: Any, spin: Any
+) -> None:
+    """A timer of the user's goes on."""
+    leaf = MoveRobot("m", 5.0, action_name=name)
+    tree = py_trees.trees.BehaviourTree(leaf)
+    tree.setup(node=node)
+    until(lambda: state(leaf) == "EXECUTING", meanwhile=lambda: (spin(), tree.tick()))
+    tree.shutdown()
+    with pytest.raises(RuntimeError, match="setup"):
+        tree.tick()
+    assert journal.ends() == ["canceled"]
+
+
+def test_a_tick_before_setup_says_what_is_wrong(name: str) -> None:
+    with pytest.raises(RuntimeError, match="setup"):
+        MoveRobot("m", 1.0, action_name=name).tick_once()
+
+
+def test_setup_without_a_node_says_what_is_wrong(name: str) -> None:
+    with pytest.raises(TypeError, match="node"):
+        MoveRobot("m", 1.0, action_name=name).setup()
+
+
+def test_the_deadline_of_shutdown_is_one_for_all_goals(
+    host: Host, name: str, node: Any, spin: Any
+) -> None:
+    """And not one for each: five servers refuse to cancel."""
+    names = [f"{name}_{number}" for number in range(5)]
+    for each in names:
+        host.open(each, "1:reject_cancel")
+    leaves = [
+        MoveRobot(each.rpartition("/")[2], 9.0, action_name=each, timeout=Timeouts(cancel=2.0))
+        for each in names
+    ]
+    tree = py_trees.trees.BehaviourTree(together(*leaves))
+    tree.setup(node=node)
+    until(
+        lambda: all(state(leaf) == "EXECUTING" for leaf in leaves),
+        meanwhile=lambda: (spin(), tree.tick()),
+    )
+    started = time.monotonic()
+    tree.shutdown()
+    assert time.monotonic() - started < 7.0
+    assert {(leaf.outcome, leaf.end) for leaf in leaves} == {(Outcome.CANCELED, End.UNKNOWN)}
+    for each in names:
+        host.close_server(each)
+
+
+def test_shutdown_while_the_acceptance_is_open(host: Host, name: str, node: Any, spin: Any) -> None:
+    journal = host.open(name, "1:delay_accept=0.7")
+    leaf = MoveRobot("m", 5.0, action_name=name)
+    tree = py_trees.trees.BehaviourTree(leaf)
+    tree.setup(node=node)
+    until(lambda: journal.count("received"), meanwhile=lambda: (spin(), tree.tick()))
+    tree.shutdown()
+    assert journal.ends() == ["canceled"]
+    assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.CANCELED)
+    host.close_server(name)
+
+
+def test_two_trees_with_the_same_names_never_have_two_goals_live(
+    journal: Journal, name: str, context: Any, node: Any, spin: Any
+) -> None:
+    """On one node, and on two: resources are held by the process."""
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.node import Node
+
+    other = Node("tests", context=context, namespace="/other")
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(other)
+    leaves = [MoveRobot("m", 0.2, action_name=name) for _ in range(4)]
+    trees = [py_trees.trees.BehaviourTree(together(leaf, name="root")) for leaf in leaves]
+    for number, tree in enumerate(trees):
+        tree.setup(node=other if number % 2 else node)
+
+    def step() -> None:
+        spin()
+        executor.spin_once(timeout_sec=0.005)
+        for tree in trees:
+            if tree.root.status is not Status.SUCCESS:
+                tree.tick()
+
+    until(lambda: all(tree.root.status is Status.SUCCESS for tree in trees), meanwhile=step)
+    assert journal.max_live == 1
+    assert journal.ends() == ["succeeded"] * 4
+    for tree in trees:
+        tree.shutdown()
+    executor.shutdown()
+    other.destroy_node()
+
+
+@pytest.mark.parametrize("busy", ["wait", "share"])
+def test_an_action_shared_by_twenty_leaves(
+    journal: Journal, name: str, node: Any, spin: Any, busy: str
+) -> None:
+    """As many as would overrun the queue of the server's service, which holds ten."""
+    leaves = [MoveRobot(f"m{i}", 0.05, action_name=name, busy=busy) for i in range(20)]
+    tree = py_trees.trees.BehaviourTree(together(*leaves))
+    tree.setup(node=node)
+    until(
+        lambda: tree.root.status is not Status.RUNNING,
+        9.0,
+        meanwhile=lambda: (tree.tick(), spin()),
+    )
+    assert [leaf.outcome for leaf in leaves] == [Outcome.SUCCEEDED] * 20
+    assert journal.ends() == ["succeeded"] * 20
+    assert journal.executed_twice == []
+    assert (journal.max_live == 1) == (busy == "wait")
+    tree.shutdown()
+
+
+def test_nobody_ticks_any_more_and_the_goal_is_drained_by_its_deadline(
+    journal: Journal, name: str, node: Any, spin: Any
+) -> None:
+    leaf = MoveRobot("m", 9.0, action_name=name, timeout=0.4)
+    leaf.setup(node=node)
+    until(lambda: state(leaf) == "EXECUTING", meanwhile=lambda: (spin(), leaf.tick_once()))
+    until(lambda: journal.ends() == ["canceled"], meanwhile=spin)
+    until(lambda: leaf.end is End.CANCELED, meanwhile=spin)
+    leaf.tick_once()
+    assert (leaf.status, leaf.outcome) == (Status.FAILURE, Outcome.RESULT_TIMEOUT)
+    leaf.shutdown()

@@ -1,0 +1,457 @@
+"""The server: killed, stopped, closed, restarted, late, or there twice.
+
+The servers are processes of their own. The tree runs in this one, on stock settings; how soon a
+dead server is noticed is decided by the lease that the *server's* process announces.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from typing import Any
+
+import pytest
+from py_trees.common import Status
+
+from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
+from bt_actions.attempts import AttemptRecord
+from bt_actions.goal import State
+from tests.support.processes import HostFactory, Journal
+from tests.support.reliability import Record
+from tests.support.trees import in_sequence, in_turn, state
+from tests.support.waiting import holds_for, until
+
+SHORT = 5.0
+"""Seconds within which a dead server with the short lease is noticed."""
+STOCK = 25.0
+"""The same with Fast DDS as it comes, where no deadline is set."""
+RESTARTED = 5.0
+"""The same from the appearance of its successor."""
+
+
+def stood(leaf: MoveRobot) -> tuple[Outcome | None, End | None]:
+    return leaf.outcome, leaf.end
+
+
+def until_shown(node: Any, name: str, servers: int) -> None:
+    """Wait until discovery shows the node of the tests so many servers."""
+    topic = f"{name}/_action/status"
+    until(lambda: len(node.get_publishers_info_by_topic(topic)) == servers, 6.0, what=topic)
+
+
+class TestKilled:
+    @pytest.mark.parametrize(
+        "phase",
+        [
+            pytest.param("SENDING", marks=pytest.mark.chaos),
+            "EXECUTING",
+            pytest.param("CANCELING", marks=pytest.mark.chaos),
+        ],
+    )
+    @pytest.mark.parametrize("executor", ["multi", pytest.param("single", marks=pytest.mark.chaos)])
+    def test_killed_with_the_short_lease(
+        self,
+        new_host: HostFactory,
+        name: str,
+        node: Any,
+        executor: str,
+        phase: str,
+        record: Record,
+    ) -> None:
+        """SIGKILL to a server that has the short lease, in the phase named"""
+        victim = new_host()
+        fault = {"SENDING": "1:delay_accept=60", "CANCELING": "1:delay_cancel=60"}
+        journal = victim.open(name, *([fault[phase]] if phase in fault else []))
+        timeouts = Timeouts(accept=30.0, cancel=30.0, result=0.3 if phase == "CANCELING" else None)
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=timeouts)
+        with TreeRunner(leaf, node=node, executor=executor) as runner:
+            runner.start()
+            until(lambda: state(leaf) == phase)
+            journal.wait_for("received" if phase == "SENDING" else "accepted")
+            if phase == "CANCELING":
+                journal.wait_for("cancel_requested")
+            killed = victim.kill()
+            assert runner.wait(9.0) is Status.FAILURE
+            record.took(time.monotonic() - killed, SHORT)
+            assert runner.unaccounted == []
+        wanted = Outcome.RESULT_TIMEOUT if phase == "CANCELING" else Outcome.SERVER_LOST
+        assert stood(leaf) == (wanted, End.SERVER_GONE)
+        record.outcome = f"{leaf.outcome}, end {leaf.end}"
+
+    @pytest.mark.chaos
+    def test_killed_on_stock_settings_with_no_deadline(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """SIGKILL to a server with Fast DDS as it comes; the tree has no deadline at all"""
+        victim = new_host(short_lease=False)
+        victim.open(name)
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            killed = victim.kill()
+            assert runner.wait(40.0) is Status.FAILURE
+            record.took(time.monotonic() - killed, STOCK)
+        assert stood(leaf) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+        record.outcome = f"{leaf.outcome}, end {leaf.end}"
+
+    @pytest.mark.chaos
+    def test_killed_on_stock_settings_with_a_feedback_deadline(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """SIGKILL to a server with Fast DDS as it comes; feedback deadline 1 s, cancel 1 s"""
+        victim = new_host(short_lease=False)
+        victim.open(name)
+        leaf = MoveRobot(
+            "m", 9.0, action_name=name, timeout=Timeouts(feedback=1.0, cancel=1.0), retry=3
+        )
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            killed = victim.kill()
+            assert runner.wait(9.0) is Status.FAILURE
+            record.took(time.monotonic() - killed, 4.0)
+            assert stood(leaf) == (Outcome.STALLED, End.UNKNOWN)
+            assert [each.goal_id for each in runner.unaccounted] == [leaf.history[-1].goal_id]
+            record.outcome = "STALLED, end UNKNOWN and said so; not tried again beside it"
+            until(lambda: leaf.end is End.SERVER_GONE, STOCK, what="SERVER_GONE")
+        assert len(leaf.history) == 1
+
+
+class TestStopped:
+    def test_stopped_for_less_than_the_feedback_deadline(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """SIGSTOP for 1 s, feedback deadline 2.5 s"""
+        host = new_host(short_lease=False)
+        journal = host.open(name)
+        leaf = MoveRobot("m", 1.0, action_name=name, timeout=Timeouts(feedback=2.5))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: leaf.progress().feedback is not None)
+            host.send(signal.SIGSTOP)
+            assert holds_for(lambda: leaf.outcome is None, 1.0)
+            host.send(signal.SIGCONT)
+            assert runner.wait(9.0) is Status.SUCCESS
+        assert journal.events() == ["received", "accepted", "succeeded"]
+        record.outcome = "SUCCEEDED, as if nothing had been"
+
+    def test_stopped_for_longer_than_the_feedback_deadline(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """SIGSTOP until after feedback (0.6 s) and cancel deadline (0.6 s), then SIGCONT"""
+        host = new_host(short_lease=False)
+        journal = host.open(name)
+        leaf = MoveRobot(
+            "m", 9.0, action_name=name, timeout=Timeouts(feedback=0.6, cancel=0.6), retry=3
+        )
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: leaf.progress().feedback is not None)
+            stopped = host.send(signal.SIGSTOP)
+            assert runner.wait(5.0) is Status.FAILURE
+            record.took(time.monotonic() - stopped, 3.0)
+            assert stood(leaf) == (Outcome.STALLED, End.UNKNOWN)
+            assert len(runner.unaccounted) == 1
+            host.send(signal.SIGCONT)
+            journal.wait_for("canceled")
+            until(lambda: leaf.end is End.CANCELED, what="accounted for at last")
+            assert runner.unaccounted == []
+        assert journal.ends() == ["canceled"]
+        record.outcome = "STALLED, end UNKNOWN; canceled as soon as the server woke"
+
+    @pytest.mark.chaos
+    def test_stopped_and_awake_before_the_cancel_deadline(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """SIGSTOP until the feedback deadline (0.6 s) has passed, then SIGCONT; two attempts"""
+        host = new_host(short_lease=False)
+        journal = host.open(name)
+        leaf = MoveRobot(
+            "m", 1.0, action_name=name, timeout=Timeouts(feedback=0.6, cancel=9.0), retry=2
+        )
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: leaf.progress().feedback is not None)
+            host.send(signal.SIGSTOP)
+            until(lambda: state(leaf) == "CANCELING")
+            host.send(signal.SIGCONT)
+            assert runner.wait(9.0) is Status.SUCCESS
+        assert journal.max_live == 1
+        assert journal.ends()[-1] == "succeeded"
+        record.outcome = "STALLED, its end confirmed; then SUCCEEDED, never two at once"
+
+    @pytest.mark.chaos
+    def test_stopped_for_longer_than_its_lease_and_back(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """SIGSTOP beyond the lease, then SIGCONT: the same server with our goal still running"""
+        host = new_host()
+        journal = host.open(name)
+        first = MoveRobot("first", 20.0 / 3, action_name=name)
+        second = MoveRobot("second", 0.3, action_name=name, timeout=Timeouts(server=20.0))
+        with TreeRunner(in_turn(first, second), node=node) as runner:
+            runner.start()
+            until(lambda: first.progress().feedback is not None)
+            stopped = host.send(signal.SIGSTOP)
+            until(lambda: first.outcome, 9.0)
+            record.took(time.monotonic() - stopped, SHORT)
+            assert stood(first) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+            host.send(signal.SIGCONT)
+            assert runner.wait(20.0) is Status.SUCCESS
+        assert first.end in (End.CANCELED, End.SUCCEEDED)
+        assert journal.ends() == ["canceled", "succeeded"]
+        assert journal.max_live == 1
+        record.outcome = "SERVER_LOST; back: canceled first, then the next goal SUCCEEDED"
+
+    @pytest.mark.chaos
+    def test_stopped_and_back_while_another_node_wants_it(
+        self, new_host: HostFactory, name: str, domain: int, record: Record
+    ) -> None:
+        """SIGSTOP beyond the lease, then SIGCONT; the next goal is one of another node"""
+        host = new_host()
+        journal = host.open(name)
+        first = MoveRobot("first", 40.0, action_name=name)
+        second = MoveRobot("second", 0.3, action_name=name, timeout=Timeouts(server=30.0))
+        with TreeRunner(first) as one, TreeRunner(second) as other:
+            one.start()
+            until(lambda: first.progress().feedback is not None)
+            host.send(signal.SIGSTOP)
+            assert one.wait(20.0) is Status.FAILURE
+            assert stood(first) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+            other.start()
+            until(lambda: state(second) == "WAITING_FOR_SERVER")
+            host.send(signal.SIGCONT)
+            status = other.wait(40.0)
+            assert journal.max_live == 1
+            if status is Status.SUCCESS:
+                assert first.end is End.CANCELED
+                assert journal.ends() == ["canceled", "succeeded"]
+            else:  # Fast DDS showed the second node no more than a part of the server again
+                assert second.outcome is Outcome.SERVER_UNAVAILABLE
+        record.outcome = (
+            "SERVER_LOST; back: canceled before the other node's goal, never two at once"
+        )
+
+
+class TestClosed:
+    @pytest.mark.chaos
+    @pytest.mark.parametrize("phase", ["SENDING", "EXECUTING", "CANCELING"])
+    def test_a_server_that_exits_in_good_order(
+        self, new_host: HostFactory, name: str, node: Any, phase: str, record: Record
+    ) -> None:
+        """SIGINT to the server's process, which closes its server and goes; stock lease"""
+        host = new_host(short_lease=False)
+        fault = {"SENDING": "1:delay_accept=60", "CANCELING": "1:delay_cancel=60"}
+        journal = host.open(name, *([fault[phase]] if phase in fault else []))
+        timeouts = Timeouts(accept=30.0, cancel=30.0, result=0.3 if phase == "CANCELING" else None)
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=timeouts)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            journal.wait_for("received")
+            until(lambda: state(leaf) == phase)
+            closed = host.send(signal.SIGINT)
+            assert runner.wait(9.0) is Status.FAILURE
+            record.took(time.monotonic() - closed, SHORT)
+            assert runner.unaccounted == []
+        wanted = Outcome.RESULT_TIMEOUT if phase == "CANCELING" else Outcome.SERVER_LOST
+        assert leaf.outcome is wanted
+        assert leaf.end in (End.SERVER_GONE, End.ABORTED, End.CANCELED)
+        record.outcome = f"{leaf.outcome}, end {leaf.end}"
+
+
+class TestRestarted:
+    @pytest.mark.parametrize(
+        "phase",
+        [
+            pytest.param("SENDING", marks=pytest.mark.chaos),
+            "EXECUTING",
+            pytest.param("CANCELING", marks=pytest.mark.chaos),
+        ],
+    )
+    def test_restarted_within_the_lease(
+        self, new_host: HostFactory, name: str, node: Any, phase: str, record: Record
+    ) -> None:
+        """SIGKILL with the stock lease, another process with the same name at once; two tries"""
+        victim, successor = new_host(short_lease=False), new_host(short_lease=False)
+        fault = {"SENDING": "1:delay_accept=60", "CANCELING": "1:delay_cancel=60"}
+        old = victim.open(name, *([fault[phase]] if phase in fault else []))
+        timeouts = Timeouts(
+            server=10.0, accept=2.0, cancel=12.0, result=2.0 if phase == "CANCELING" else None
+        )
+        retry = Retry(
+            2,
+            outcomes=frozenset(
+                {Outcome.SERVER_LOST, Outcome.RESULT_TIMEOUT, Outcome.ACCEPT_TIMEOUT}
+            ),
+        )
+        leaf = MoveRobot("m", 0.4, action_name=name, timeout=timeouts, retry=retry)
+        leaf.goal = lambda: {"distance": 0.3 if leaf.history else 5.0}
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == phase)
+            old.wait_for("cancel_requested" if phase == "CANCELING" else "received")
+            victim.kill()
+            journal = successor.open(name)
+            opened = journal.wait_for("opened", times=2).t
+            until(lambda: leaf.history, 12.0)
+            record.took(time.monotonic() - opened, RESTARTED)
+            assert runner.wait(20.0) is Status.SUCCESS
+            first = leaf.history[0]
+            said = (first.outcome, first.end)
+            if phase == "SENDING":  # until the ghost is gone, it might still be accepted
+                assert first.outcome is Outcome.ACCEPT_TIMEOUT
+                until(lambda: first.end is End.SERVER_GONE or ended(first), STOCK, what="ghost")
+                assert first.end in (End.SERVER_GONE, End.NEVER_STARTED)
+        if phase != "SENDING":
+            wanted = Outcome.RESULT_TIMEOUT if phase == "CANCELING" else Outcome.SERVER_LOST
+            assert said == (wanted, End.SERVER_GONE)
+        assert of_process(journal, successor.pid) == ["received", "accepted", "succeeded"]
+        assert journal.executed_twice == []
+        record.outcome = f"{first.outcome}, end {first.end}; the second try SUCCEEDED"
+
+    @pytest.mark.chaos
+    def test_restarted_after_the_lease(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """SIGKILL with the short lease; the successor comes when the loss was noticed"""
+        victim, successor = new_host(), new_host()
+        victim.open(name)
+        lost = MoveRobot("lost", 9.0, action_name=name)
+        following = MoveRobot("next", 0.3, action_name=name, timeout=Timeouts(server=10.0))
+        with TreeRunner(in_turn(lost, following), node=node) as runner:
+            runner.start()
+            until(lambda: state(lost) == "EXECUTING")
+            killed = victim.kill()
+            until(lambda: lost.outcome, 9.0)
+            record.took(time.monotonic() - killed, SHORT)
+            journal = successor.open(name)
+            assert runner.wait(9.0) is Status.SUCCESS
+        assert stood(lost) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+        assert of_process(journal, successor.pid) == ["received", "accepted", "succeeded"]
+        record.outcome = "SERVER_LOST, end SERVER_GONE; the next goal SUCCEEDED"
+
+    @pytest.mark.chaos
+    def test_restarted_again_and_again(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """Killed in mid-motion and restarted three times in a row, stock lease, four tries"""
+        hosts = [new_host(short_lease=False) for _ in range(4)]
+        journal = hosts[0].open(name)
+        retry = Retry(4, outcomes=frozenset({Outcome.SERVER_LOST}))
+        leaf = MoveRobot("m", 2.0, action_name=name, retry=retry, timeout=Timeouts(server=10.0))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            for number, host in enumerate(hosts[1:], start=1):
+                journal.wait_for("accepted", times=number, within=15.0)
+                until(lambda: state(leaf) == "EXECUTING")
+                hosts[number - 1].kill()
+                host.open(name)
+            assert runner.wait(20.0) is Status.SUCCESS
+        assert [each.outcome for each in leaf.history] == [
+            *[Outcome.SERVER_LOST] * 3,
+            Outcome.SUCCEEDED,
+        ]
+        assert journal.executed_twice == []
+        assert len(journal.ends()) == 4
+        record.outcome = "SERVER_LOST three times, then SUCCEEDED"
+
+
+class TestLate:
+    def test_a_server_that_appears_3_s_late(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """The server comes 3 s after the goal was wanted; server deadline 10 s"""
+        host = new_host()
+        leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=10.0))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            assert holds_for(lambda: leaf.outcome is None, 3.0)
+            journal = host.open(name)
+            opened = time.monotonic()
+            assert runner.wait(9.0) is Status.SUCCESS
+            record.took(time.monotonic() - opened, 3.0)
+        assert journal.events() == ["received", "accepted", "succeeded"]
+        record.outcome = "SUCCEEDED"
+
+
+class TestTwice:
+    def test_two_servers_under_one_name_execute_nothing(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """Two live servers, in two processes, under one name"""
+        one, other = new_host(), new_host()
+        one.open(name)
+        journal = other.open(name)
+        until_shown(node, name, 2)
+        leaf = MoveRobot("m", 0.3, action_name=name, retry=3)
+        wanted = time.monotonic()
+        with TreeRunner(leaf, node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.FAILURE
+        record.took(time.monotonic() - wanted, 5.0)
+        assert stood(leaf) == (Outcome.SERVER_AMBIGUOUS, End.NEVER_STARTED)
+        assert journal.events() == []
+        assert len(leaf.history) == 1
+        record.outcome = "SERVER_AMBIGUOUS, end NEVER_STARTED"
+
+    def test_a_ghost_is_not_a_second_server(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """A server was killed (stock lease: a ghost for 20 s), its successor is up: a new goal"""
+        victim, successor = new_host(short_lease=False), new_host(short_lease=False)
+        victim.open(name)
+        warm = MoveRobot("warm", 0.1, action_name=name)
+        leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=10.0))
+        with TreeRunner(warm, node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+            victim.kill()
+            journal = successor.open(name)
+            until_shown(node, name, 2)
+            wanted = time.monotonic()
+            with TreeRunner(leaf, node=node) as second:
+                assert second.run(timeout=15.0) is Status.SUCCESS
+            record.took(time.monotonic() - wanted, 10.0)
+        assert of_process(journal, successor.pid) == ["received", "accepted", "succeeded"]
+        assert journal.executed_twice == []
+        record.outcome = "SUCCEEDED, executed once"
+
+    @pytest.mark.chaos
+    def test_two_of_two_are_killed_and_one_comes_back(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """Two live servers, one of them is killed (short lease): goals go to the other again"""
+        one, other = new_host(), new_host()
+        one.open(name)
+        journal = other.open(name)
+        until_shown(node, name, 2)
+        refused = MoveRobot("refused", 0.3, action_name=name)
+        leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=15.0))
+        tree = in_turn(refused, in_sequence(leaf))
+        with TreeRunner(tree, node=node) as runner:
+            runner.start()
+            until(lambda: refused.outcome, 9.0)
+            runner.pause()
+            killed = other.kill()
+            until_shown(node, name, 1)
+            runner.resume()
+            runner.wait(15.0)
+            record.took(time.monotonic() - killed, 10.0)
+        if leaf.outcome is Outcome.SERVER_AMBIGUOUS:  # it was asked before the pause took hold
+            leaf = MoveRobot("again", 0.3, action_name=name)
+            with TreeRunner(leaf, node=node) as runner:
+                runner.run(timeout=9.0)
+        assert leaf.outcome is Outcome.SUCCEEDED
+        assert of_process(journal, other.pid) == []
+        assert of_process(journal, one.pid) == ["received", "accepted", "succeeded"]
+        record.outcome = "SERVER_AMBIGUOUS while both live, then SUCCEEDED"
+
+
+def ended(record: AttemptRecord) -> bool:
+    return record.goal.lost or record.goal.state is State.DONE
+
+
+def of_process(journal: Journal, pid: int) -> list[str]:
+    """The events of the goals that one process has received, without the steps."""
+    entries = [e for e in journal.entries() if e.pid == pid and e.event != "step"]
+    received = {e.goal for e in entries if e.event == "received"}
+    return [str(e.event) for e in entries if e.goal in received]

@@ -1,0 +1,42 @@
+"""Setup and teardown: create, run, shut down, and nothing is left.
+
+Each scenario is a process of its own, so that all it holds can be counted, and all it says.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+
+from tests.scenarios.conftest import Launch
+from tests.support.reliability import Record
+
+MEMORY = 0.05
+"""MB that a cycle may hold on to: a tenth of what one leaked thread or context holds."""
+AT_RANDOM = 3.0
+"""MB by which a process grows in some runs, once: what it discovers of others is in it."""
+
+
+@pytest.mark.parametrize("cycles", [20, pytest.param(200, marks=pytest.mark.chaos)])
+@pytest.mark.parametrize("how", ["own", "user"])
+def test_cycles_in_one_process_leave_nothing(
+    how: str, cycles: int, launch: Launch, record: Record
+) -> None:
+    """Create, run, shut down, so many times in one process; "user": in a user's own context"""
+    began = time.monotonic()
+    program = launch(how, str(cycles), program=("-m", "tests.support.cycles"))
+    assert program.wait(30.0 + 2.0 * cycles) == 0, program
+    told = json.loads(program.lines[-1])
+    warm, after = told["warm"], told["after"]
+    assert program.errors == [], "no warning"
+    assert program.lines[:-1] == []
+    assert after["threads"] == warm["threads"]
+    assert after["files"] <= warm["files"]
+    grown = after["memory"] - warm["memory"]
+    assert grown < AT_RANDOM + MEMORY * cycles, f"{grown:.2f} MB"
+    assert told["longest"] < 30.0
+    record.took(time.monotonic() - began)
+    record.shows = f"{cycles} goals succeeded"
+    record.outcome = "no warning, no thread, no file and no memory left behind"

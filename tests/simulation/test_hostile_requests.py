@@ -1,0 +1,101 @@
+"""What clients must not do, done to a server: it goes on, and its journal tells."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
+from test_msgs.action import Fibonacci
+from unique_identifier_msgs.msg import UUID
+
+from bt_actions.simulation import Script, ScriptedServer
+from bt_actions.simulation import journal as j
+from tests.simulation.conftest import Bench, Client
+
+ID = UUID(uuid=list(range(16)))
+
+
+@pytest.fixture
+def client(bench: Bench, space: str) -> Client:
+    name = f"{space}/fibonacci"
+    client = bench.client(Fibonacci, name)
+    bench.serve(
+        ScriptedServer(bench.node, Fibonacci, name, Script(duration=30.0), journal=bench.path)
+    )
+    return client.until_ready()
+
+
+def cancel(bench: Bench, client: Client, request: CancelGoal.Request) -> CancelGoal.Response:
+    name = client.rclpy_client._action_name
+    asker = bench.client_node.create_client(CancelGoal, f"{name}/_action/cancel_goal")
+    bench.until(asker.service_is_ready)
+    answer = asker.call_async(request)
+    bench.until(answer.done)
+    bench.client_node.destroy_client(asker)
+    return answer.result()
+
+
+def test_the_same_id_twice_is_one_goal(bench: Bench, client: Client) -> None:
+    rclpy_client = client.rclpy_client
+    first = rclpy_client.send_goal_async(Fibonacci.Goal(), goal_uuid=ID)
+    bench.until(first.done)
+    again = rclpy_client.send_goal_async(Fibonacci.Goal(), goal_uuid=ID)
+    bench.until(again.done)
+    assert first.result().accepted
+    assert not again.result().accepted
+    assert bench.events() == ["received", "accepted", "received", "rejected"]
+    assert "already in use" in bench.entries()[-1].reason
+    assert j.executions(bench.entries()) == {bytes(ID.uuid).hex(): 1}
+
+
+def test_a_cancel_of_an_unknown_goal_is_answered_as_such(bench: Bench, client: Client) -> None:
+    request = CancelGoal.Request()
+    request.goal_info.goal_id = ID
+    assert cancel(bench, client, request).return_code == CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID
+    assert bench.events() == ["cancel_requested"]
+
+
+def test_a_cancel_of_all_goals_cancels_all(bench: Bench, client: Client) -> None:
+    goals = [client.send().until_accepted() for _ in range(3)]
+    assert len(cancel(bench, client, CancelGoal.Request()).goals_canceling) == 3
+    assert [goal.until_ended().status for goal in goals] == [GoalStatus.STATUS_CANCELED] * 3
+
+
+def test_a_cancel_of_an_ended_goal_is_answered_and_changes_nothing(
+    bench: Bench, client: Client
+) -> None:
+    goal = client.send().until_accepted()
+    for _ in range(2):
+        goal.cancel()
+    assert goal.until_ended().status == GoalStatus.STATUS_CANCELED
+    bench.until(lambda: len(goal.cancels) == 2)
+    assert bench.events().count("canceled") == 1
+
+
+def test_a_result_of_an_unknown_goal_is_answered_with_unknown(bench: Bench, client: Client) -> None:
+    goal = client.send().until_accepted()
+    goal.handle._goal_id = ID
+    goal.ask_for_result()
+    assert goal.until_ended().status == GoalStatus.STATUS_UNKNOWN
+
+
+def test_a_client_that_goes_away_leaves_its_goal_running(bench: Bench, client: Client) -> None:
+    name = client.rclpy_client._action_name
+    leaving = Client(bench, Fibonacci, name).until_ready()
+    leaving.send()
+    bench.until(bench.happened("received"))
+    leaving.rclpy_client.destroy()
+    bench.until(bench.happened("accepted"))
+    assert len(cancel(bench, client, CancelGoal.Request()).goals_canceling) == 1
+    bench.until(bench.happened("canceled"))
+
+
+def test_many_cancels_and_results_at_once(bench: Bench, client: Client) -> None:
+    goals: list[Any] = [client.send().until_accepted() for _ in range(4)]
+    for goal in goals:
+        goal.cancel()
+        goal.ask_for_result()
+        goal.cancel()
+    assert {goal.until_ended().status for goal in goals} == {GoalStatus.STATUS_CANCELED}

@@ -1,0 +1,164 @@
+"""The journal: whole lines, whatever happens, and a reader that judges by them."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bt_actions.simulation import journal
+from bt_actions.simulation.journal import Entry, Event, Journal
+
+S = "/move_robot"
+
+
+def entry(t: float, goal: str, event: Event, *, server: str = S, pid: int = 1) -> Entry:
+    return Entry(t, server, goal, event, pid)
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "j.jsonl"
+    times = iter([1.0, 2.0])
+    written = Journal(path, clock=lambda: next(times))
+    written.write(S, "a1", Event.RECEIVED, number=1)
+    written.write(S, "a1", Event.STEP, pose=1.5)
+    assert len(path.read_text().splitlines()) == 2, "a line is flushed as it is written"
+    written.close()
+    first, second = journal.read(path)
+    assert (first.t, first.server, first.goal, first.event) == (1.0, S, "a1", Event.RECEIVED)
+    assert first.pid == os.getpid()
+    assert first.more == {"number": 1}
+    assert first.pose is None
+    assert second.pose == 1.5
+
+
+def test_each_line_is_a_json_object_with_the_promised_keys(tmp_path: Path) -> None:
+    path = tmp_path / "j.jsonl"
+    Journal(path).write(S, "a1", Event.REJECTED, reason='no "\n" way')
+    line = json.loads(path.read_text())
+    assert {"t", "server", "goal", "event"} <= line.keys()
+    assert line["reason"] == 'no "\n" way'
+
+
+def test_without_a_path_it_is_off() -> None:
+    silent = Journal()
+    assert not silent
+    silent.write(S, "a1", Event.STEP)
+    silent.close()
+
+
+def test_it_goes_on_in_the_file_of_a_predecessor(tmp_path: Path) -> None:
+    path = tmp_path / "j.jsonl"
+    for goal in ("a", "b"):
+        Journal(path).write(S, goal, Event.RECEIVED)
+    assert [each.goal for each in journal.read(path)] == ["a", "b"]
+
+
+def test_a_torn_last_line_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "j.jsonl"
+    Journal(path).write(S, "a", Event.RECEIVED)
+    with path.open("a") as file:
+        file.write('{"t": 2.0, "serv')
+    assert [each.goal for each in journal.read(path)] == ["a"]
+
+
+def test_a_full_disk_is_told_once_and_stops_nothing() -> None:
+    told: list[str] = []
+    full = Journal("/dev/full", on_error=told.append)
+    for _ in range(3):
+        full.write(S, "a", Event.STEP)
+    assert len(told) == 1
+    assert "/dev/full" in told[0]
+
+
+def test_a_file_that_cannot_be_opened_is_an_error_at_once(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No such file"):
+        Journal(tmp_path / "nowhere" / "j.jsonl")
+
+
+def test_a_process_that_is_killed_leaves_every_line_it_wrote(tmp_path: Path) -> None:
+    path = tmp_path / "j.jsonl"
+    program = (
+        "import os, signal, sys\n"
+        "from bt_actions.simulation.journal import Event, Journal\n"
+        "j = Journal(sys.argv[1])\n"
+        "for n in range(1000): j.write('/s', str(n), Event.STEP)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", program, str(path)], check=False)
+    assert [each.goal for each in journal.read(path)] == [str(n) for n in range(1000)]
+
+
+def test_a_goal_is_live_from_its_acceptance_to_its_end() -> None:
+    entries = [
+        entry(1, "a", Event.RECEIVED),
+        entry(2, "a", Event.ACCEPTED),
+        entry(3, "a", Event.CANCEL_REQUESTED),
+        entry(4, "a", Event.CANCELED),
+        entry(5, "b", Event.RECEIVED),
+        entry(5, "b", Event.REJECTED),
+    ]
+    [interval] = journal.live_intervals(entries)
+    assert (interval.goal, interval.start, interval.end) == ("a", 2, 4)
+    assert interval.how is Event.CANCELED
+    assert journal.max_live(entries) == 1
+    assert journal.ends(entries) == {"a": Event.CANCELED, "b": Event.REJECTED}
+
+
+def test_two_goals_at_once_are_counted_as_two() -> None:
+    entries = [
+        entry(1, "a", Event.ACCEPTED),
+        entry(2, "b", Event.ACCEPTED),
+        entry(3, "a", Event.ABORTED),
+        entry(4, "b", Event.SUCCEEDED),
+    ]
+    assert journal.max_live(entries) == 2
+    assert journal.max_live(entries, "/other") == 0
+
+
+def test_one_goal_after_another_is_one_at_once() -> None:
+    entries = [
+        entry(1, "a", Event.ACCEPTED),
+        entry(2, "a", Event.SUCCEEDED),
+        entry(2, "b", Event.ACCEPTED),
+        entry(3, "b", Event.SUCCEEDED),
+    ]
+    assert journal.max_live(entries) == 1
+
+
+def test_a_goal_without_an_end_is_live_for_ever_unless_its_process_was_killed() -> None:
+    entries = [entry(1, "a", Event.ACCEPTED, pid=7), entry(5, "b", Event.ACCEPTED, pid=8)]
+    assert journal.max_live(entries) == 2
+    assert journal.max_live(entries, killed={7: 3.0}) == 1
+    first, second = journal.live_intervals(entries, killed={7: 3.0})
+    assert (first.end, first.how) == (3.0, Event.DIED)
+    assert (second.end, second.how) == (None, None)
+    assert journal.ends(entries) == {"a": None, "b": None}
+
+
+def test_a_goal_that_two_servers_accept_is_executed_twice() -> None:
+    entries = [
+        entry(1, "a", Event.ACCEPTED, pid=7),
+        entry(1, "a", Event.ACCEPTED, pid=8),
+        entry(2, "b", Event.ACCEPTED, pid=8),
+    ]
+    assert journal.executions(entries) == {"a": 2, "b": 1}
+    assert journal.max_live(entries) == 3
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.sampled_from(Event))))
+def test_the_judge_agrees_with_counting(lines: list[tuple[str, Event]]) -> None:
+    entries = [entry(t, goal, event) for t, (goal, event) in enumerate(lines)]
+    live: set[str] = set()
+    most = 0
+    for each in entries:
+        if each.event is Event.ACCEPTED:
+            live.add(each.goal)
+        elif each.event in journal.ENDS:
+            live.discard(each.goal)
+        most = max(most, len(live))
+    assert journal.max_live(entries) == most

@@ -1,0 +1,97 @@
+"""The robot moves as in the article: a tenth of what is left each step, to within a centimetre."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bt_actions.simulation.robot import LIMIT, TOLERANCE, RobotSimulator, RobotStatus, refusal
+
+targets = st.floats(-LIMIT, LIMIT)
+
+
+def test_a_step_covers_a_tenth_of_what_is_left() -> None:
+    robot = RobotSimulator()
+    robot.set_goal(2.0)
+    assert robot.move_step() == pytest.approx(0.2)
+    assert robot.move_step() == pytest.approx(0.38)
+
+
+def test_it_is_ready_then_moving_then_completed() -> None:
+    robot = RobotSimulator()
+    assert robot.get_status() is RobotStatus.READY
+    robot.set_goal(1.0)
+    assert robot.get_status() is RobotStatus.MOVING
+    for _ in range(100):
+        robot.move_step()
+    assert robot.get_status() is RobotStatus.COMPLETED
+
+
+def test_two_metres_take_fifty_one_steps() -> None:
+    robot = RobotSimulator()
+    robot.set_goal(2.0)
+    steps = 0
+    while robot.get_status() is RobotStatus.MOVING:
+        robot.move_step()
+        steps += 1
+    assert steps == 51  # 2 m * 0.9**51 is the first under a centimetre
+
+
+def test_a_goal_where_it_stands_is_completed_without_a_step() -> None:
+    robot = RobotSimulator(3.0)
+    robot.set_goal(3.0)
+    assert robot.get_status() is RobotStatus.COMPLETED
+
+
+def test_it_does_not_move_before_a_goal_nor_after_it_was_stopped() -> None:
+    robot = RobotSimulator(1.0)
+    assert robot.move_step() == 1.0
+    robot.set_goal(2.0)
+    robot.move_step()
+    robot.stop()
+    stopped_at = robot.current_pose
+    assert robot.move_step() == stopped_at
+    assert robot.get_status() is RobotStatus.READY
+
+
+@pytest.mark.parametrize("distance", [math.nan, math.inf, -math.inf, 10.0001, -10.0001, 1e308])
+def test_a_goal_beyond_the_axis_is_refused_and_changes_nothing(distance: float) -> None:
+    robot = RobotSimulator()
+    robot.set_goal(1.0)
+    with pytest.raises(ValueError, match=r"finite|axis"):
+        robot.set_goal(distance)
+    assert robot.target_pose == 1.0
+
+
+@pytest.mark.parametrize("distance", [10.0, -10.0, 0.0, -0.0, 5e-324])
+def test_the_ends_of_the_axis_belong_to_it(distance: float) -> None:
+    assert refusal(distance) is None
+
+
+@given(start=targets, target=targets)
+def test_it_arrives_from_anywhere_without_passing_its_target(start: float, target: float) -> None:
+    robot = RobotSimulator(start)
+    robot.set_goal(target)
+    left = abs(target - start)
+    for _ in range(80):
+        if robot.get_status() is RobotStatus.COMPLETED:
+            break
+        robot.move_step()
+        now_left = abs(target - robot.current_pose)
+        assert now_left <= left
+        assert (target - robot.current_pose) * (target - start) >= 0
+        left = now_left
+    assert robot.get_status() is RobotStatus.COMPLETED
+    assert left < TOLERANCE
+
+
+@given(target=targets, share=st.floats(0.01, 1.0))
+def test_a_smaller_share_of_a_step_covers_that_much_less(target: float, share: float) -> None:
+    slow, fast = RobotSimulator(), RobotSimulator()
+    for robot in (slow, fast):
+        robot.set_goal(target)
+    slow.move_step(share)
+    fast.move_step()
+    assert abs(slow.current_pose) <= abs(fast.current_pose)
+    assert slow.current_pose == pytest.approx(share * fast.current_pose)

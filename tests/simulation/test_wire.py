@@ -1,0 +1,53 @@
+"""A server that is destroyed while its executor spins, at each moment the executor may be at."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from test_msgs.action import Fibonacci
+
+from bt_actions.simulation import ScriptedServer
+from bt_actions.simulation.wire import InterceptedActionServer
+from tests.simulation.conftest import Bench
+
+
+@pytest.fixture
+def gone(bench: Bench, space: str) -> InterceptedActionServer:
+    """The rclpy side of a server that an executor has just put into its wait set."""
+    server = ScriptedServer(bench.node, Fibonacci, f"{space}/fibonacci")
+    wire: Any = server._wire
+    server.close()
+    return wire
+
+
+def test_it_is_left_out_of_the_wait_set(gone: InterceptedActionServer, bench: Bench) -> None:
+    with bench.node.context.handle:
+        wait_set = _rclpy.WaitSet(0, 0, 0, 0, 0, 0, bench.node.context.handle)
+    gone.add_to_wait_set(wait_set)
+    assert not gone.is_ready(wait_set)
+    assert gone.get_num_entities().num_services in {0, 3}
+
+
+def test_nothing_is_taken_from_it(gone: InterceptedActionServer) -> None:
+    assert gone.take_data() == {}
+
+
+def test_what_was_taken_before_is_not_answered(gone: InterceptedActionServer) -> None:
+    request = Fibonacci.Impl.SendGoalService.Request()
+    execution = gone.execute({"goal": (object(), request), "expired": ()})
+    with pytest.raises(StopIteration):
+        execution.send(None)
+
+
+def test_its_results_are_not_sent(gone: InterceptedActionServer) -> None:
+    from rclpy.task import Future
+
+    future = Future()
+    future.set_result(Fibonacci.Impl.GetResultService.Response())
+    gone._send_result_response(object(), future)
+
+
+def test_it_may_be_destroyed_twice(gone: InterceptedActionServer) -> None:
+    gone.destroy()

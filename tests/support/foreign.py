@@ -1,0 +1,300 @@
+"""Programs as a user writes them, with node, executor and loop: ``python -m … PROGRAM ACTION``.
+
+Each sends a long goal, says "executing" when it runs, and ends in its own way, good or bad. None
+of them is kinder to our leaf than py_trees' contract asks for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import os
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+import py_trees
+import rclpy
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
+
+from bt_actions import MoveRobot, Timeouts, TreeRunner
+from bt_actions.events import Event, GoalChanged
+
+
+class User:
+    """A node, a tree of one leaf, and the ways to tick it."""
+
+    def __init__(self, action: str) -> None:
+        rclpy.init()
+        self.node = rclpy.create_node("user")
+        timeouts = Timeouts(cancel=10.0, server=30.0, accept=30.0)
+        self.leaf = MoveRobot("m", 60.0, action_name=action, timeout=timeouts)
+        self.tree = py_trees.trees.BehaviourTree(self.leaf)
+        self.tree.setup(node=self.node)
+        self._said = False
+
+    def executing(self) -> bool:
+        if self.leaf.progress().state != "EXECUTING":
+            return False
+        if not self._said:
+            self._said = True
+            print("executing", flush=True)
+        return True
+
+    def tick(self) -> None:
+        self.tree.tick()
+        self.executing()
+
+    def work(self) -> None:
+        """Tick in a loop of its own until the goal runs."""
+        while not self.executing():
+            rclpy.spin_once(self.node, timeout_sec=0.01)
+            self.tree.tick()
+
+    def work_for_ever(self) -> NoReturn:
+        while True:
+            rclpy.spin_once(self.node, timeout_sec=0.01)
+            self.tick()
+
+    def tell(self) -> None:
+        print(f"end {self.leaf.outcome} {self.leaf.end}", flush=True)
+
+
+def shut_down_and_destroy_on_the_next_line(user: User) -> None:
+    user.work()
+    user.tree.shutdown()
+    user.node.destroy_node()
+    rclpy.shutdown()
+    user.tell()
+
+
+def destroy_while_another_thread_spins(user: User) -> None:
+    executor = MultiThreadedExecutor(3)
+    executor.add_node(user.node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    while not user.executing():
+        user.tree.tick()
+        threading.Event().wait(0.02)
+    user.tree.shutdown()
+    user.node.destroy_node()
+    user.tell()
+    executor.shutdown()
+    thread.join()
+    rclpy.shutdown()
+
+
+def _shut_down_in_a_timer(user: User, executor: Any) -> None:
+    executor.add_node(user.node)
+
+    def callback() -> None:
+        user.tree.tick()
+        if user.executing():
+            timer.cancel()
+            user.tree.shutdown()
+            user.tell()
+            user.node.destroy_node()
+            rclpy.shutdown()
+
+    timer = user.node.create_timer(0.02, callback)
+    with contextlib.suppress(ExternalShutdownException):
+        executor.spin()
+
+
+def shut_down_in_a_timer(user: User) -> None:
+    _shut_down_in_a_timer(user, SingleThreadedExecutor())
+
+
+def shut_down_in_a_timer_of_a_multithreaded_executor(user: User) -> None:
+    _shut_down_in_a_timer(user, MultiThreadedExecutor(3))
+
+
+def tick_tock(user: User) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(user.node)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+
+    def enough(tree: py_trees.trees.BehaviourTree) -> None:
+        if user.executing():
+            tree.interrupt()
+
+    user.tree.tick_tock(period_ms=20, post_tick_handler=enough)
+    user.tree.shutdown()
+    user.tell()
+    executor.shutdown()
+    thread.join()
+    user.node.destroy_node()
+    rclpy.shutdown()
+
+
+def tick_in_a_timer_until_done(user: User) -> None:
+    """The one that lets the goal succeed."""
+    user.leaf.goal = {"distance": 0.3}
+    done = rclpy.task.Future()
+
+    def callback() -> None:
+        user.tick()
+        if user.tree.root.status is not py_trees.common.Status.RUNNING:
+            timer.cancel()
+            done.set_result(None)
+
+    timer = user.node.create_timer(0.02, callback)
+    executor = MultiThreadedExecutor(2)
+    executor.add_node(user.node)
+    executor.spin_until_future_complete(done)
+    user.tree.shutdown()
+    user.tell()
+    executor.shutdown()
+    user.node.destroy_node()
+    rclpy.shutdown()
+
+
+def never_shut_down(user: User) -> None:
+    user.work()
+    user.node.destroy_node()
+    rclpy.shutdown()
+
+
+def just_end(user: User) -> None:
+    user.work()
+
+
+def just_end_soon(user: User) -> None:
+    """Whatever the server says."""
+    user.leaf.timeouts = Timeouts(cancel=2.0, server=30.0, accept=30.0)
+    user.work()
+
+
+def end_with_a_spinning_daemon_thread(user: User) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(user.node)
+    threading.Thread(target=executor.spin, daemon=True).start()
+    while not user.executing():
+        user.tree.tick()
+        threading.Event().wait(0.02)
+
+
+def crash(user: User) -> None:
+    user.work()
+    raise RuntimeError("on purpose")
+
+
+def crash_in_a_timer(user: User) -> None:
+    def callback() -> None:
+        user.tree.tick()
+        if user.executing():
+            raise RuntimeError("on purpose")
+
+    user.node.create_timer(0.02, callback)
+    rclpy.spin(user.node)
+
+
+def exit_in_a_timer(user: User) -> None:
+    def callback() -> None:
+        user.tree.tick()
+        if user.executing():
+            sys.exit(7)
+
+    user.node.create_timer(0.02, callback)
+    rclpy.spin(user.node)
+
+
+def loop_until_a_signal(user: User) -> None:
+    user.work_for_ever()
+
+
+def spin_until_a_signal(user: User) -> None:
+    user.node.create_timer(0.02, user.tick)
+    rclpy.spin(user.node)
+
+
+def spin_until_a_signal_and_clean_up(user: User) -> None:
+    user.node.create_timer(0.02, user.tick)
+    try:
+        rclpy.spin(user.node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        user.tree.shutdown()
+        user.tell()
+        user.node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def tick_tock_until_a_signal(user: User) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(user.node)
+    threading.Thread(target=executor.spin, daemon=True).start()
+
+    def until_the_context_ends(tree: py_trees.trees.BehaviourTree) -> None:
+        user.executing()
+        if not rclpy.ok():
+            tree.interrupt()
+
+    user.tree.tick_tock(period_ms=20, post_tick_handler=until_the_context_ends)
+    user.tree.shutdown()
+    user.tell()
+
+
+def _started(action: str) -> TreeRunner:
+    """A runner with a node of its own, whose goal runs."""
+    leaf = MoveRobot("m", 60.0, action_name=action, timeout=Timeouts(cancel=10.0, server=30.0))
+    runner = TreeRunner(leaf)
+
+    def say(event: Event) -> None:
+        if isinstance(event, GoalChanged) and event.state == "EXECUTING":
+            print("executing", flush=True)
+            executing.set()
+
+    executing = threading.Event()
+    runner.observe(say)
+    runner.start()
+    executing.wait()
+    return runner
+
+
+def crash_beside_a_runner(action: str) -> NoReturn:
+    _started(action)
+    raise RuntimeError("on purpose")
+
+
+def end_beside_a_runner(action: str) -> None:
+    _started(action)
+
+
+def wait_for_a_runner(action: str) -> None:
+    _started(action).wait()
+
+
+def run_and_clean_up(action: str) -> None:
+    leaf = MoveRobot("m", 60.0, action_name=action, timeout=Timeouts(cancel=10.0, server=30.0))
+    with TreeRunner(leaf) as runner:
+        runner.observe(
+            lambda event: (
+                print("executing", flush=True)
+                if isinstance(event, GoalChanged) and event.state == "EXECUTING"
+                else None
+            )
+        )
+        runner.run()
+
+
+PROGRAMS: dict[str, Callable[..., None]] = {
+    name: program
+    for name, program in list(globals().items())
+    if callable(program) and getattr(program, "__module__", "") == __name__ and name[0].islower()
+}
+
+
+def _end_with_the_test() -> None:
+    if not os.read(0, 1):
+        os._exit(99)
+
+
+if __name__ == "__main__":
+    threading.Thread(target=_end_with_the_test, daemon=True).start()
+    program = PROGRAMS[sys.argv[1]]
+    takes_a_user = "user" in inspect.signature(program).parameters
+    program(User(sys.argv[2]) if takes_a_user else sys.argv[2])

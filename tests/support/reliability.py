@@ -1,0 +1,146 @@
+"""What the scenarios tell the report: docs/reliability.md is written from it and from nothing else.
+
+A row is kept for each scenario that ran. Times are rounded so that two runs read alike.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+
+from bt_actions.simulation import journal
+from tests.support.processes import Journal
+
+HEAD = """\
+# Reliability: what was tried, and what became of the goals
+
+Written by `make chaos` from its last run; do not edit. Each row is one scenario with real
+processes, real signals and real network cuts. What a server did is read from its journal, a file it
+writes as each goal is received, accepted, canceled and finished: the client's own view is not
+believed. Times are rounded. How to get the short lease for servers of your own:
+[reliability-settings.md](reliability-settings.md).
+"""
+ON_A_BUSY_MACHINE = 3.0
+"""Times longer than a scenario's limit is good enough where no report is written: `make test` runs
+beside anything, and a lease of 20 s, or a deadline that is forgotten, still stands out."""
+SHOWN = 4
+"""Goals (alike ones in a row are one) whose events are told one by one; more are counted."""
+
+
+@dataclass
+class Record:
+    """One scenario, as it fills itself in; what it leaves out, its name and journals tell."""
+
+    family: str
+    scenario: str
+    did: str = ""
+    outcome: str = ""
+    seconds: float | None = None
+    limit: float | None = None
+    leniency: float = 1.0
+    shows: str = ""
+    verdict: str = "failed"
+    journals: list[Journal] = field(default_factory=list)
+
+    def took(self, seconds: float, limit: float | None = None) -> None:
+        """Note the time to the outcome; with `limit`, fail the scenario when it took longer."""
+        self.seconds, self.limit = seconds, limit
+        if limit is not None:
+            allowed = limit * self.leniency
+            assert seconds <= allowed, f"took {seconds:.2f} s, allowed are {allowed:g} s"
+
+    def read_journals(self) -> None:
+        """Say what the journals show, unless the scenario has said it."""
+        if not self.shows:
+            told = [(each, summary([each])) for each in self.journals]
+            many = len(told) > 1
+            self.shows = "; ".join(
+                f"{last_part(each.server)}: {text}" if many else text for each, text in told
+            )
+            if len(told) > SHOWN:
+                self.shows = summary(self.journals)
+
+    @property
+    def row(self) -> str:
+        """The row of the table."""
+        time = "" if self.seconds is None else rounded(self.seconds)
+        if time and self.limit is not None:
+            time += f" (allowed: {self.limit:g} s)"
+        outcome = self.outcome if self.verdict == "passed" else f"**{self.verdict}**"
+        cells = [self.scenario, self.did or "–", self.shows or "–", outcome or "held", time]
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def last_part(server: str) -> str:
+    """The part of a server's name that tells it from others, without a test's own number."""
+    return re.sub(r"/t\d+_\d+", "", server).strip("/") or server
+
+
+def rounded(seconds: float) -> str:
+    """Return the seconds as they are worth telling."""
+    if seconds < 1.0:
+        return "under 1 s"
+    return f"about {round(seconds * 2) / 2:g} s" if seconds < 10.0 else f"about {seconds:.0f} s"
+
+
+def summary(journals: Iterable[Journal]) -> str:
+    """Return in words what became of the goals."""
+    goals: dict[tuple[str, str], list[str]] = {}
+    ends: Counter[str] = Counter()
+    twice = most = 0
+    for each in journals:
+        entries = each.entries()
+        for entry in entries:
+            if entry.goal and entry.event not in ("step", "cancel_accepted"):
+                goals.setdefault((entry.server, entry.goal), []).append(str(entry.event))
+        ends += Counter(str(end or "never answered") for end in journal.ends(entries).values())
+        twice += sum(times > 1 for times in journal.executions(entries).values())
+        most = max(most, journal.max_live(entries, killed=each.killed))
+    if not goals:
+        return "no goal was received"
+    stories = [(text, len(list(same))) for text, same in groupby(map(_once, goals.values()))]
+    if len(stories) <= SHOWN:
+        told = "; then ".join(f"{n} × {text}" if n > 1 else text for text, n in stories)
+    else:
+        told = f"{len(goals)} goals: " + ", ".join(f"{n} {end}" for end, n in ends.items())
+    live = ""
+    if len(goals) > 1:
+        live = f"; {most} live at once" if most > 1 else "; never two live at once"
+    return told.replace("_", " ") + live + (f"; **{twice} executed twice**" if twice else "")
+
+
+def _once(events: list[str]) -> str:
+    """Name each event once, in the order of its first time."""
+    return ", ".join(dict.fromkeys(events))
+
+
+def sentence(name: str) -> str:
+    """Return the name of a test as the sentence that it is."""
+    text, _, case = name.removeprefix("test_").partition("[")
+    text = text.replace("_", " ")
+    shown = case.rstrip("]").replace("_", " ")
+    return text[:1].upper() + text[1:] + (f" ({shown})" if shown else "")
+
+
+def write(path: Path, records: Iterable[Record]) -> None:
+    """Write the report."""
+    families: dict[str, list[Record]] = {}
+    for record in records:
+        families.setdefault(record.family, []).append(record)
+    count = sum(len(each) for each in families.values())
+    ran = [record for each in families.values() for record in each]
+    good = sum(record.verdict == "passed" for record in ran)
+    skipped = sum(record.verdict.startswith("skipped") for record in ran)
+    lines = [HEAD, f"{count} scenarios: {good} held, {count - good - skipped} did not"]
+    lines[-1] += f", {skipped} were skipped.\n" if skipped else ".\n"
+    for family, rows in families.items():
+        lines += [f"## {family}\n"]
+        lines += ["| scenario | what was done | the journal shows | outcome | time to outcome |"]
+        lines += ["|---|---|---|---|---|"]
+        lines += [record.row for record in rows]
+        lines += [""]
+    path.write_text("\n".join(lines), encoding="utf-8")

@@ -1,0 +1,82 @@
+"""Behaviours for trees in tests: gates, guards, and ones that raise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import ParallelPolicy, Status
+from py_trees.composites import Parallel, Selector, Sequence
+
+from bt_actions import ActionBehaviour
+
+
+class Gate(Behaviour):
+    """RUNNING until `passed` is true; then SUCCESS."""
+
+    def __init__(self, name: str = "gate") -> None:
+        super().__init__(name)
+        self.passed = False
+
+    def update(self) -> Status:
+        return Status.SUCCESS if self.passed else Status.RUNNING
+
+
+class Guard(Behaviour):
+    """SUCCESS while `holds`, otherwise FAILURE."""
+
+    def __init__(self, name: str = "guard") -> None:
+        super().__init__(name)
+        self.holds = False
+
+    def update(self) -> Status:
+        return Status.SUCCESS if self.holds else Status.FAILURE
+
+
+class Raises(Behaviour):
+    """Raises in one of its methods, once it is told to (at once, where it is not said)."""
+
+    def __init__(self, name: str, method: str, *, when: Callable[[], Any] = lambda: True) -> None:
+        super().__init__(name)
+        self.method = method
+        self.when = when
+
+    def _perhaps(self, method: str) -> None:
+        if method == self.method and self.when():
+            raise RuntimeError(f"on purpose in {method}")
+
+    def setup(self, **kwargs: Any) -> None:
+        self._perhaps("setup")
+
+    def initialise(self) -> None:
+        self._perhaps("initialise")
+
+    def update(self) -> Status:
+        self._perhaps("update")
+        return Status.RUNNING
+
+    def terminate(self, new_status: Status) -> None:
+        self._perhaps("terminate")
+
+    def shutdown(self) -> None:
+        self._perhaps("shutdown")
+
+
+def in_sequence(*children: Behaviour, name: str = "sequence", memory: bool = True) -> Sequence:
+    return Sequence(name, memory=memory, children=list(children))
+
+
+def in_turn(*children: Behaviour, name: str = "fallback", memory: bool = True) -> Selector:
+    return Selector(name, memory=memory, children=list(children))
+
+
+def together(*children: Behaviour, name: str = "together") -> Parallel:
+    """All at once; finished children are not started again."""
+    policy = ParallelPolicy.SuccessOnAll(synchronise=True)
+    return Parallel(name, policy=policy, children=list(children))
+
+
+def state(leaf: ActionBehaviour) -> str:
+    """The state of the goal that the leaf is at."""
+    return leaf.progress().state

@@ -1,0 +1,108 @@
+"""When an action is tried again, and when not."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import pytest
+
+from bt_actions.attempts import AttemptRecord, Attempts
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import Now
+from bt_actions.policy import RETRYABLE, End, Outcome, Retry, Timeouts
+
+START = Now(100.0, 1000.0)
+
+
+def record(outcome: Outcome, end: End = End.ABORTED, result: Any = None) -> AttemptRecord:
+    goal = Goal(b"\x01" * 16, "/move", Timeouts(), START)
+    goal.end = end
+    return AttemptRecord(1, outcome, "", 1000.0, 1002.5, result, goal)
+
+
+def attempts(retry: Retry, when: Any = None) -> Attempts:
+    return Attempts(retry, when, random.Random(0))
+
+
+def later(seconds: float) -> Now:
+    return Now(START.steady + seconds, START.ros + seconds)
+
+
+def test_attempts_counts_all_tries() -> None:
+    three = attempts(Retry(3))
+    answers = [three.again(record(Outcome.ABORTED), START) for _ in range(3)]
+    assert answers == [True, True, False]
+    assert len(three.history) == 3
+
+
+def test_one_attempt_is_never_tried_again() -> None:
+    assert not attempts(Retry()).again(record(Outcome.ABORTED), START)
+
+
+@pytest.mark.parametrize("outcome", list(Outcome))
+def test_only_what_is_named_is_tried_again(outcome: Outcome) -> None:
+    assert attempts(Retry(2)).again(record(outcome), START) == (outcome in Retry().outcomes)
+    everything = Retry(2, outcomes=RETRYABLE)
+    assert attempts(everything).again(record(outcome), START) == (outcome in RETRYABLE)
+
+
+@pytest.mark.parametrize("outcome", sorted(RETRYABLE))
+def test_a_retry_waits_until_the_end_of_the_earlier_goal_is_known(outcome: Outcome) -> None:
+    retry = Retry(2, outcomes=RETRYABLE)
+    assert not attempts(retry).again(record(outcome, End.UNKNOWN), START)
+    assert attempts(retry).again(record(outcome, End.SERVER_GONE), START)
+
+
+def test_when_decides_by_the_result() -> None:
+    def when(result: int) -> bool:
+        return result == 2
+
+    assert attempts(Retry(2), when).again(record(Outcome.ABORTED, result=2), START)
+    assert not attempts(Retry(2), when).again(record(Outcome.ABORTED, result=3), START)
+    assert attempts(Retry(2), when).again(record(Outcome.ABORTED), START), "no result to ask about"
+
+
+def test_when_that_raises_counts_as_no() -> None:
+    def when(result: Any) -> bool:
+        return bool(result.error_code)
+
+    filed = record(Outcome.ABORTED, result=2)
+    assert not attempts(Retry(2), when).again(filed, START)
+    assert "retry.when raised AttributeError" in filed.reason
+
+
+def test_the_next_attempt_waits_for_its_pause_on_the_nodes_clock() -> None:
+    paused = attempts(Retry(3, backoff=2.0))
+    assert paused.pause_left(START) == 0.0
+    paused.again(record(Outcome.ABORTED), START)
+    assert paused.pause_left(START) == 2.0
+    assert paused.pause_left(Now(9999.0, START.ros)) == 2.0, "simulated time stands still"
+    assert paused.pause_left(later(1.5)) == pytest.approx(0.5)
+    assert paused.pause_left(later(2.0)) == 0.0
+
+
+def test_a_clock_that_jumps_back_leaves_what_remained_of_the_pause() -> None:
+    paused = attempts(Retry(3, backoff=2.0))
+    paused.again(record(Outcome.ABORTED), START)
+    paused.pause_left(later(1.5))
+    jumped = Now(START.steady + 1.5, 3.0)
+    assert paused.pause_left(jumped) == pytest.approx(0.5)
+    assert paused.pause_left(Now(jumped.steady, jumped.ros + 0.5)) == pytest.approx(0.0)
+
+
+def test_attempt_is_the_one_under_way_or_next() -> None:
+    two = attempts(Retry(2))
+    assert two.attempt == 1
+    two.again(record(Outcome.ABORTED), START)
+    assert two.attempt == 2
+
+
+def test_a_record_shows_an_end_that_became_known_later() -> None:
+    filed = record(Outcome.RESULT_TIMEOUT, End.UNKNOWN)
+    assert filed.end is End.UNKNOWN
+    filed.goal.end = End.CANCELED
+    assert filed.end is End.CANCELED
+    assert filed.goal_id == "01" * 16
+    assert filed.duration == 2.5
+    assert not filed.late

@@ -1,0 +1,57 @@
+"""The gates in benchmarks/ fail when what they promise does not hold."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHECK = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "check.py"))
+WITHIN = {"parse": 1.0, "check": 2.9, "load": 5.7, "check_large": 57.0, "times_larger": 10.0}
+
+
+def kept(**took: float) -> list[bool]:
+    """Which of the promises about parser, build and growth are kept."""
+    seconds: Any = CHECK["Seconds"](**{**WITHIN, **took})
+    return [ratio.holds for ratio in CHECK["ratios"](seconds)]
+
+
+def test_what_is_within_its_limits_holds() -> None:
+    assert kept() == [True, True, True]
+
+
+@pytest.mark.parametrize(
+    ("took", "holds"),
+    [
+        ({"parse": 0.9}, [False, True, True]),
+        ({"load": 6.0}, [True, False, True]),
+        ({"check_large": 60.0}, [True, True, False]),
+    ],
+)
+def test_what_is_beyond_a_limit_does_not(took: dict[str, float], holds: list[bool]) -> None:
+    assert kept(**took) == holds
+
+
+@pytest.mark.parametrize(("parse", "code"), [(1.0, 0), (0.9, 1)])
+def test_the_gate_fails_with_exit_code_1(
+    parse: float, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    took = CHECK["Seconds"](**{**WITHIN, "parse": parse})
+    monkeypatch.setitem(CHECK["main"].__globals__, "measure", lambda *_: took)
+    monkeypatch.setattr("sys.argv", ["check.py"])
+    assert CHECK["main"]() == code
+    assert ("DOES NOT HOLD" in capsys.readouterr().out) is bool(code)
+
+
+def test_every_job_is_measured() -> None:
+    took = CHECK["measure"](200, 400, 2)
+    for seconds in (took.parse, took.check, took.load, took.check_large):
+        assert 0.0 < seconds < float("inf")
+    assert took.times_larger == 2.0
+
+
+def test_the_tree_that_is_measured_has_so_many_nodes() -> None:
+    written = CHECK["text_of"](1000)
+    assert sum(written.count(f"- {kind}: ") for kind in ("move", "check")) == 1000

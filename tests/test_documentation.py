@@ -1,0 +1,77 @@
+"""What the README and the examples show works as it stands there."""
+
+import re
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.support.processes import Host, HostFactory, Process
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+Start = Callable[..., Process]
+
+
+def _block(language: str) -> str:
+    blocks = re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 1, f"the README has {len(blocks)} {language} blocks"
+    return str(blocks[0])
+
+
+@pytest.fixture
+def server(new_host: HostFactory) -> Host:
+    """A process of servers for names without a namespace, as README and examples use them."""
+    return new_host()
+
+
+def test_the_tree_in_the_readme_runs_and_is_as_short_as_promised(
+    start_program: Start, tmp_path: Path
+) -> None:
+    tree = tmp_path / "fetch.yaml"
+    tree.write_text(_block("yaml"), encoding="utf-8")
+    assert len(_block("yaml").splitlines()) <= 15
+    program = start_program("-m", "bt_actions.cli", "run", str(tree), "--sim", "--speed", "10")
+    assert program.wait() == 0, program
+    assert "The part is in the gripper of the robot" in "\n".join(program.lines), program
+
+
+def test_the_python_in_the_readme_runs_and_is_as_short_as_promised(
+    start_program: Start, server: Host, tmp_path: Path
+) -> None:
+    code = _block("python")
+    assert len(code.splitlines()) <= 20
+    server.robot("", speed=10.0)
+    script = tmp_path / "fetch.py"
+    script.write_text(code, encoding="utf-8")
+    program = start_program(str(script))
+    assert program.wait(40.0) == 0, program
+    assert program.lines[0] == "Status.SUCCESS", program
+    assert [line.split()[-3:-1] for line in program.lines[1:]] == [["SUCCEEDED"] * 2] * 5, program
+
+
+def test_the_example_of_embedding_delivers_the_part(start_program: Start, server: Host) -> None:
+    server.robot("", speed=10.0)
+    program = start_program("examples/embed.py")
+    assert program.wait(40.0) == 0, program
+    assert any(line.startswith("Release: SUCCEEDED, end SUCCEEDED") for line in program.lines)
+
+
+def test_ctrl_c_in_the_example_cancels_its_goal_on_the_server(
+    start_program: Start, server: Host
+) -> None:
+    robot = server.robot("", speed=0.5)
+    program = start_program("examples/embed.py")
+    robot.wait_for("accepted", within=20.0)
+    program.send(signal.SIGINT)
+    assert program.wait() == 1, program
+    robot.wait_for("canceled")
+    assert "succeeded" not in robot.events()
+
+
+def test_every_file_that_the_readme_and_the_docs_name_is_there() -> None:
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name} names {target}"

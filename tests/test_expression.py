@@ -1,0 +1,207 @@
+"""The rules of expressions, as sentences."""
+
+from __future__ import annotations
+
+import array
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bt_actions.expression import MAX_LENGTH, Expression, ExpressionError
+
+RESULT = SimpleNamespace(
+    stalled=True, position=4.0, message="done", poses=[SimpleNamespace(x=1.5), {"x": 2}]
+)
+VARIABLES: dict[str, Any] = {
+    "a": 1,
+    "b": 2.5,
+    "on": True,
+    "list": [10, 20, 30],
+    "where": {"pose": {"x": 7}},
+    "big": 2**200,
+    "raw": array.array("d", [1.0, 2.0]),
+}
+
+
+def value(text: str) -> object:
+    expression = Expression(text, roots=frozenset({"result"}))
+    return expression.evaluate({"result": RESULT}, VARIABLES.__getitem__)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("result.stalled", True),
+        ("result.position == 4", True),
+        ("not result.stalled", False),
+        ("result.stalled and $a < 2", True),
+        ("$a < 2 < $b", True),
+        ("$a + 1", 2),
+        ("$a+$b*2", 6.0),
+        ("-$a ** 2", -1),
+        ("2 ** -1", 0.5),
+        ("7 // 2 + 7 % 4", 6),
+        ("$a in [1, 2]", True),
+        ("'on' in result.message", True),
+        ("$a not in (1, 2)", False),
+        ("$list.1", 20),
+        ("$list[2]", 30),
+        ("$list.0 + $list.1", 30),
+        ("$where.pose.x", 7),
+        ("$where['pose'].x", 7),
+        ("result.poses.0.x", 1.5),
+        ("result.poses.1.x", 2),
+        ("result.poses[0].x + .5", 2.0),
+        ("1.5 + 1.25", 2.75),
+        ("len($list) == 3", True),
+        ("max($a, $b)", 2.5),
+        ("min($list)", 10),
+        ("abs(-3)", 3),
+        ("$raw == [1, 2]", True),
+        ("$raw.1", 2.0),
+        ("true and True", True),
+        ("false or False", False),
+        ("'$a' == \"$a\"", True),
+        ("'ä' == 'ä'", True),
+        ("  $a\n  ==  1 ", True),
+        ("$on", True),
+    ],
+)
+def test_an_expression_has_the_value_python_gives_it(text: str, expected: object) -> None:
+    assert value(text) == expected
+    assert type(value(text)) is type(expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "column"),
+    [
+        ("", "an empty expression", 0),
+        ("result.stalled = true", "'=' alone compares nothing: write '=='", 15),
+        ("$a && $b", "'&&': write 'and'", 3),
+        ("!$a", "'!': write 'not'", 0),
+        ("$a # why", "'#': a comment has no place in an expression", 3),
+        (
+            "pick_at > 1",
+            "unknown name 'pick_at': a variable is written $pick_at; result can be used bare",
+            0,
+        ),
+        ("$1", "a dollar sign begins a name: write $name", 0),
+        ("$a > 1 and __import__('os')", "only len, abs, min and max can be called", 11),
+        ("result.__class__", "'__class__': names with a leading underscore are private", 0),
+        ("_a", "unknown name '_a': a variable is written $_a; result can be used bare", 0),
+        ("len()", "len() needs a value", 0),
+        ("[x for x in $list]", "a comprehension cannot be used in an expression", 0),
+        ("(lambda: 1)", "a lambda cannot be used in an expression", 1),
+        ("$a is 1", "write '==' or '!=' instead of 'is'", 0),
+        ("1 if $a else 2", "'if' cannot be used in an expression", 0),
+        ("$list[0:1]", "a slice cannot be used in an expression", 0),
+        ("f'{x}'", "an f-string cannot be used in an expression", 0),
+        ("'abc", "this text has no closing quote", 0),
+        ("'a\\n'", "a text here holds no backslash and no line break", 2),
+        ("None", "there is no 'None' here", 0),
+        ("$ä", "a dollar sign begins a name: write $name", 0),
+        ("(1", "'(' was never closed", 0),
+        ("1 +", "this is not an expression", 3),
+        ("9" * 100, "this number is too large", 0),
+        ("(" * 300 + "1" + ")" * 300, "this is not an expression", None),
+        ("+" * 1000 + "1", "nested too deep", None),
+        ("1" * (MAX_LENGTH + 1), f"longer than {MAX_LENGTH} characters", 0),
+    ],
+)
+def test_what_is_no_expression_is_refused_with_its_place(
+    text: str, message: str, column: int | None
+) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        Expression(text)
+    assert caught.value.message == message
+    if column is not None:
+        assert caught.value.column == column
+    assert caught.value.end_column > caught.value.column
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "span"),
+    [
+        ("1 + $gone", "$gone has no value", (4, 9)),
+        ("$a / 0", "division by zero", (0, 6)),
+        ("1 == 1 and $a.x", "1 has no field 'x'", (11, 15)),
+        ("$where.poze", "no key 'poze'; there is pose", (0, 11)),
+        ("$list.7", "index 7 is outside of 3 items", (0, 7)),
+        ("$list.0.0", "10 has no items", (0, 9)),
+        ("$big * $big", "the number is too large", (0, 11)),
+        ("9 ** 9 ** 9", "the number would be too large", (0, 11)),
+        ("'a' * 9", "a number is needed, not 'a'", (0, 7)),
+        ("'a' < 1", "a number is needed, not 'a'", (0, 7)),
+        ("not 3", "true or false is needed, not 3", (0, 5)),
+        ("$a and $on", "true or false is needed, not 1", (0, 2)),
+        ("len(3)", "object of type 'int' has no len()", (0, 6)),
+        ("result.nothing", None, (0, 14)),
+    ],
+)
+def test_what_has_no_value_says_which_part_and_why(
+    text: str, message: str | None, span: tuple[int, int]
+) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        value(text)
+    if message is not None:
+        assert caught.value.message == message
+    assert (caught.value.column, caught.value.end_column) == span
+
+
+def test_a_condition_is_true_or_false_and_nothing_else() -> None:
+    assert Expression("$a == 1").holds({}, VARIABLES.__getitem__) is True
+    with pytest.raises(ExpressionError, match="a condition is true or false, but this is 1"):
+        Expression("$a").holds({}, VARIABLES.__getitem__)
+
+
+def test_it_tells_the_variables_it_reads_with_their_places() -> None:
+    expression = Expression("$a.x + $list.0 > len($a)")
+    assert expression.names == {"a", "list"}
+    assert expression.variable_spans == (("a", (0, 2)), ("list", (7, 12)), ("a", (21, 23)))
+
+
+def test_a_variable_that_raises_is_an_expression_error() -> None:
+    def broken(_name: str) -> object:
+        raise RuntimeError("the blackboard is on fire")
+
+    with pytest.raises(ExpressionError, match="on fire"):
+        Expression("$a").evaluate({}, broken)
+
+
+class _Hostile:
+    def __eq__(self, _other: object) -> bool:
+        raise RuntimeError("no comparing")
+
+    def __repr__(self) -> str:
+        raise RuntimeError("no showing")
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+_TOKENS = st.sampled_from(
+    ["$a", "$b", "$list", "$where", "$raw", "$gone", "$bad", "result", ".0", ".x", ".pose", "[0]",
+     "[", "]", "(", ")", "+", "-", "*", "**", "/", "%", "//", "<", "==", "!=", "and", "or", "not",
+     "in", "is", "1", "2.5", "1e308", "99999999999", "'t'", '"', "len(", "max(", "abs(", ",", " ",
+     "true", "lambda", "if", "else", "for", ":", "=", "#", "ä", "\\", "\n", "__class__", "{", "}"]
+)  # fmt: skip
+_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
+    | st.builds(_Hostile) | st.binary(max_size=3),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=5,
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=500)
+@given(st.lists(_TOKENS, max_size=12).map(" ".join) | st.text(max_size=30), _VALUES)
+def test_reading_and_evaluating_raise_nothing_but_expression_errors(text: str, bad: object) -> None:
+    variables = {**VARIABLES, "bad": bad}
+    caught = None
+    try:
+        Expression(text).evaluate({"result": bad}, variables.__getitem__)
+    except ExpressionError as error:
+        caught = error
+    assert caught is None or 0 <= caught.column < caught.end_column <= len(text) + 1

@@ -1,0 +1,822 @@
+"""The life of one goal, rule by rule (DESIGN.md). Every interleaving is tried in machine/."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+from typing import Any
+
+import pytest
+
+import bt_actions.goal
+from bt_actions.goal import (
+    ASK_AGAIN,
+    ASK_IN_ANY_CASE,
+    DENIED_FOR_GOOD,
+    DOUBTS,
+    PATIENCE,
+    RESULT_QUESTIONS,
+    TABLE,
+    Goal,
+)
+from bt_actions.goal_terms import (
+    CANCEL_ACCEPTED,
+    CANCEL_REJECTED,
+    CANCEL_TERMINATED,
+    CANCEL_UNKNOWN_GOAL,
+    STATUS_ABORTED,
+    STATUS_CANCELED,
+    STATUS_SUCCEEDED,
+    Command,
+    Event,
+    Now,
+    State,
+)
+from bt_actions.policy import Busy, End, Outcome, Timeouts
+
+LIMITS = Timeouts(queue=10.0, server=5.0, accept=3.0, result=30.0, feedback=2.0, cancel=4.0)
+SEND, ASK, CANCEL, RELEASE = Command.SEND, Command.ASK_RESULT, Command.CANCEL, Command.RELEASE
+SUCCEEDED = (STATUS_SUCCEEDED, "the result")
+ABORTED = (STATUS_ABORTED, "the result")
+CANCELED = (STATUS_CANCELED, "the result")
+
+
+class Life:
+    """A goal and a clock; `sent` is all it has commanded."""
+
+    def __init__(self, timeouts: Timeouts = LIMITS, **kwargs: Any) -> None:
+        self.now = Now(100.0, 1000.0)
+        self.goal = Goal(b"\x2a" * 16, "/move", timeouts, self.now, **kwargs)
+        self.sent: list[Command] = []
+
+    def on(self, event: Event, detail: Any = None) -> list[Command]:
+        commands = list(self.goal.on(event, self.now, detail))
+        self.sent += commands
+        return commands
+
+    def pass_time(self, seconds: float, ros: float | None = None) -> list[Command]:
+        """Let time pass (on the node's clock `ros` seconds, the same by default) and poll."""
+        ros = seconds if ros is None else ros
+        self.now = Now(self.now.steady + seconds, self.now.ros + ros)
+        commands = list(self.goal.poll(self.now))
+        self.sent += commands
+        return commands
+
+    @property
+    def due_in(self) -> float | None:
+        return self.goal.due_in(self.now)
+
+    def ended(self, outcome: Outcome, end: End) -> None:
+        assert (self.goal.state, self.goal.outcome, self.goal.end) == (State.DONE, outcome, end)
+        assert self.sent.count(RELEASE) == 1
+        assert self.due_in is None
+
+    def is_free(self, outcome: Outcome, end: End) -> None:
+        """The leaf may go on, though the goal is not DONE."""
+        goal = self.goal
+        assert (goal.state, goal.outcome, goal.end) == (State.CANCELING, outcome, end)
+
+
+def waiting(timeouts: Timeouts = LIMITS, **kwargs: Any) -> Life:
+    life = Life(timeouts, **kwargs)
+    life.on(Event.GRANTED)
+    return life
+
+
+def sending(timeouts: Timeouts = LIMITS, **kwargs: Any) -> Life:
+    life = waiting(timeouts, **kwargs)
+    assert life.on(Event.SERVER_READY) == [SEND]
+    return life
+
+
+def executing(timeouts: Timeouts = LIMITS, **kwargs: Any) -> Life:
+    life = sending(timeouts, **kwargs)
+    assert life.on(Event.ACCEPTED) == [ASK]
+    assert life.goal.state is State.EXECUTING
+    return life
+
+
+def suspect(timeouts: Timeouts = LIMITS) -> Life:
+    """A goal whose request was not answered within timeout.accept."""
+    life = sending(timeouts)
+    assert life.pass_time(timeouts.accept or 0.0) == [CANCEL]
+    return life
+
+
+# The table
+
+
+def test_every_pair_of_state_and_event_is_decided() -> None:
+    assert set(TABLE) == {(state, event) for state in State for event in Event}
+
+
+def test_after_done_nothing_is_sent_whatever_comes() -> None:
+    life = executing()
+    life.on(Event.RESULT, SUCCEEDED)
+    for event in Event:
+        assert life.on(event, SUCCEEDED) == []
+    assert life.pass_time(1e6) == []
+    life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
+
+
+@pytest.mark.parametrize("make", [Life, waiting, sending, executing, suspect])
+@pytest.mark.parametrize("event", list(Event))
+def test_the_table_says_where_each_event_may_lead(make: Any, event: Event) -> None:
+    details = {Event.STATUS: STATUS_ABORTED, Event.RESULT: ABORTED, Event.CANCEL_ANSWERED: 0}
+    life = make()
+    before = life.goal.state
+    life.on(event, details.get(event, "detail"))
+    assert life.goal.state in TABLE[before, event].to
+
+
+def test_the_machine_knows_no_ros_no_thread_and_no_clock() -> None:
+    tree = ast.parse(inspect.getsource(bt_actions.goal))
+    imported = {
+        name
+        for node in ast.walk(tree)
+        for name in (
+            [node.module]
+            if isinstance(node, ast.ImportFrom)
+            else [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else []
+        )
+    }
+    assert imported <= {
+        "__future__",
+        "collections.abc",
+        "dataclasses",
+        "typing",
+        "bt_actions.goal_terms",
+        "bt_actions.policy",
+    }
+
+
+def test_a_moment_that_is_none_is_a_mistake_of_the_caller() -> None:
+    with pytest.raises(ValueError, match="not a moment"):
+        Life().goal.on(Event.GRANTED, Now(math.nan, 0.0))
+
+
+def test_a_goal_shows_where_it_is() -> None:
+    assert repr(sending().goal) == "<Goal /move 2a2a2a2a SENDING>"
+    life = executing()
+    life.on(Event.RESULT, ABORTED)
+    assert repr(life.goal) == "<Goal /move 2a2a2a2a DONE ABORTED, end ABORTED>"
+
+
+def test_without_resources_of_its_own_a_goal_needs_its_servers_name() -> None:
+    assert Life().goal.resources == {"/move"}
+    assert Life(resources=frozenset({"base"})).goal.resources == {"base"}
+
+
+# The row of the outcome table
+
+
+def test_a_goal_succeeds() -> None:
+    life = executing()
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
+    assert life.goal.result == "the result"
+    assert life.sent == [SEND, ASK, RELEASE]
+
+
+def test_an_aborted_goal_keeps_its_result() -> None:
+    life = executing()
+    life.on(Event.RESULT, ABORTED)
+    life.ended(Outcome.ABORTED, End.ABORTED)
+    assert life.goal.result == "the result"
+    assert life.goal.reason == "aborted by /move"
+
+
+def test_canceled_without_being_asked_was_somebody_else() -> None:
+    life = executing()
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.CANCELED_BY_OTHER, End.CANCELED)
+
+
+def test_a_refused_goal_never_started() -> None:
+    life = sending()
+    life.on(Event.REJECTED)
+    life.ended(Outcome.REJECTED, End.NEVER_STARTED)
+
+
+def test_no_server_in_time() -> None:
+    life = waiting()
+    life.pass_time(5.0)
+    life.ended(Outcome.SERVER_UNAVAILABLE, End.NEVER_STARTED)
+    assert life.goal.reason == "no action server /move within 5 s"
+
+
+def test_two_servers_are_sent_nothing() -> None:
+    life = waiting()
+    life.on(Event.SERVER_AMBIGUOUS)
+    life.ended(Outcome.SERVER_AMBIGUOUS, End.NEVER_STARTED)
+    assert SEND not in life.sent
+
+
+@pytest.mark.parametrize("how", ["at once", "in time"])
+def test_a_taken_resource_ends_as_server_busy(how: str) -> None:
+    life = Life()
+    if how == "at once":
+        life.on(Event.TAKEN)
+    else:
+        life.pass_time(10.0)
+    life.ended(Outcome.SERVER_BUSY, End.NEVER_STARTED)
+
+
+def test_a_message_that_cannot_be_built_is_not_sent() -> None:
+    life = waiting()
+    life.on(Event.INVALID, "no variable $pick_at")
+    life.ended(Outcome.INVALID_GOAL, End.NEVER_STARTED)
+    assert life.goal.reason == "no variable $pick_at"
+
+
+def test_a_request_that_does_not_leave_started_nothing() -> None:
+    life = sending()
+    life.on(Event.SEND_FAILED, "no space left")
+    life.ended(Outcome.SERVER_UNAVAILABLE, End.NEVER_STARTED)
+
+
+# Rule 2: interrupted before acceptance
+
+
+@pytest.mark.parametrize("make", [Life, waiting])
+def test_interrupted_before_it_was_sent_nothing_is_sent(make: Any) -> None:
+    life = make()
+    life.on(Event.INTERRUPTED)
+    life.ended(Outcome.CANCELED, End.NEVER_STARTED)
+    assert life.sent == [RELEASE]
+
+
+@pytest.mark.parametrize("event", [Event.ACCEPTED, Event.FEEDBACK, Event.STATUS])
+def test_interrupted_before_acceptance_it_is_canceled_as_soon_as_it_turns_up(event: Event) -> None:
+    life = sending()
+    assert life.on(Event.INTERRUPTED) == [], "the server does not know it yet"
+    assert life.on(event, STATUS_CANCELED) == [CANCEL, ASK]
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+@pytest.mark.parametrize("code", [CANCEL_ACCEPTED, CANCEL_TERMINATED])
+def test_a_server_that_knows_a_goal_it_had_not_answered_has_accepted_it(code: int) -> None:
+    life = suspect()
+    assert life.on(Event.CANCEL_ANSWERED, code) == [CANCEL, ASK]
+    assert life.goal.accepted
+
+
+def test_accepted_however_late_it_is_canceled() -> None:
+    life = suspect()
+    life.pass_time(2.0)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(1.0)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    life.pass_time(3600.0)
+    assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
+    assert life.goal.end is End.UNKNOWN
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.ACCEPT_TIMEOUT, End.CANCELED)
+
+
+def test_interrupted_and_then_refused() -> None:
+    life = sending()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.REJECTED)
+    life.ended(Outcome.CANCELED, End.NEVER_STARTED)
+
+
+# Rule 3: suspects
+
+
+def test_an_unanswered_request_is_asked_about_by_canceling() -> None:
+    life = sending()
+    assert life.pass_time(3.0) == [CANCEL]
+    assert life.goal.outcome is None, "the leaf waits: it might have been executed"
+
+
+def test_a_suspect_that_the_server_denies_never_started_and_frees_its_resource() -> None:
+    life = suspect()
+    life.pass_time(2.0)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    assert RELEASE in life.pass_time(1.0)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+
+
+def test_a_suspect_that_nobody_denies_stays_unknown_and_keeps_its_resource() -> None:
+    life = suspect()
+    life.pass_time(3.0)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
+    assert life.goal.holding
+    assert life.pass_time(ASK_AGAIN) == [CANCEL], "and the questions go on"
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(3.0)
+    assert life.goal.end is End.UNKNOWN, "an old denial does not count"
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(2.0, 2.0)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(1.0)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+
+
+def test_a_suspect_that_is_refused_late_was_rejected() -> None:
+    life = suspect()
+    life.on(Event.REJECTED)
+    life.ended(Outcome.REJECTED, End.NEVER_STARTED)
+    assert life.goal.late
+
+
+def test_without_a_deadline_for_acceptance_an_unwanted_goal_is_not_waited_for_for_ever() -> None:
+    for limits, patience in (
+        (Timeouts(accept=None, cancel=4.0), 4.0),
+        (Timeouts(accept=None, cancel=None), PATIENCE),
+    ):
+        life = sending(limits)
+        assert life.due_in is None
+        life.on(Event.INTERRUPTED)
+        assert life.due_in == patience
+        assert life.pass_time(patience) == [CANCEL]
+        life.pass_time(patience - 1.0)
+        life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+        life.pass_time(1.0)
+        life.is_free(Outcome.CANCELED, End.NEVER_STARTED)
+
+
+# Rule 4: what comes late or twice
+
+
+def test_what_comes_twice_is_counted_and_dropped() -> None:
+    life = executing()
+    life.on(Event.ACCEPTED)
+    life.on(Event.REJECTED)
+    assert life.goal.state is State.EXECUTING
+    life.on(Event.RESULT, SUCCEEDED)
+    life.on(Event.RESULT, ABORTED)
+    assert life.goal.dropped == 3
+    life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
+
+
+def test_a_refusal_after_acceptance_does_not_end_a_goal_that_is_being_canceled() -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.REJECTED)
+    assert life.goal.state is State.CANCELING
+    assert life.goal.holding
+
+
+@pytest.mark.parametrize("event", [Event.FEEDBACK, Event.STATUS])
+def test_what_only_an_accepted_goal_has_is_as_good_as_its_acceptance(event: Event) -> None:
+    life = sending()
+    assert life.on(event, 2) == [ASK]
+    assert life.goal.state is State.EXECUTING
+    life.on(Event.ACCEPTED)
+    assert life.goal.dropped == 1
+
+
+def test_a_goal_that_ended_before_its_acceptance_was_heard_of_is_asked_for_its_result() -> None:
+    life = sending()
+    life.on(Event.STATUS, STATUS_SUCCEEDED)
+    assert life.pass_time(ASK_AGAIN) == [ASK]
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
+
+
+# Rule 5: terminate, and what is drained
+
+
+def test_interrupted_while_executing_it_is_canceled_whatever_it_ended_with() -> None:
+    for result, end in ((SUCCEEDED, End.SUCCEEDED), (ABORTED, End.ABORTED)):
+        life = executing()
+        assert life.on(Event.INTERRUPTED) == [CANCEL, ASK]
+        assert life.goal.outcome is None
+        life.on(Event.RESULT, result)
+        life.ended(Outcome.CANCELED, end)
+        assert not life.goal.late
+
+
+@pytest.mark.parametrize("make", [sending, executing, suspect])
+def test_interrupting_twice_is_interrupting_once(make: Any) -> None:
+    life = make()
+    life.on(Event.INTERRUPTED)
+    reason, due = life.goal.reason, life.due_in
+    for _ in range(3):
+        assert life.on(Event.INTERRUPTED) == []
+    assert (life.goal.reason, life.due_in) == (reason, due)
+
+
+def test_an_outcome_is_decided_once() -> None:
+    life = executing()
+    life.pass_time(2.0)
+    life.pass_time(4.0)
+    life.is_free(Outcome.STALLED, End.UNKNOWN)
+    life.on(Event.INTERRUPTED)
+    life.on(Event.SERVER_LOST, "gone")
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.STALLED, End.SUCCEEDED)
+
+
+def test_the_cancel_deadline_runs_to_the_terminal_status_not_to_the_acknowledgement() -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_ACCEPTED)
+    life.pass_time(3.9)
+    assert life.goal.outcome is None
+    life.pass_time(0.1)
+    life.is_free(Outcome.CANCELED, End.UNKNOWN)
+    assert life.goal.holding, "others queue meanwhile"
+    assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+def test_a_cancel_that_is_refused_or_not_answered_is_asked_for_again() -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED)
+    for _ in range(3):
+        assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
+
+
+# Rule 6: deadlines
+
+
+def test_a_deadline_cancels_and_the_leaf_waits_for_the_end() -> None:
+    life = executing(Timeouts(result=30.0))
+    assert life.pass_time(30.0) == [CANCEL, ASK]
+    assert life.goal.outcome is None
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.RESULT_TIMEOUT, End.CANCELED)
+    assert life.goal.reason == "not finished within 30 s"
+
+
+def test_success_that_comes_late_counts_as_what_it_is() -> None:
+    life = executing(Timeouts(result=30.0))
+    life.pass_time(30.0)
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
+    assert life.goal.late
+
+
+def test_interrupted_after_a_deadline_it_is_canceled_even_if_it_succeeds_late() -> None:
+    life = executing(Timeouts(result=30.0))
+    life.pass_time(30.0)
+    life.on(Event.INTERRUPTED)
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.CANCELED, End.SUCCEEDED)
+
+
+def test_feedback_breaks_the_silence() -> None:
+    life = executing()
+    for _ in range(5):
+        life.pass_time(1.9)
+        life.on(Event.FEEDBACK, "moving")
+    assert life.goal.feedback == "moving"
+    assert life.pass_time(2.0) == [CANCEL, ASK]
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.STALLED, End.CANCELED)
+
+
+def test_result_and_feedback_run_on_the_nodes_clock() -> None:
+    life = executing()
+    life.pass_time(1e6, ros=1.9)
+    assert life.goal.state is State.EXECUTING
+    life.pass_time(0.0, ros=0.1)
+    assert life.goal.state is State.CANCELING
+
+
+@pytest.mark.parametrize("make", [Life, waiting, sending])
+def test_queue_server_and_accept_run_on_the_steady_clock(make: Any) -> None:
+    life = make()
+    before = life.goal.state
+    life.pass_time(0.1, ros=1e6)
+    assert life.goal.state is before
+    life.pass_time(10.0, ros=0.0)
+    assert life.goal.state is not before
+
+
+def test_a_jump_back_of_the_clock_leaves_what_remained() -> None:
+    life = executing(Timeouts(result=30.0))
+    life.pass_time(20.0)
+    life.pass_time(0.0, ros=-500.0)
+    assert life.due_in == pytest.approx(10.0)
+    life.pass_time(9.9)
+    assert life.goal.state is State.EXECUTING
+    life.pass_time(0.2)
+    assert life.goal.state is State.CANCELING
+
+
+def test_a_jump_back_that_nobody_has_polled_yet_does_not_lengthen_the_wait() -> None:
+    life = executing(Timeouts(result=30.0))
+    life.pass_time(20.0)
+    assert life.goal.due_in(Now(life.now.steady, life.now.ros - 500.0)) == pytest.approx(10.0)
+    assert life.goal.deadline(Now(life.now.steady, 0.0)) == (Event.RESULT_DUE, pytest.approx(10.0))
+
+
+def test_no_deadline_means_none() -> None:
+    none = Timeouts(None, None, None, None, None, None)
+    for make in (Life, waiting, sending):
+        life = make(none)
+        assert life.due_in is None
+        assert life.pass_time(1e9) == []
+
+
+def test_without_deadlines_the_server_is_still_asked_now_and_then() -> None:
+    life = executing(Timeouts(None, None, None, None, None, None))
+    assert life.goal.deadline(life.now) is None, "it is no deadline"
+    for _ in range(3):
+        assert life.pass_time(ASK_IN_ANY_CASE - 0.1) == []
+        assert life.pass_time(0.1) == [Command.ASK_RESULT]
+    assert life.goal.state is State.EXECUTING
+
+
+def test_the_deadline_shown_is_the_earliest_that_means_something() -> None:
+    life = executing()
+    assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, 2.0)
+    life.on(Event.INTERRUPTED)
+    assert life.goal.deadline(life.now) == (Event.CANCEL_DUE, 4.0), "not the next question"
+    assert life.due_in == ASK_AGAIN
+    life.on(Event.RESULT, CANCELED)
+    assert life.goal.deadline(life.now) is None
+
+
+def test_a_paused_tree_stops_the_deadlines_of_what_was_not_sent() -> None:
+    life = waiting()
+    life.goal.postpone(60.0)
+    assert life.due_in == 65.0
+    running = executing()
+    running.goal.postpone(60.0)
+    assert running.due_in == 2.0
+
+
+# Rule 7: the server dies, restarts, comes back
+
+
+def test_a_lost_server_frees_the_leaf_and_the_resource() -> None:
+    life = executing()
+    assert life.on(Event.SERVER_LOST, "gone") == [RELEASE]
+    life.is_free(Outcome.SERVER_LOST, End.SERVER_GONE)
+    assert life.goal.lost
+    assert life.due_in is None
+
+
+def test_a_lost_server_that_is_back_is_told_to_cancel_first_of_all() -> None:
+    life = executing()
+    life.on(Event.SERVER_LOST, "gone")
+    life.pass_time(10.0)
+    assert life.on(Event.SERVER_RETURNED) == [CANCEL, ASK]
+    assert life.goal.live
+    assert life.goal.end is End.UNKNOWN
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.SERVER_LOST, End.CANCELED)
+
+
+def test_feedback_of_a_goal_given_up_as_lost_shows_that_it_runs() -> None:
+    life = executing()
+    life.on(Event.SERVER_LOST, "gone")
+    assert life.on(Event.FEEDBACK, "moving") == [CANCEL, ASK]
+    assert life.goal.end is End.UNKNOWN
+
+
+def test_a_goal_lost_before_its_acceptance_is_judged_when_the_server_is_back() -> None:
+    life = sending()
+    life.on(Event.SERVER_LOST, "gone")
+    assert life.on(Event.SERVER_RETURNED) == [CANCEL]
+    assert life.goal.end is End.UNKNOWN
+    life.pass_time(2.0)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(1.0)
+    life.is_free(Outcome.SERVER_LOST, End.NEVER_STARTED)
+    assert not life.goal.live, "nothing is owed: others may be sent"
+
+
+def test_a_restart_ends_what_the_dead_server_ran() -> None:
+    life = executing()
+    life.on(Event.SERVER_LOST, "restarted")
+    life.on(Event.SERVER_RESTARTED)
+    life.ended(Outcome.SERVER_LOST, End.SERVER_GONE)
+
+
+def test_a_restart_of_a_server_that_is_not_lost_means_nothing() -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.SERVER_RESTARTED)
+    assert life.goal.state is State.CANCELING
+
+
+def test_a_suspect_judged_never_started_is_kept_in_mind_when_its_server_is_lost() -> None:
+    """Its acceptance may have been under way when the link was cut."""
+    life = suspect()
+    life.pass_time(2.0)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(1.0)
+    life.on(Event.SERVER_LOST, "cut")
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    assert life.on(Event.SERVER_RETURNED) == [CANCEL]
+    assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
+
+
+def test_a_new_server_is_asked_whether_it_knows_the_goal() -> None:
+    assert executing().on(Event.SERVER_CHANGED) == [ASK]
+    assert sending().on(Event.SERVER_CHANGED) == [], "it had not been accepted"
+
+
+def test_a_lone_server_is_believed_only_when_it_denies_the_goal_several_times() -> None:
+    life = executing(Timeouts(result=None))
+    for _ in range(DOUBTS - 1):
+        assert life.on(Event.RESULT_UNKNOWN) == []
+        assert life.pass_time(ASK_AGAIN) == [ASK]
+    life.on(Event.RESULT_UNKNOWN)
+    life.ended(Outcome.SERVER_LOST, End.UNKNOWN)
+
+
+def test_feedback_clears_the_doubt() -> None:
+    life = executing(Timeouts(result=None))
+    for _ in range(2 * DOUBTS):
+        life.on(Event.RESULT_UNKNOWN)
+        life.on(Event.FEEDBACK, "moving")
+    assert life.goal.state is State.EXECUTING
+
+
+def test_a_canceled_goal_that_the_server_has_forgotten_ends() -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    for _ in range(DOUBTS):
+        life.on(Event.RESULT_UNKNOWN)
+    life.ended(Outcome.CANCELED, End.UNKNOWN)
+
+
+def test_where_the_result_is_lost_the_status_topic_says_how_it_ended() -> None:
+    life = executing(Timeouts(result=None))
+    life.on(Event.STATUS, STATUS_ABORTED)
+    for _ in range(RESULT_QUESTIONS):
+        assert life.pass_time(ASK_AGAIN) == [ASK]
+    life.pass_time(ASK_AGAIN)
+    life.ended(Outcome.SERVER_LOST, End.ABORTED)
+
+
+def test_a_server_that_dies_after_showing_the_end_leaves_no_question() -> None:
+    life = executing()
+    life.on(Event.STATUS, STATUS_SUCCEEDED)
+    life.on(Event.SERVER_LOST, "gone")
+    life.ended(Outcome.SERVER_LOST, End.SUCCEEDED)
+
+
+# Rule 8: the process ends
+
+
+@pytest.mark.parametrize("make", [sending, executing, suspect])
+def test_a_process_that_ends_says_which_goal_it_cannot_account_for(make: Any) -> None:
+    life = make()
+    life.on(Event.CLOSED)
+    assert life.goal.state is State.DONE
+    assert life.goal.end is End.UNKNOWN
+    assert life.goal.outcome is not None
+
+
+def test_a_process_that_ends_before_sending_has_nothing_to_account_for() -> None:
+    life = waiting()
+    life.on(Event.CLOSED)
+    life.ended(Outcome.CANCELED, End.NEVER_STARTED)
+
+
+# Replaced
+
+
+def replaced() -> Life:
+    life = executing()
+    assert life.on(Event.REPLACED) == [], "servers that preempt end it by themselves"
+    return life
+
+
+def test_what_was_replaced_is_canceled_whatever_it_ended_with() -> None:
+    for result, end in ((SUCCEEDED, End.SUCCEEDED), (ABORTED, End.ABORTED)):
+        life = replaced()
+        life.on(Event.RESULT, result)
+        life.ended(Outcome.CANCELED, end)
+
+
+def test_what_was_replaced_is_canceled_when_it_does_not_end_in_time() -> None:
+    life = replaced()
+    assert life.pass_time(4.0) == [CANCEL, ASK]
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+def test_being_replaced_again_gives_no_more_time() -> None:
+    life = replaced()
+    life.pass_time(3.0)
+    life.on(Event.REPLACED)
+    assert life.due_in == 1.0
+
+
+@pytest.mark.parametrize("how", ["feedback then silence", "lost", "denied", "result lost"])
+def test_what_was_replaced_never_has_an_outcome_that_is_retried(how: str) -> None:
+    life = replaced()
+    if how == "feedback then silence":
+        life.on(Event.FEEDBACK, "moving")
+        life.pass_time(2.5)
+        life.pass_time(1.5)
+        life.pass_time(4.0)
+    elif how == "lost":
+        life.on(Event.SERVER_LOST, "gone")
+    elif how == "denied":
+        for _ in range(DOUBTS):
+            life.on(Event.RESULT_UNKNOWN)
+    else:
+        life.on(Event.STATUS, STATUS_SUCCEEDED)
+        for _ in range(DOUBTS + 2):
+            life.pass_time(ASK_AGAIN)
+    assert life.goal.outcome is Outcome.CANCELED
+
+
+def test_replaced_before_it_was_sent_it_is_not_sent() -> None:
+    life = waiting(busy=Busy.WAIT)
+    life.on(Event.REPLACED)
+    life.ended(Outcome.CANCELED, End.NEVER_STARTED)
+
+
+def test_replaced_before_acceptance_it_is_canceled_when_it_turns_up() -> None:
+    life = sending()
+    assert life.on(Event.REPLACED) == []
+    assert life.goal.reason == "replaced by a newer goal before it was accepted"
+    assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
+
+
+def test_replaced_after_a_deadline_it_is_not_tried_again() -> None:
+    life = executing()
+    life.pass_time(2.0)
+    life.on(Event.REPLACED)
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+def test_a_suspect_that_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_up() -> (
+    None
+):
+    life = suspect()
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(life.goal.timeouts.accept or 0.0)
+    assert life.goal.suspect
+    life.on(Event.DRAINED)
+    assert (life.goal.outcome, life.goal.end) == (Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
+    assert not life.goal.owed, "the server may get other goals"
+    assert Command.CANCEL in life.on(Event.ACCEPTED)
+
+
+def denied(life: Life) -> None:
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+
+
+def denied_suspect() -> Life:
+    """A suspect for which the tree did not wait any longer, because its server denied it."""
+    life = suspect()
+    life.pass_time((LIMITS.accept or 0.0) - 1.0)
+    denied(life)
+    life.pass_time(1.0)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    return life
+
+
+def test_a_suspect_that_is_denied_for_good_need_not_be_waited_for() -> None:
+    life = denied_suspect()
+    assert life.pass_time(DENIED_FOR_GOOD - 2.0) == []
+    assert life.goal.suspect
+    assert life.pass_time(1.0) == [CANCEL], "asked once more"
+    denied(life)
+    assert not life.goal.suspect
+    assert life.due_in is None
+    life.on(Event.DRAINED)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    assert CANCEL in life.on(Event.ACCEPTED), "and it is still canceled if it turns up"
+    assert life.goal.end is End.UNKNOWN
+
+
+def test_only_denials_count_towards_denied_for_good_and_only_as_long_as_nothing_else_came() -> None:
+    life = denied_suspect()
+    life.pass_time(DENIED_FOR_GOOD)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED)
+    assert life.pass_time(ASK_AGAIN) == [CANCEL]
+    denied(life)
+    assert life.goal.suspect, "denied anew, and not for long"
+    life.pass_time(DENIED_FOR_GOOD)
+    assert life.goal.suspect, "silence is no denial"
+    denied(life)
+    assert not life.goal.suspect
+
+
+def test_a_suspect_that_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_good() -> (
+    None
+):
+    life = denied_suspect()
+    life.on(Event.DRAINED)
+    assert life.goal.end is End.UNKNOWN
+    life.pass_time(DENIED_FOR_GOOD)
+    denied(life)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+
+
+def test_a_process_that_ends_does_not_say_never_started_of_a_request_without_answer() -> None:
+    life = suspect()
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(life.goal.timeouts.accept or 0.0)
+    life.on(Event.CLOSED)
+    life.ended(Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)

@@ -1,0 +1,61 @@
+"""Goal ids tell which process chose them."""
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+from bt_actions.goal_ids import author_of, new_goal_id
+
+MAKE = (
+    "from bt_actions.goal_ids import new_goal_id; print(new_goal_id().hex(), flush=True); input()"
+)
+
+
+def test_an_id_names_the_process_that_made_it_and_that_it_is_alive() -> None:
+    author = author_of(new_goal_id())
+    assert author is not None
+    assert (author.pid, author.here, author.alive) == (os.getpid(), True, True)
+
+
+def test_ids_never_repeat_whatever_thread_makes_them() -> None:
+    with ThreadPoolExecutor(8) as pool:
+        made = list(pool.map(lambda _: new_goal_id(), range(5000)))
+    assert len(set(made)) == 5000
+    assert {len(goal_id) for goal_id in made} == {16}
+
+
+def test_the_author_of_a_killed_process_is_dead() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", MAKE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as child:
+        assert child.stdout is not None
+        author = author_of(bytes.fromhex(child.stdout.readline().strip()))
+        assert author is not None
+        assert author.pid == child.pid
+        assert author.alive
+        child.kill()
+        child.wait()
+        assert not author.alive
+
+
+def test_a_pid_that_was_given_to_another_process_is_not_the_author() -> None:
+    ours = bytearray(new_goal_id())
+    ours[10] ^= 0xFF
+    author = author_of(bytes(ours))
+    assert author is not None
+    assert not author.alive
+
+
+def test_an_id_from_another_machine_counts_as_alive() -> None:
+    theirs = bytearray(new_goal_id())
+    theirs[3] ^= 0xFF
+    author = author_of(bytes(theirs))
+    assert author is not None
+    assert not author.here
+    assert author.alive
+
+
+def test_ids_that_others_chose_have_no_author() -> None:
+    assert author_of(os.urandom(16)) is None
+    assert author_of(b"short") is None

@@ -1,0 +1,90 @@
+"""The pictures in README.md and docs/ show the trees as they are, as render draws them now."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPT = runpy.run_path(str(ROOT / "scripts" / "pictures.py"))
+PICTURES: dict[Path, Path] = SCRIPT["PICTURES"]
+is_fresh: Callable[[Path], bool] = SCRIPT["is_fresh"]
+drawn: Callable[[Path], str] = SCRIPT["drawn"]
+
+
+@pytest.fixture
+def picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A picture of a copy of a tree."""
+    (tree := tmp_path / "tree.yaml").write_text(
+        "tree: t\nroot:\n  sequence: Work\n  children:\n    - success: a\n    - failure: b\n"
+    )
+    path = tmp_path / "tree.svg"
+    names: dict[str, Any] = is_fresh.__globals__  # type: ignore[attr-defined]
+    monkeypatch.setitem(names, "ROOT", tmp_path)
+    monkeypatch.setitem(PICTURES, path, tree)
+    path.write_text(drawn(path))
+    return path
+
+
+@pytest.mark.parametrize("path", sorted(PICTURES), ids=lambda path: path.name)
+def test_a_picture_shows_its_tree_as_it_is_drawn_now(path: Path) -> None:
+    assert is_fresh(path), f"{path} is stale: run `make docs`"
+
+
+def test_every_picture_that_a_page_shows_is_made_by_the_script() -> None:
+    shown = set()
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        for target in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+            shown.add((page.parent / target).resolve())
+    assert shown == set(PICTURES)
+    kept = {path for path in (ROOT / "docs" / "images").rglob("*") if path.is_file()}
+    assert kept == set(PICTURES)
+
+
+def test_a_picture_stays_fresh_where_the_fonts_are_others(picture: Path) -> None:
+    image = picture.read_text()
+    moved = re.sub(r'(?<= )(c?[xy]|r[xy])="[^"]*"', r'\1="1.5"', image)
+    moved = re.sub(r'points="[^"]*"', 'points="0,0"', moved)
+    assert moved != image
+    picture.write_text(moved)
+    assert is_fresh(picture)
+
+
+def test_a_picture_is_stale_when_its_tree_changes(picture: Path) -> None:
+    tree = PICTURES[picture]
+    tree.write_text(tree.read_text().replace("success: a", "success: another"))
+    assert not is_fresh(picture)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("dot", lambda root: 'digraph { n0 [label="other"]; }'),
+        ("draw", lambda *_: b'<svg xmlns="http://www.w3.org/2000/svg"><g/></svg>'),
+    ],
+)
+def test_a_picture_is_stale_when_the_renderer_changes(
+    name: str, value: object, picture: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(is_fresh.__globals__, name, value)  # type: ignore[attr-defined]
+    assert not is_fresh(picture)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("#ffc46b", "#ffffff"), (">Work<", ">Play<"), ("dot: ", "dot: 0")]
+)
+def test_a_picture_that_was_edited_is_stale(old: str, new: str, picture: Path) -> None:
+    image = picture.read_text()
+    assert old in image
+    picture.write_text(image.replace(old, new))
+    assert not is_fresh(picture)
+
+
+def test_a_picture_that_is_not_there_is_stale(picture: Path) -> None:
+    picture.unlink()
+    assert not is_fresh(picture)

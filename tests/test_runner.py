@@ -1,0 +1,773 @@
+"""The runner: what it returns and raises, what it drains, and that it leaves nothing behind."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import py_trees
+import pytest
+from py_trees.common import Status
+
+from bt_actions import MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
+from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
+from tests.support.processes import Host, Journal
+from tests.support.trees import Gate, Raises, in_sequence, state, together
+from tests.support.waiting import holds_for, until
+
+
+@pytest.fixture
+def journal(host: Host, name: str) -> Iterator[Journal]:
+    """A server without faults, and what it writes."""
+    yield host.open(name)
+    host.close_server(name)
+
+
+@contextlib.contextmanager
+def spun(node: Any, kind: str = "single") -> Iterator[Any]:
+    """Spin `node` as its user does."""
+    from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+
+    classes = {"single": SingleThreadedExecutor, "multi": MultiThreadedExecutor}
+    executor = classes[kind](context=node.context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    yield executor
+    executor.shutdown()
+    thread.join()
+    if kind == "multi":
+        executor._executor.shutdown(wait=True)
+    node.executor = None
+
+
+class TestRun:
+    @pytest.mark.parametrize("executor", [None, "multi", "single"])
+    def test_on_a_node_of_its_own(self, journal: Journal, name: str, executor: str | None) -> None:
+        leaf = MoveRobot("m", 0.1, action_name=name)
+        with TreeRunner(leaf, executor=executor) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+            assert runner.node.context.ok()
+            context = runner.node.context
+        assert not context.ok()
+        assert journal.ends() == ["succeeded"]
+
+    def test_a_namespace_is_that_of_its_own_node(self, journal: Journal, name: str) -> None:
+        namespace, _, action = name.rpartition("/")
+        leaf = MoveRobot("m", 0.1, action_name=action)
+        with TreeRunner(leaf, namespace=namespace) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+        assert journal.ends() == ["succeeded"]
+
+    def test_again_and_again(self, journal: Journal, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 0.05, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            for _ in range(5):
+                assert runner.run(timeout=9.0) is Status.SUCCESS
+        assert journal.ends() == ["succeeded"] * 5
+
+    def test_a_behaviour_tree_keeps_its_handlers_and_visitors(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        tree = py_trees.trees.BehaviourTree(MoveRobot("m", 0.1, action_name=name))
+        ticks: list[int] = []
+        tree.add_post_tick_handler(lambda tree: ticks.append(tree.count))
+        with TreeRunner(tree, node=node) as runner:
+            runner.run(timeout=9.0)
+        assert ticks
+        assert tree.visitors == []
+
+    def test_the_timeout_drains_and_raises(
+        self, journal: Journal, name: str, node: Any, executor: str
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, node=node, executor=executor) as runner:
+            with pytest.raises(TimeoutError, match=r"m did not finish within 0\.5 s"):
+                runner.run(timeout=0.5)
+            assert journal.ends() == ["canceled"]
+            assert leaf.outcome is Outcome.CANCELED
+            assert leaf.status is Status.INVALID
+
+    def test_after_a_timeout_it_may_run_again(self, journal: Journal, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 0.8, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            with pytest.raises(TimeoutError):
+                runner.run(timeout=0.3)
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+        assert journal.ends() == ["canceled", "succeeded"]
+
+    def test_a_second_run_at_a_time_is_refused(self, node: Any) -> None:
+        gate = Gate()
+        with TreeRunner(gate, node=node) as runner:
+            runner.start()
+            with pytest.raises(RuntimeError, match="running already"):
+                runner.run()
+            with pytest.raises(RuntimeError, match="already"):
+                runner.start()
+            gate.passed = True
+            assert runner.wait(5.0) is Status.SUCCESS
+
+    def test_on_an_executors_thread_it_raises(self, node: Any) -> None:
+        told: list[str] = []
+
+        def callback() -> None:
+            try:
+                runner.run()
+            except RuntimeError as error:
+                told.append(str(error))
+
+        with spun(node) as executor:
+            runner = TreeRunner(Gate(), node=node)
+            executor.create_task(callback)
+            until(lambda: told)
+            runner.shutdown()
+        assert "start()" in told[0]
+
+    def test_after_shutdown_it_raises(self, node: Any) -> None:
+        runner = TreeRunner(Gate(), node=node)
+        runner.shutdown()
+        runner.shutdown()
+        with pytest.raises(RuntimeError, match="shut down"):
+            runner.run()
+
+    def test_a_heartbeat_of_nothing_is_refused(self) -> None:
+        with pytest.raises(ValueError, match="heartbeat"):
+            TreeRunner(Gate(), heartbeat=0.0)
+
+    def test_an_unknown_executor_is_refused_and_leaves_nothing(self, domain: int) -> None:
+        before = threading.active_count()
+        with pytest.raises(ValueError, match="'multi', 'single'"):
+            TreeRunner(Gate(), executor="fast")
+        assert threading.active_count() == before
+
+
+class TestInterrupt:
+    def test_drains_and_returns_invalid(
+        self, journal: Journal, name: str, node: Any, executor: str
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, node=node, executor=executor) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            runner.interrupt()
+            assert runner.wait(5.0) is Status.INVALID
+            assert journal.ends() == ["canceled"]
+
+    def test_is_safe_in_a_signal_handler(self, journal: Journal, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            before = signal.signal(signal.SIGUSR2, lambda *_: runner.interrupt())
+            runner.observe(
+                lambda event: (
+                    os.kill(os.getpid(), signal.SIGUSR2)
+                    if isinstance(event, GoalChanged) and event.state == "EXECUTING"
+                    else None
+                )
+            )
+            try:
+                assert runner.run(timeout=9.0) is Status.INVALID
+            finally:
+                signal.signal(signal.SIGUSR2, before)
+        assert journal.ends() == ["canceled"]
+
+    def test_before_a_run_makes_it_return_at_once(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
+            runner.interrupt()
+            assert runner.run(timeout=5.0) is Status.INVALID
+            assert journal.events() == []
+            assert runner.run(timeout=5.0) is Status.SUCCESS
+
+    def test_to_abandon_ends_the_wait_for_a_goal_that_cannot_be_canceled(
+        self, host: Host, name: str, node: Any
+    ) -> None:
+        host.open(name, "1:reject_cancel")
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(cancel=30.0))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            runner.interrupt()
+            assert holds_for(lambda: not leaf.end or leaf.end == "UNKNOWN", 0.3)
+            runner.interrupt(abandon=True)
+            assert runner.wait(9.0) is Status.INVALID  # and not the 30 s of its deadline
+            assert [report.name for report in runner.unaccounted] == ["m"]
+            host.close_server(name)
+            until(lambda: not runner.unaccounted)
+
+
+class TestStart:
+    def test_inside_a_node_that_its_user_spins(
+        self, journal: Journal, name: str, node: Any, executor: str
+    ) -> None:
+        with (
+            spun(node, executor),
+            TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner,
+        ):
+            runner.start()
+            assert runner.wait(5.0) is Status.SUCCESS
+
+    def test_from_a_callback_of_that_node(self, journal: Journal, name: str, node: Any) -> None:
+        runners: list[TreeRunner] = []
+
+        def callback() -> None:
+            runners.append(TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node))
+            runners[0].start()
+
+        with spun(node) as executor:
+            executor.create_task(callback)
+            until(lambda: runners)
+            assert runners[0].wait(5.0) is Status.SUCCESS
+            runners[0].shutdown()
+
+    def test_wait_gives_up_and_the_tree_goes_on(self, node: Any) -> None:
+        gate = Gate()
+        with TreeRunner(gate, node=node) as runner:
+            runner.start()
+            with pytest.raises(TimeoutError, match="still running"):
+                runner.wait(0.05)
+            gate.passed = True
+            assert runner.wait(5.0) is Status.SUCCESS
+
+    def test_wait_without_start_raises(self, node: Any) -> None:
+        with TreeRunner(Gate(), node=node) as runner, pytest.raises(RuntimeError, match="started"):
+            runner.wait()
+
+    def test_wait_raises_what_run_would(self, node: Any) -> None:
+        with TreeRunner(Raises("culprit", "update"), node=node) as runner:
+            runner.start()
+            with pytest.raises(TreeError, match="culprit"):
+                runner.wait(5.0)
+
+    def test_shutdown_ends_a_run_on_another_thread(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        runner = TreeRunner(leaf, node=node)
+        returned: list[Status] = []
+        thread = threading.Thread(target=lambda: returned.append(runner.run()))
+        thread.start()
+        until(lambda: state(leaf) == "EXECUTING")
+        runner.shutdown()
+        assert journal.ends() == ["canceled"]
+        thread.join(1.0)
+        assert returned == [Status.INVALID]
+
+    @pytest.mark.parametrize("last", [GoalChanged, TreeFinished])
+    def test_shutdown_by_an_observer_is_refused(
+        self, journal: Journal, name: str, node: Any, last: type[Event]
+    ) -> None:
+        """It would wait for the run that waits for it; the observer is dropped, the run goes on."""
+
+        def observer(event: Event) -> None:
+            if isinstance(event, last):
+                try:
+                    runner.shutdown()
+                except RuntimeError as error:
+                    told.append(str(error))
+
+        told: list[str] = []
+        with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
+            runner.observe(observer)
+            runner.start()
+            assert runner.wait(5.0) is Status.SUCCESS
+        assert "interrupt()" in told[0]
+
+    def test_leaving_the_context_drains(self, journal: Journal, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+        assert journal.ends() == ["canceled"]
+
+
+class TestPause:
+    def test_no_new_goal_starts_and_running_ones_finish(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        first, second = (MoveRobot(n, 0.3, action_name=name) for n in ("first", "second"))
+        with TreeRunner(in_sequence(first, second), node=node) as runner:
+            runner.start()
+            until(lambda: state(first) == "EXECUTING")
+            runner.pause()
+            journal.wait_for("succeeded")
+            assert holds_for(lambda: journal.count("received") == 1, 0.3)
+            runner.resume()
+            assert runner.wait(5.0) is Status.SUCCESS
+        assert journal.count("succeeded") == 2
+
+    def test_a_paused_tree_can_be_interrupted(self, journal: Journal, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            runner.pause()
+            runner.interrupt()
+            assert runner.wait(5.0) is Status.INVALID
+        assert journal.ends() == ["canceled"]
+
+    def test_waiting_for_a_server_is_paused_too(self, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=0.4))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "WAITING_FOR_SERVER")
+            runner.pause()
+            assert holds_for(lambda: leaf.outcome is None, 0.6)
+            runner.resume()
+            assert runner.wait(5.0) is Status.FAILURE
+        assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
+
+    def test_a_deadline_of_a_running_goal_holds(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=0.4)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            runner.pause()
+            journal.wait_for("canceled")
+            runner.resume()
+            assert runner.wait(5.0) is Status.FAILURE
+
+
+class TestWhoSpins:
+    def test_a_node_in_an_executor_that_nobody_spins_is_an_error(self, node: Any) -> None:
+        from rclpy.executors import SingleThreadedExecutor
+
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        started = time.monotonic()
+        with (
+            TreeRunner(Gate(), node=node) as runner,
+            pytest.raises(RuntimeError, match="nobody spins"),
+        ):
+            runner.run(timeout=9.0)
+        assert 0.9 <= time.monotonic() - started < 9.0
+        executor.shutdown()
+        node.executor = None
+
+    def test_a_node_that_is_no_longer_spun_is_an_error_too(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        leaf = MoveRobot("m", 0.5, action_name=name)
+        with contextlib.ExitStack() as stack:
+            spinning = contextlib.ExitStack()
+            spinning.enter_context(spun(node))
+            runner = stack.enter_context(TreeRunner(leaf, node=node))
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            spinning.close()
+            with pytest.raises(RuntimeError, match="nobody spins"):
+                runner.wait(8.0)
+        assert journal.ends() in (["succeeded"], ["canceled"])
+
+    def test_an_executor_that_stands_still_is_an_error_as_well(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        free, held = threading.Event(), threading.Event()
+        with spun(node) as executor, TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            executor.create_task(lambda: (held.set(), free.wait(20.0)))
+            held.wait(5.0)
+            with pytest.raises(RuntimeError, match="nobody spins"):
+                runner.wait(9.0)
+            assert journal.ends() == ["canceled"]
+            free.set()
+
+    def test_a_dead_spin_thread_fails_the_tree(
+        self, journal: Journal, name: str, executor: str
+    ) -> None:
+        def callback() -> None:
+            raise RuntimeError("a callback of the user's")
+
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, executor=executor) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            runner.node.create_timer(0.01, callback)
+            with pytest.raises(TreeError, match=r"spin thread died.*a callback of the user's"):
+                runner.wait(9.0)
+            assert runner.unaccounted == []
+        assert journal.ends() == ["canceled"]
+
+    def test_a_context_that_is_shut_down_under_the_tree_ends_it(
+        self, journal: Journal, name: str, executor: str
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name, retry=3)
+        with TreeRunner(in_sequence(leaf, Gate()), executor=executor) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            runner.node.context.shutdown()
+            try:
+                assert runner.wait(9.0) is not Status.SUCCESS
+            except TreeError as error:
+                assert "context" in str(error) or "spin" in str(error)  # noqa: PT017
+        assert journal.ends() == ["canceled"]
+
+    def test_an_executor_without_nodes_is_spun_here(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        from rclpy.executors import SingleThreadedExecutor
+
+        executor = SingleThreadedExecutor(context=node.context)
+        leaf = MoveRobot("m", 0.1, action_name=name)
+        with TreeRunner(leaf, node=node, executor=executor) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+        executor.shutdown()
+
+    def test_an_executor_that_was_given_stays_usable(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        from rclpy.executors import SingleThreadedExecutor
+
+        executor = SingleThreadedExecutor(context=node.context)
+        for _ in range(2):
+            leaf = MoveRobot("m", 0.1, action_name=name)
+            with TreeRunner(leaf, node=node, executor=executor) as runner:
+                assert runner.run(timeout=9.0) is Status.SUCCESS
+        done = threading.Event()
+        executor.create_task(done.set)
+        executor.spin_once(timeout_sec=1.0)
+        assert done.is_set()
+        executor.shutdown()
+
+    def test_a_users_node_and_its_subscriptions_stay_usable(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        from std_msgs.msg import String
+
+        heard: list[str] = []
+        topic = f"{name}_said"
+        subscription = node.create_subscription(String, topic, lambda m: heard.append(m.data), 10)
+        publisher = node.create_publisher(String, topic, 10)
+        for _ in range(2):
+            with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
+                assert runner.run(timeout=9.0) is Status.SUCCESS
+        with spun(node):
+            until(lambda: heard, meanwhile=lambda: publisher.publish(String(data="hello")))
+        node.destroy_subscription(subscription)
+        node.destroy_publisher(publisher)
+
+
+def test_progress_may_be_read_by_any_thread(host: Host, name: str, node: Any) -> None:
+    """As a live view does, while goals come and go."""
+    host.open(name, "50%:abort")
+    leaf = MoveRobot("m", 0.0, action_name=name, timeout=5.0, retry=5)
+    errors: list[Exception] = []
+    over = threading.Event()
+
+    def look() -> None:
+        while not over.is_set():
+            try:
+                leaf.progress()
+                assert leaf.attempt >= 0
+                assert leaf.reason is not None
+            except Exception as error:  # noqa: BLE001 - whatever it is
+                errors.append(error)
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    looking = threading.Thread(target=look)
+    looking.start()
+    with TreeRunner(leaf, node=node) as runner:
+        for _ in range(10):
+            runner.run(timeout=9.0)
+    over.set()
+    looking.join()
+    sys.setswitchinterval(before)
+    host.close_server(name)
+    assert errors == []
+
+
+class TestEvents:
+    def test_come_in_order(self, journal: Journal, name: str, node: Any) -> None:
+        events: list[Event] = []
+        leaf = MoveRobot("m", 0.2, action_name=name)
+        with TreeRunner(in_sequence(leaf, name="root"), node=node) as runner:
+            runner.observe(events.append)
+            runner.run(timeout=9.0)
+        assert isinstance(events[0], TreeStarted)
+        assert isinstance(events[-1], TreeFinished)
+        assert events[-1].status is Status.SUCCESS
+        times = [event.time for event in events]
+        assert times == sorted(times)
+        states = [event.state for event in events if isinstance(event, GoalChanged)]
+        order = ["QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING", "DONE"]
+        assert [each for each in order if each in states] == states
+        assert states[-3:] == ["SENDING", "EXECUTING", "DONE"]
+        last = [event for event in events if isinstance(event, GoalChanged)][-1]
+        assert (last.outcome, last.end, last.attempt) == ("SUCCEEDED", "SUCCEEDED", 1)
+        changes = [(e.path, e.status) for e in events if isinstance(e, NodeChanged)]
+        assert changes == [
+            (("root", "m"), Status.RUNNING),
+            (("root",), Status.RUNNING),
+            (("root", "m"), Status.SUCCESS),
+            (("root",), Status.SUCCESS),
+        ]
+
+    def test_of_an_interrupted_tree_end_with_its_drained_goals(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        events: list[Event] = []
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(in_sequence(leaf, name="root"), node=node) as runner:
+            runner.observe(events.append)
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            runner.interrupt()
+            runner.wait(5.0)
+        assert isinstance(events[-1], TreeFinished)
+        assert events[-1].status is Status.INVALID
+        goal = [event for event in events if isinstance(event, GoalChanged)][-1]
+        assert (goal.state, goal.outcome, goal.end) == ("DONE", "CANCELED", "CANCELED")
+        changes = {event.path: event.status for event in events if isinstance(event, NodeChanged)}
+        assert changes == {("root",): Status.INVALID, ("root", "m"): Status.INVALID}
+
+    def test_an_observer_that_raises_is_dropped_and_the_run_goes_on(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        calls: list[Event] = []
+
+        def faulty(event: Event) -> None:
+            calls.append(event)
+            raise RuntimeError("on purpose")
+
+        events: list[Event] = []
+        with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
+            runner.observe(faulty)
+            runner.observe(events.append)
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+        assert len(calls) == 1
+        assert isinstance(events[-1], TreeFinished)
+
+    def test_an_observer_is_called_on_the_ticking_thread(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        threads: set[int] = set()
+        with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
+            runner.observe(lambda event: threads.add(threading.get_ident()))
+            runner.run(timeout=9.0)
+        assert threads == {threading.get_ident()}
+
+    def test_two_trees_on_one_node_hear_of_their_own_goals(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        """They have the same names, and share the server."""
+        heard: list[list[Event]] = [[], []]
+        leaves = [MoveRobot("m", 0.2, action_name=name) for _ in range(2)]
+        with spun(node), contextlib.ExitStack() as stack:
+            runners = [stack.enter_context(TreeRunner(leaf, node=node)) for leaf in leaves]
+            for runner, events in zip(runners, heard, strict=True):
+                runner.observe(events.append)
+                runner.start()
+            for runner in runners:
+                assert runner.wait(5.0) is Status.SUCCESS
+        for leaf, events in zip(leaves, heard, strict=True):
+            assert {e.behaviour for e in events if isinstance(e, GoalChanged)} == {leaf}
+        assert journal.max_live == 1
+
+
+class TestWhoseGoalsTheyAre:
+    def test_those_of_a_leaf_that_was_replaced_in_its_tick(
+        self, host: Host, name: str, node: Any
+    ) -> None:
+        journal = host.open(name, "1:delay_accept=1")
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        tree = py_trees.trees.BehaviourTree(in_sequence(leaf))
+
+        def replace(tree: Any) -> None:
+            if leaf.parent is not None and state(leaf) == "SENDING":
+                tree.replace_subtree(leaf.id, py_trees.behaviours.Success("instead"))
+
+        tree.add_post_tick_handler(replace)
+        with TreeRunner(tree, node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+            assert runner.unaccounted == []
+            assert journal.ends() == ["canceled"], "and it was waited for"
+        host.close_server(name)
+
+    def test_those_of_a_leaf_inside_of_another_behaviour(
+        self, host: Host, name: str, node: Any
+    ) -> None:
+        class Wrapper(py_trees.behaviour.Behaviour):
+            """Ticks a leaf that nobody else knows of."""
+
+            def __init__(self, leaf: MoveRobot) -> None:
+                super().__init__("wrapper")
+                self.leaf = leaf
+
+            def setup(self, **kwargs: Any) -> None:
+                self.leaf.setup(**kwargs)
+
+            def update(self) -> Status:
+                self.leaf.tick_once()
+                return self.leaf.status if state(self.leaf) != "EXECUTING" else Status.SUCCESS
+
+        host.open(name, "1:reject_cancel")
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(cancel=0.5))
+        with TreeRunner(Wrapper(leaf), node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+            assert [report.name for report in runner.unaccounted] == ["m"]
+        host.cancel_all(name)
+        host.close_server(name)
+
+    def test_all_those_of_a_node_that_ends_with_its_runner(
+        self, journal: Journal, name: str
+    ) -> None:
+        """A second runner on the node of the first, which is shut down under it."""
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(Gate()) as owner:
+            owner.start()
+            guest = TreeRunner(leaf, node=owner.node)
+            guest.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            owner.interrupt()
+            owner.wait(9.0)
+        assert journal.ends() == ["canceled"]
+        with contextlib.suppress(Exception):  # its node is gone, and it may say so
+            guest.wait(9.0)
+        guest.shutdown()
+
+
+class TestWhoWaits:
+    def test_a_wait_ends_when_another_thread_shuts_down(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        runner = TreeRunner(MoveRobot("m", 9.0, action_name=name), node=node)
+        runner.start()
+        journal.wait_for("accepted")
+        threading.Thread(target=runner.shutdown).start()
+        assert runner.wait(9.0) is Status.INVALID
+        assert journal.ends() == ["canceled"]
+
+    def test_standard_error_that_nobody_reads_holds_up_nothing(
+        self, host: Host, name: str, domain: int
+    ) -> None:
+        """In a program of the user's own, with a full pipe for standard error."""
+        program = f"""
+from bt_actions import MoveRobot, Timeouts, TreeRunner
+leaf = MoveRobot("m", 9.0, action_name={name!r}, timeout=Timeouts(result=0.2, cancel=0.3))
+with TreeRunner(leaf) as runner:
+    print(runner.run(timeout=20.0), runner.unaccounted[0].name, flush=True)
+"""
+        host.open(name, "1:reject_cancel")
+        read, write = os.pipe()
+        os.set_blocking(write, False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(write, b"x" * 4096)
+        os.set_blocking(write, True)
+        command = [sys.executable, "-c", program]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=write, text=True) as run:
+            said, _ = run.communicate(timeout=60.0)
+        os.close(read)
+        os.close(write)
+        assert said == "Status.FAILURE m\n"
+        host.cancel_all(name)
+        host.close_server(name)
+
+    def test_a_log_that_nobody_reads_holds_up_nothing(
+        self, host: Host, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from bt_actions.ros.log import log
+
+        written, said = threading.Event(), threading.Event()
+
+        class Stalled:
+            """Standard error, with a full pipe behind it."""
+
+            def error(self, text: str) -> None:
+                said.set()
+                written.wait(60.0)
+
+            warning = info = error
+
+        monkeypatch.setattr(log, "_logger", Stalled())
+        host.open(name, "1:reject_cancel")
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.2, cancel=0.3))
+        with TreeRunner(leaf, node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.FAILURE
+            assert said.wait(5.0), "the goal is not accounted for, and the log is told"
+        written.set()
+        log.flush(5.0)
+        host.cancel_all(name)
+        host.close_server(name)
+
+
+class TestTicks:
+    def test_come_when_something_happens_and_not_before(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        tree = py_trees.trees.BehaviourTree(MoveRobot("m", 1.0, action_name=name))
+        with TreeRunner(tree, node=node, heartbeat=30.0) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+        assert tree.count < 30
+
+    def test_a_deadline_wakes_the_tree(self, journal: Journal, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=0.3)
+        with TreeRunner(leaf, node=node, heartbeat=30.0) as runner:
+            assert runner.run(timeout=9.0) is Status.FAILURE
+
+    def test_a_pause_before_a_retry_wakes_the_tree(self, host: Host, name: str, node: Any) -> None:
+        from bt_actions import Retry
+
+        host.open(name, "1:reject")
+        leaf = MoveRobot("m", 0.1, action_name=name, retry=Retry(2, backoff=0.2))
+        with TreeRunner(leaf, node=node, heartbeat=30.0) as runner:
+            started = time.monotonic()
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+            assert time.monotonic() - started < 2.0
+        host.close_server(name)
+
+    def test_many_leaves_in_a_row_take_no_heartbeat_each(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        leaves = [MoveRobot(f"m{number}", 0.0, action_name=name) for number in range(20)]
+        with TreeRunner(in_sequence(*leaves), node=node, heartbeat=5.0) as runner:
+            started = time.monotonic()
+            assert runner.run(timeout=30.0) is Status.SUCCESS
+            assert time.monotonic() - started < 6.0
+
+    def test_the_heartbeat_serves_behaviours_that_watch_the_clock(self, node: Any) -> None:
+        timer = py_trees.timers.Timer("timer", duration=0.2)
+        with TreeRunner(timer, node=node) as runner:
+            assert runner.run(timeout=5.0) is Status.SUCCESS
+
+
+def open_files() -> int:
+    return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - as many as there are, no paths
+
+
+def test_fifty_cycles_leave_no_thread_and_no_file(
+    journal: Journal, name: str, executor: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def cycle() -> None:
+        with TreeRunner(
+            together(MoveRobot("m", 0.0, action_name=name), py_trees.behaviours.Success("ok")),
+            executor=executor,
+        ) as runner:
+            runner.start()
+            runner.interrupt()
+            runner.wait(5.0)
+
+    warm_up: Callable[[], None] = cycle
+    for _ in range(3):
+        warm_up()
+    gc.collect()
+    threads, files = threading.active_count(), open_files()
+    for _ in range(25):
+        cycle()
+    gc.collect()
+    until(lambda: threading.active_count() <= threads)
+    assert open_files() <= files + 1
+    assert capfd.readouterr().err == ""

@@ -1,0 +1,99 @@
+"""What docs/security.md promises: a tree runs no code, and the package has no back door."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bt_actions import load_tree
+from bt_actions.cli import main
+from bt_actions.document import DocumentError
+
+PACKAGE = Path(__file__).parents[1] / "bt_actions"
+
+NEVER_CALLED = {"eval", "exec", "compile", "__import__", "system", "popen", "Popen", "check_output"}
+NEVER_IMPORTED = {"pickle", "marshal", "shelve", "subprocess", "pty", "dill"}
+
+
+@pytest.fixture
+def trap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A tree that includes one with a `python:` node whose module leaves a mark when imported."""
+    mark = tmp_path / "imported"
+    (tmp_path / "trap.py").write_text(
+        "import pathlib, py_trees\n"
+        f"pathlib.Path({str(mark)!r}).touch()\n"
+        "class Trap(py_trees.behaviours.Success):\n    pass\n"
+    )
+    (tmp_path / "inner.yaml").write_text("tree: inner\nroot: {python: trap.Trap}\n")
+    (tmp_path / "outer.yaml").write_text(
+        "tree: outer\ninputs: {x: {type: float64, default: 1.0}}\n"
+        "root:\n  sequence: Work\n  children:\n    - subtree: inner.yaml\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return tmp_path
+
+
+@pytest.mark.parametrize("more", [[], ["--set", "x=2.0"]])
+def test_run_no_python_refuses_the_tree_and_imports_nothing(
+    trap: Path, more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(trap / "outer.yaml"), "--no-python", *more]) == 2
+    assert "inner.yaml:2:8: error[BT214]: python: is not allowed here" in capsys.readouterr().err
+    assert not (trap / "imported").exists()
+
+
+def test_load_tree_refuses_it_as_well_with_and_without_types(trap: Path) -> None:
+    for types in (True, False):
+        with pytest.raises(DocumentError, match="not allowed"):
+            load_tree(trap / "outer.yaml", types=types, python=False)
+    assert not (trap / "imported").exists()
+
+
+def test_without_the_option_it_is_loaded(trap: Path) -> None:
+    load_tree(trap / "outer.yaml")
+    assert (trap / "imported").exists()
+
+
+@pytest.mark.parametrize(
+    "tag", ["!!python/object/apply:os.system", "!!python/name:os.system", "!x"]
+)
+def test_a_tag_that_would_construct_something_is_an_error(tmp_path: Path, tag: str) -> None:
+    path = tmp_path / "tagged.yaml"
+    path.write_text(f"tree: tagged\nroot: {{log: {tag} [echo]}}\n")
+    with pytest.raises(DocumentError):
+        load_tree(path)
+
+
+def calls() -> Iterator[tuple[Path, ast.Call]]:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call):
+                yield path, node
+
+
+def test_the_package_evaluates_no_text_and_starts_no_command() -> None:
+    found = []
+    for path, call in calls():
+        name = getattr(call.func, "id", None) or getattr(call.func, "attr", "")
+        owner = getattr(getattr(call.func, "value", None), "id", "")
+        harmless = name == "compile" and owner == "re"
+        if name in NEVER_CALLED and not harmless:
+            found.append(f"{path.name}:{call.lineno} {name}")
+        if owner == "yaml" and name in {"load", "load_all", "unsafe_load", "full_load"}:
+            found.append(f"{path.name}:{call.lineno} yaml.{name}")
+        if any(word.arg == "shell" for word in call.keywords):
+            found.append(f"{path.name}:{call.lineno} shell=")
+    assert found == []
+
+
+def test_the_package_imports_nothing_that_unpickles_or_runs_commands() -> None:
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found += [f"{path.name}: {n}" for n in names if n.split(".")[0] in NEVER_IMPORTED]
+    assert found == []

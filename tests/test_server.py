@@ -1,0 +1,180 @@
+"""What is known of one action server, seen from outside."""
+
+from __future__ import annotations
+
+import pytest
+
+from bt_actions.server import LEASE, PROBE_EVERY, SETTLED_AFTER, SLOWEST_START, Server, ServerWatch
+
+OLD, NEW, THIRD = b"old", b"new", b"third"
+
+
+def gids(*which: bytes) -> frozenset[bytes]:
+    return frozenset(which)
+
+
+@pytest.fixture
+def watch() -> ServerWatch:
+    seen = ServerWatch()
+    seen.observe(0.0, True, gids(OLD))
+    return seen
+
+
+def crowd(watch: ServerWatch, at: float = 1.0) -> ServerWatch:
+    watch.observe(at, True, gids(OLD, NEW))
+    return watch
+
+
+def settle(watch: ServerWatch, at: float = 1.0) -> ServerWatch:
+    """Show a ghost and its successor, and let only the successor answer."""
+    crowd(watch, at)
+    watch.probe_answered(at + 0.1, 1)
+    watch.observe(at + 0.1 + SLOWEST_START, True, gids(OLD, NEW))
+    return watch
+
+
+def test_nothing_was_seen_yet() -> None:
+    assert ServerWatch().state(0.0) is Server.ABSENT
+    assert not ServerWatch().wants_probe(0.0)
+
+
+def test_one_that_is_ready_is_ready(watch: ServerWatch) -> None:
+    assert watch.state(0.0) is Server.READY
+    assert not watch.wants_probe(0.0), "nothing is open: no traffic"
+
+
+def test_without_its_services_or_its_status_topic_it_is_absent(watch: ServerWatch) -> None:
+    watch.observe(1.0, False, gids(OLD))
+    assert watch.state(1.0) is Server.ABSENT
+    watch.observe(2.0, True, gids())
+    assert watch.state(2.0) is Server.ABSENT
+
+
+def test_two_publishers_are_not_yet_two_servers(watch: ServerWatch) -> None:
+    assert crowd(watch).state(1.0) is Server.SETTLING
+
+
+def test_two_answers_to_one_probe_are_two_servers(watch: ServerWatch) -> None:
+    crowd(watch).probe_answered(1.1, 1)
+    assert watch.state(1.1) is Server.SETTLING
+    watch.probe_answered(1.2, 1)
+    assert watch.state(1.2) is Server.AMBIGUOUS
+
+
+def test_one_answer_and_silence_are_a_ghost_and_its_successor(watch: ServerWatch) -> None:
+    late = 1.0 + SLOWEST_START
+    crowd(watch).probe_answered(late, 1)
+    watch.observe(late + SETTLED_AFTER / 2, True, gids(OLD, NEW))
+    assert watch.state(late + SETTLED_AFTER / 2) is Server.SETTLING
+    watch.observe(late + SETTLED_AFTER, True, gids(OLD, NEW))
+    assert watch.state(late + SETTLED_AFTER) is Server.READY
+    assert watch.alone
+
+
+def test_a_server_that_has_just_come_in_sight_is_given_time_to_answer_too(
+    watch: ServerWatch,
+) -> None:
+    crowd(watch).probe_answered(1.01, 1)
+    watch.observe(1.0 + SLOWEST_START - 0.1, True, gids(OLD, NEW))
+    assert not watch.alone, "the old one answered at once; the new one may be slow"
+    watch.probe_answered(1.0 + SLOWEST_START - 0.1, 1)
+    assert watch.state(1.0 + SLOWEST_START) is Server.AMBIGUOUS
+
+
+def test_answers_to_two_probes_are_not_two_answers(watch: ServerWatch) -> None:
+    crowd(watch)
+    for probe in (1, 2, 3):
+        watch.probe_answered(1.0 + 0.1 * probe, probe)
+    assert watch.state(1.5) is Server.SETTLING
+
+
+def test_a_second_answer_that_is_late_still_shows_two_servers(watch: ServerWatch) -> None:
+    settle(watch).probe_answered(4.0, 1)
+    assert watch.state(4.0) is Server.AMBIGUOUS
+    watch.observe(5.0, True, gids(OLD, NEW))
+    assert watch.state(5.0) is Server.AMBIGUOUS, "one answer to another probe changes nothing"
+
+
+def test_what_is_shown_beyond_the_lease_is_a_server(watch: ServerWatch) -> None:
+    assert settle(watch).state(1.0 + LEASE + 0.1) is Server.AMBIGUOUS
+
+
+def test_when_the_ghost_is_gone_there_is_one_again(watch: ServerWatch) -> None:
+    crowd(watch).observe(20.0, True, gids(NEW))
+    assert watch.state(20.0) is Server.READY
+    assert not watch.alone
+    assert not watch.wants_probe(20.0)
+
+
+def test_a_third_one_opens_the_question_again(watch: ServerWatch) -> None:
+    settle(watch).observe(10.0, True, gids(OLD, NEW, THIRD))
+    assert watch.state(10.0) is Server.SETTLING
+
+
+def test_of_three_two_remain_and_the_question_is_open_again(watch: ServerWatch) -> None:
+    watch.observe(1.0, True, gids(OLD, NEW, THIRD))
+    watch.probe_answered(1.1, 1)
+    watch.probe_answered(1.1, 1)
+    assert watch.state(1.1) is Server.AMBIGUOUS
+    watch.observe(2.0, True, gids(NEW, THIRD))
+    assert watch.state(2.0) is Server.SETTLING
+
+
+def test_it_is_probed_now_and_then_while_the_question_is_open(watch: ServerWatch) -> None:
+    crowd(watch)
+    assert watch.wants_probe(1.0)
+    assert not watch.wants_probe(1.0 + PROBE_EVERY / 2)
+    assert watch.wants_probe(1.0 + PROBE_EVERY)
+
+
+def test_where_two_have_answered_it_is_not_probed_any_more(watch: ServerWatch) -> None:
+    crowd(watch).probe_answered(1.1, 1)
+    watch.probe_answered(1.1, 1)
+    assert not watch.wants_probe(9.0)
+
+
+def test_a_long_crowd_leaves_no_growing_heap_of_answers(watch: ServerWatch) -> None:
+    crowd(watch)
+    for probe in range(1_000):
+        now = 1.0 + PROBE_EVERY * probe
+        watch.probe_answered(now, probe)
+        watch.observe(now, True, gids(OLD, NEW))
+    assert len(watch._answers) < 50
+
+
+def test_answers_from_before_the_crowd_are_not_counted(watch: ServerWatch) -> None:
+    watch.probe_answered(0.5, 1)
+    crowd(watch).observe(3.0, True, gids(OLD, NEW))
+    assert watch.state(3.0) is Server.SETTLING
+
+
+def test_it_is_gone_when_nobody_a_goal_was_sent_to_is_shown(watch: ServerWatch) -> None:
+    assert not watch.gone(0.0, gids(OLD))
+    watch.observe(1.0, True, gids(NEW))
+    assert watch.gone(1.0, gids(OLD))
+    assert not watch.gone(1.0, gids(OLD, NEW))
+
+
+def test_it_is_gone_when_it_is_not_ready_for_a_while_but_not_at_once(watch: ServerWatch) -> None:
+    watch.observe(1.0, True, gids(OLD))
+    watch.observe(1.2, False, gids(OLD))
+    assert not watch.gone(1.2, gids(OLD))
+    watch.observe(2.3, False, gids(OLD))
+    assert watch.gone(2.3, gids(OLD))
+    watch.observe(2.4, True, gids(OLD))
+    assert not watch.gone(2.4, gids(OLD))
+
+
+def test_a_newcomer_is_a_change_and_a_departure_is_not(watch: ServerWatch) -> None:
+    assert not watch.changed(gids(OLD))
+    assert crowd(watch).changed(gids(OLD))
+    watch.observe(2.0, True, gids(NEW))
+    assert not watch.changed(gids(OLD, NEW))
+
+
+def test_looking_seldom_is_not_being_away(watch: ServerWatch) -> None:
+    """Nobody looked for a minute; the first look finds it not ready, for how long nobody knows."""
+    watch.observe(60.0, False, gids(OLD))
+    assert not watch.gone(60.0, gids(OLD))
+    watch.observe(61.0, False, gids(OLD))
+    assert watch.gone(61.0, gids(OLD))
