@@ -12,6 +12,7 @@ from pathlib import Path
 
 SHORT_LEASE = Path(__file__).with_name("short_lease.xml")
 _PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+_TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _IN_THIS_FOLDER = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 _LOGS = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 _RANGES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
@@ -28,10 +29,16 @@ class Reach(Enum):
 
 
 def prepare(reach: Reach = Reach.NETWORK) -> None:
-    """Let others notice within 3 s when this process dies, and set how far it may be seen."""
+    """Let others notice within 3 s when this process dies, and set how far it may be seen.
+
+    It talks over UDP alone: processes that are killed hold up others in Fast DDS's shared memory,
+    whatever their domain (docs/reliability-settings.md). With Reach.MACHINE, rmw_fastrtps insists
+    on shared memory besides.
+    """
     chosen = any(os.environ.get(name) for name in _PROFILES)
     if not chosen and not any(Path(name).exists() for name in _IN_THIS_FOLDER):
         os.environ[_PROFILES[0]] = str(SHORT_LEASE)
+        os.environ.setdefault(_TRANSPORTS, "UDPv4")
     if not any(os.environ.get(name) for name in _LOGS):
         os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")  # rcl insists on one
     if reach is not Reach.NETWORK and not any(os.environ.get(name) for name in _RANGES):

@@ -326,7 +326,7 @@ class Line:
         """Our node is gone, or its context: nobody can want these goals any more."""
         if not self.orphaned:
             self.orphaned = True
-            if self.goals:
+            if any(not ticket.accounted_for for ticket in self.goals.values()):
                 log.warning(f"{self.name}: the node is gone; canceling what it left")
         for ticket in list(self.goals.values()):  # also one that was begun since
             if ticket.goal.outcome is None:

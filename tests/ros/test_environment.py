@@ -1,5 +1,7 @@
 """Settings of the middleware: ours where the user has none."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,8 +17,10 @@ def _clean(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         "ROS_AUTOMATIC_DISCOVERY_RANGE",
         "ROS_LOCALHOST_ONLY",
         "ROS_STATIC_PEERS",
+        "FASTDDS_BUILTIN_TRANSPORTS",
     ):
-        monkeypatch.setenv(name, "")
+        monkeypatch.setenv(name, "")  # so that it is as it was afterwards
+    monkeypatch.delenv("FASTDDS_BUILTIN_TRANSPORTS")
     monkeypatch.chdir(tmp_path)
 
 
@@ -30,6 +34,32 @@ def test_the_short_lease_is_given_where_the_user_has_no_profile() -> None:
     prepare()
     assert _get("FASTRTPS_DEFAULT_PROFILES_FILE") == str(SHORT_LEASE)
     assert SHORT_LEASE.exists()
+    assert _get("FASTDDS_BUILTIN_TRANSPORTS") == "UDPv4"
+
+
+def test_transports_that_the_user_chose_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "LARGE_DATA")
+    prepare()
+    assert _get("FASTDDS_BUILTIN_TRANSPORTS") == "LARGE_DATA"
+
+
+@pytest.mark.parametrize("prepared", [True, False])
+def test_a_process_that_is_prepared_keeps_out_of_the_shared_memory(
+    prepared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    program = (
+        "import pathlib, rclpy\n"
+        "from bt_actions.ros.environment import prepare\n"
+        f"prepare() if {prepared} else None\n"
+        "rclpy.init()\n"
+        "node = rclpy.create_node('looks')\n"
+        "print('/dev/shm/fastrtps' in pathlib.Path('/proc/self/maps').read_text())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], check=True, capture_output=True, text=True
+    )
+    assert done.stdout.split()[-1] == str(not prepared)
 
 
 @pytest.mark.parametrize(
@@ -41,6 +71,7 @@ def test_a_profile_of_the_user_is_never_overridden(
     monkeypatch.setenv(name, "/theirs.xml")
     prepare()
     assert _get(name) == "/theirs.xml"
+    assert _get("FASTDDS_BUILTIN_TRANSPORTS") == ""
     assert str(SHORT_LEASE) not in (
         _get("FASTRTPS_DEFAULT_PROFILES_FILE"),
         _get("FASTDDS_DEFAULT_PROFILES_FILE"),

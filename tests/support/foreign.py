@@ -226,16 +226,20 @@ def spin_until_a_signal_and_clean_up(user: User) -> None:
 def tick_tock_until_a_signal(user: User) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(user.node)
-    threading.Thread(target=executor.spin, daemon=True).start()
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
 
     def until_the_context_ends(tree: py_trees.trees.BehaviourTree) -> None:
         user.executing()
         if not rclpy.ok():
             tree.interrupt()
 
-    user.tree.tick_tock(period_ms=20, post_tick_handler=until_the_context_ends)
-    user.tree.shutdown()
-    user.tell()
+    try:  # SIGINT also raises KeyboardInterrupt, wherever the program is
+        user.tree.tick_tock(period_ms=20, post_tick_handler=until_the_context_ends)
+        user.tree.shutdown()
+        user.tell()
+    finally:
+        thread.join()  # rclpy aborts a process that ends while a thread of its own still spins
 
 
 def _started(action: str) -> TreeRunner:

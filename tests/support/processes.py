@@ -131,6 +131,8 @@ class Process:
     def __str__(self) -> str:
         return "\n".join([f"process {self.pid}", *self.lines[-30:], *self.errors[-60:]])
 
+    __repr__ = __str__  # what pytest shows of an assertion's message
+
 
 class Journal:
     """What one server has written, read while it writes."""
