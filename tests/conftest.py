@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bt_actions.ros.environment import PROFILE, SHORT_LEASE
+
 if TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour
     from tests.support.processes import Host, HostFactory, Journal, Process
@@ -41,6 +43,7 @@ def domain() -> Iterator[int]:
             environment = {
                 "ROS_DOMAIN_ID": str(number),
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+                PROFILE: str(SHORT_LEASE),  # the tests play the orchestrator, so they have its profile
             }
             before = {name: os.environ.get(name) for name in environment}
             os.environ.update(environment)

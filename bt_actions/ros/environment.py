@@ -11,7 +11,8 @@ from enum import Enum
 from pathlib import Path
 
 SHORT_LEASE = Path(__file__).with_name("short_lease.xml")
-_PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_PROFILES = (PROFILE, "FASTDDS_DEFAULT_PROFILES_FILE")
 _TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _IN_THIS_FOLDER = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 _LOGS = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
@@ -37,7 +38,7 @@ def prepare(reach: Reach = Reach.NETWORK) -> None:
     """
     chosen = any(os.environ.get(name) for name in _PROFILES)
     if not chosen and not any(Path(name).exists() for name in _IN_THIS_FOLDER):
-        os.environ[_PROFILES[0]] = str(SHORT_LEASE)
+        os.environ[PROFILE] = str(SHORT_LEASE)
         os.environ.setdefault(_TRANSPORTS, "UDPv4")
     if not any(os.environ.get(name) for name in _LOGS):
         os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")  # rcl insists on one

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import re
+from pathlib import Path
 from typing import Any
 
 import pyte
@@ -164,6 +166,12 @@ def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
         "outcome": "SUCCEEDED",
         "duration": 1.0,
     }
+    text = (Path(__file__).parents[2] / "docs" / "running.md").read_text()
+    table = dict(re.findall(r"^\| `(\w+)` \|[^|]*\| (.*) \|$", text, re.MULTILINE))
+    documented = {kind: re.findall(r"`(\w+)`", keys) for kind, keys in table.items()}
+    assert documented == {each["event"]: list(each)[1:] for each in objects}
+    (actions,) = re.findall(r"^- `actions`: [^,]*, with (.*?)\.$", text, re.MULTILINE | re.DOTALL)
+    assert re.findall(r"`(\w+)`", actions) == list(action)
 
 
 # The live drawing

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import IO, Any
 
-from bt_actions.ros.environment import SHORT_LEASE
+from bt_actions.ros.environment import PROFILE, SHORT_LEASE
 from bt_actions.simulation import journal
 from bt_actions.simulation.journal import Entry
 from tests.support.waiting import until
@@ -43,11 +43,15 @@ class Process:
         prefix: Sequence[str] = (),
         environment: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        """`prefix` is a command that runs another, as ``ip netns exec NAME`` does."""
+        """`prefix` is a command that runs another, as ``ip netns exec NAME`` does.
+
+        Fast DDS is left as it comes, whatever profile the tests have, unless `short_lease` says so.
+        """
+        inherited = {name: value for name, value in os.environ.items() if name != PROFILE}
         ours = {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
-        environment = {**os.environ, **ours, **environment}
         if short_lease:
-            environment["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(SHORT_LEASE)
+            ours[PROFILE] = str(SHORT_LEASE)
+        environment = {**inherited, **ours, **environment}
         self.popen = subprocess.Popen(
             [*prefix, sys.executable, *arguments],
             stdin=subprocess.PIPE,
