@@ -43,7 +43,7 @@ def domain() -> Iterator[int]:
             environment = {
                 "ROS_DOMAIN_ID": str(number),
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-                PROFILE: str(SHORT_LEASE),  # the tests play the orchestrator, so they have its profile
+                PROFILE: str(SHORT_LEASE),  # as what they play, the orchestrator, has it
             }
             before = {name: os.environ.get(name) for name in environment}
             os.environ.update(environment)
