@@ -18,12 +18,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from bt_actions.deadlines import Deadlines
 from bt_actions.goal_terms import (
     CANCEL_ACCEPTED,
     CANCEL_TERMINATED,
     CANCEL_UNKNOWN_GOAL,
     ENDS,
-    ON_ROS_CLOCK,
     OUTCOMES,
     STATUS_ABORTED,
     STATUS_CANCELED,
@@ -101,9 +101,8 @@ class Goal:
         self._seen_status: int | None = None  # terminal, from the status topic
         self._asked_since = 0  # questions for the result since then
         self._commands: list[Command] = []
-        self._due: dict[Event, float] = {}
-        self._ros_seen = now.ros
-        self._arm(Event.QUEUE_DUE, timeouts.queue, now)
+        self._deadlines = Deadlines(now)
+        self._deadlines.arm(Event.QUEUE_DUE, timeouts.queue, now)
 
     def __repr__(self) -> str:
         told = "" if self.outcome is None else f" {self.outcome}, end {self.end}"
@@ -156,16 +155,15 @@ class Goal:
 
     def due_in(self, now: Now) -> float | None:
         """Return the seconds until the earliest deadline (0 when it has passed), or None."""
-        left = [self._left(event, now) for event in self._due]
-        return max(0.0, min(left)) if left else None
+        waits = self._deadlines.left(now)
+        return max(0.0, waits[0][0]) if waits else None
 
     def deadline(self, now: Now) -> tuple[Event, float] | None:
         """Return the deadline that falls due first and the seconds left, or None."""
-        waits = [(self._left(event, now), event) for event in self._due if event != Event.ASK_DUE]
-        if not waits:
-            return None
-        left, event = min(waits, key=lambda wait: wait[0])
-        return event, max(0.0, left)
+        for left, event in self._deadlines.left(now):
+            if event is not Event.ASK_DUE:
+                return event, max(0.0, left)
+        return None
 
     # What the caller may tell
 
@@ -176,12 +174,12 @@ class Goal:
         """
         if now.steady != now.steady or now.ros != now.ros:
             raise ValueError(f"not a moment: {now}")
-        self._follow_ros_clock(now)
+        self._deadlines.follow(now)
         row = TABLE[self.state, event]
         state = row.step(self, now, detail)
         assert state in row.to, f"{event} took {self!r} to {state}"
         if state is State.DONE and self.state is not State.DONE:
-            self._due.clear()
+            self._deadlines.clear()
             self._release()
         self.state = state
         commands, self._commands = tuple(self._commands), []
@@ -189,19 +187,17 @@ class Goal:
 
     def poll(self, now: Now) -> tuple[Command, ...]:
         """Let every deadline that has passed take effect, the earliest first."""
-        self._follow_ros_clock(now)
+        self._deadlines.follow(now)
         commands: tuple[Command, ...] = ()
-        for event in sorted(self._due, key=lambda event: self._left(event, now)):
-            if event in self._due and self._left(event, now) <= 0.0:
-                del self._due[event]
+        for _, event in self._deadlines.left(now):
+            if self._deadlines.take_passed(event, now):
                 commands += self.on(event, now)
         return commands
 
     def postpone(self, seconds: float) -> None:
         """Give a goal that was not sent yet so much more time: the tree was paused."""
         if self.state in (State.QUEUED, State.WAITING_FOR_SERVER):
-            for event in self._due:
-                self._due[event] += seconds
+            self._deadlines.postpone(seconds)
 
     # Steps of the table: each decides, acts on the goal, and returns the next state
 
@@ -220,8 +216,8 @@ class Goal:
 
     def _granted(self, now: Now, detail: Any) -> State:
         """Hold the resources, and wait for the server."""
-        self._disarm(Event.QUEUE_DUE)
-        self._arm(Event.SERVER_DUE, self.timeouts.server, now)
+        self._deadlines.disarm(Event.QUEUE_DUE)
+        self._deadlines.arm(Event.SERVER_DUE, self.timeouts.server, now)
         return State.WAITING_FOR_SERVER
 
     def _taken(self, now: Now, detail: Any) -> State:
@@ -255,8 +251,8 @@ class Goal:
 
     def _send(self, now: Now, detail: Any) -> State:
         """Send it; until the server says how it ended, its end is UNKNOWN."""
-        self._disarm(Event.SERVER_DUE)
-        self._arm(Event.ACCEPT_DUE, self.timeouts.accept, now)
+        self._deadlines.disarm(Event.SERVER_DUE)
+        self._deadlines.arm(Event.ACCEPT_DUE, self.timeouts.accept, now)
         self._sent = True
         self.end = End.UNKNOWN
         self._commands.append(Command.SEND)
@@ -272,10 +268,10 @@ class Goal:
     def _begin(self, now: Now, detail: Any) -> State:
         """Ask for the result; timeout.result and timeout.feedback begin."""
         self._accepted = True
-        self._disarm(Event.ACCEPT_DUE)
-        self._arm(Event.RESULT_DUE, self.timeouts.result, now)
-        self._arm(Event.FEEDBACK_DUE, self.timeouts.feedback, now)
-        self._arm(Event.ASK_DUE, ASK_IN_ANY_CASE, now)
+        self._deadlines.disarm(Event.ACCEPT_DUE)
+        self._deadlines.arm(Event.RESULT_DUE, self.timeouts.result, now)
+        self._deadlines.arm(Event.FEEDBACK_DUE, self.timeouts.feedback, now)
+        self._deadlines.arm(Event.ASK_DUE, ASK_IN_ANY_CASE, now)
         self._commands.append(Command.ASK_RESULT)
         return State.EXECUTING
 
@@ -315,7 +311,7 @@ class Goal:
         if self._suspect:
             return self._verdict(now)
         self._suspect = True
-        self._arm(Event.ACCEPT_DUE, self._patience, now)
+        self._deadlines.arm(Event.ACCEPT_DUE, self._patience, now)
         self._ask(now)
         return State.CANCELING
 
@@ -324,12 +320,12 @@ class Goal:
         self._settle_as_planned()
         if self._denied_lately(now):
             self.end = End.NEVER_STARTED  # should it turn up after all, it is canceled
-            self._due.clear()
+            self._deadlines.clear()
             self._release()
             self._judged = True
             self._ask_once_more(now)
         else:
-            self._arm(Event.ACCEPT_DUE, self._patience, now)
+            self._deadlines.arm(Event.ACCEPT_DUE, self._patience, now)
         return State.CANCELING
 
     def _denied_lately(self, now: Now) -> bool:
@@ -345,9 +341,9 @@ class Goal:
         self.end = End.UNKNOWN
         self._denied_since, self._judged, self._never_came = None, False, False
         self.lost = False
-        self._disarm(Event.ACCEPT_DUE)
+        self._deadlines.disarm(Event.ACCEPT_DUE)
         if self.outcome is None:
-            self._arm(Event.CANCEL_DUE, self.timeouts.cancel, now)
+            self._deadlines.arm(Event.CANCEL_DUE, self.timeouts.cancel, now)
         self._ask(now)
         return State.CANCELING
 
@@ -356,7 +352,7 @@ class Goal:
         self.feedback = detail
         self._doubts = 0
         if not self._replaced:
-            self._arm(Event.FEEDBACK_DUE, self.timeouts.feedback, now)
+            self._deadlines.arm(Event.FEEDBACK_DUE, self.timeouts.feedback, now)
         return State.EXECUTING
 
     def _feedback_while_canceling(self, now: Now, detail: Any) -> State:
@@ -371,7 +367,7 @@ class Goal:
             self._doubts = 0  # whatever it was asked for, and denied: it has the goal
         elif self._seen_status is None:
             self._seen_status = detail
-            self._arm(Event.ASK_DUE, ASK_AGAIN, now)
+            self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
         return self.state
 
     def _terminal_status_canceling(self, now: Now, detail: Any) -> State:
@@ -388,7 +384,7 @@ class Goal:
             return self._finished_by_status()
         self._commands.append(Command.ASK_RESULT)
         again = ASK_IN_ANY_CASE if self._seen_status is None else ASK_AGAIN
-        self._arm(Event.ASK_DUE, again, now)
+        self._deadlines.arm(Event.ASK_DUE, again, now)
         return State.EXECUTING
 
     def _finished(self, now: Now, detail: Any) -> State:
@@ -419,7 +415,7 @@ class Goal:
         """Ask again; believed the third time: SERVER_LOST."""
         self._doubts += 1
         if self._doubts < DOUBTS:
-            self._arm(Event.ASK_DUE, ASK_AGAIN, now)
+            self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
             return State.EXECUTING
         return self._forgotten()
 
@@ -454,10 +450,10 @@ class Goal:
         assert self._denied_since is not None
         left = self._denied_since + DENIED_FOR_GOOD - now.steady
         if left > 0.0:
-            self._arm(Event.ASK_DUE, left, now)
+            self._deadlines.arm(Event.ASK_DUE, left, now)
         else:
             self._never_came, self.end = True, End.NEVER_STARTED
-            self._disarm(Event.ASK_DUE)
+            self._deadlines.disarm(Event.ASK_DUE)
 
     def _ask_again(self, now: Now, detail: Any) -> State:
         """Ask again, cancel and result; after several questions believe the status."""
@@ -494,7 +490,7 @@ class Goal:
         self.lost = True
         if self.end is not End.NEVER_STARTED:
             self.end = End.SERVER_GONE
-        self._due.clear()
+        self._deadlines.clear()
         self._release()
         return State.CANCELING
 
@@ -510,7 +506,7 @@ class Goal:
         self.end = End.UNKNOWN
         if not self._accepted:
             self._suspect, self._judged = True, False
-            self._arm(Event.ACCEPT_DUE, self._patience, now)
+            self._deadlines.arm(Event.ACCEPT_DUE, self._patience, now)
         self._ask(now)
         return State.CANCELING
 
@@ -524,9 +520,9 @@ class Goal:
             return State.EXECUTING  # by a newer one still, which gives it no more time
         self._replaced = True
         self._plan(Outcome.CANCELED, "replaced by a newer goal")
-        self._disarm(Event.RESULT_DUE)
-        self._disarm(Event.FEEDBACK_DUE)
-        self._arm(Event.CANCEL_DUE, self.timeouts.cancel or PATIENCE, now)
+        self._deadlines.disarm(Event.RESULT_DUE)
+        self._deadlines.disarm(Event.FEEDBACK_DUE)
+        self._deadlines.arm(Event.CANCEL_DUE, self.timeouts.cancel or PATIENCE, now)
         return State.EXECUTING
 
     def _replaced_unsent(self, now: Now, detail: Any) -> State:
@@ -565,9 +561,9 @@ class Goal:
 
     def _cancel(self, now: Now, outcome: Outcome, reason: str) -> State:
         self._plan(outcome, reason)
-        self._disarm(Event.RESULT_DUE)
-        self._disarm(Event.FEEDBACK_DUE)
-        self._arm(Event.CANCEL_DUE, self.timeouts.cancel, now)
+        self._deadlines.disarm(Event.RESULT_DUE)
+        self._deadlines.disarm(Event.FEEDBACK_DUE)
+        self._deadlines.arm(Event.CANCEL_DUE, self.timeouts.cancel, now)
         self._ask(now)
         return State.CANCELING
 
@@ -575,7 +571,7 @@ class Goal:
         """Interrupted before acceptance: it is canceled as soon as it is accepted."""
         self._plan(Outcome.CANCELED, "interrupted by the tree before the goal was accepted")
         if self.timeouts.accept is None:
-            self._arm(Event.ACCEPT_DUE, self._patience, now)
+            self._deadlines.arm(Event.ACCEPT_DUE, self._patience, now)
         return State.CANCELING
 
     def _interrupted_while_canceling(self, now: Now, detail: Any) -> State:
@@ -636,27 +632,7 @@ class Goal:
         self._commands.append(Command.CANCEL)
         if self._accepted:
             self._commands.append(Command.ASK_RESULT)
-        self._arm(Event.ASK_DUE, ASK_AGAIN, now)
-
-    def _arm(self, event: Event, seconds: float | None, now: Now) -> None:
-        if seconds is not None:
-            self._due[event] = (now.ros if event in ON_ROS_CLOCK else now.steady) + seconds
-
-    def _disarm(self, event: Event) -> None:
-        self._due.pop(event, None)
-
-    def _left(self, event: Event, now: Now) -> float:
-        if event in ON_ROS_CLOCK:  # where the clock has jumped back, no more than what remained
-            return self._due[event] - max(now.ros, self._ros_seen)
-        return self._due[event] - now.steady
-
-    def _follow_ros_clock(self, now: Now) -> None:
-        """Where simulated time jumps back, what remained of a deadline still remains."""
-        back = self._ros_seen - now.ros
-        if back > 0.0:
-            for event in ON_ROS_CLOCK & self._due.keys():
-                self._due[event] -= back
-        self._ros_seen = now.ros
+        self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
 
 
 @dataclass(frozen=True, slots=True)

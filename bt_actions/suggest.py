@@ -9,6 +9,8 @@ __all__ = ["closest", "did_you_mean", "listing"]
 
 _LONGEST = 60
 _MOST = 60
+_BEGINNING = 4
+"""So many letters are meant as the beginning of a longer word rather than as another one."""
 
 
 def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
@@ -18,7 +20,10 @@ def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
     """
     if not 0 < len(word) <= _LONGEST:
         return None
-    wanted = _folded(word)
+    known, wanted = list(known), _folded(word)
+    longer = [name for name in known if len(word) >= _BEGINNING and name.startswith(word)]
+    if longer and word not in longer:
+        return min(longer, key=len)
     slack = max(2, len(word) // 3)
     near = [name for name in known if name != word and abs(len(name) - len(word)) <= slack]
     if len(near) > _MOST:  # comparing takes its time

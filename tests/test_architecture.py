@@ -19,6 +19,7 @@ PARTS = [
     {"ros"},
     {"attempts"},
     {"goal", "resources", "server", "goal_ids"},
+    {"deadlines"},
     {"goal_terms"},
     {"policy"},
 ]

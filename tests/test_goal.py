@@ -5,10 +5,12 @@ from __future__ import annotations
 import ast
 import inspect
 import math
+from types import ModuleType
 from typing import Any
 
 import pytest
 
+import bt_actions.deadlines
 import bt_actions.goal
 from bt_actions.goal import (
     ASK_AGAIN,
@@ -130,8 +132,9 @@ def test_the_table_says_where_each_event_may_lead(make: Any, event: Event) -> No
     assert life.goal.state in TABLE[before, event].to
 
 
-def test_the_machine_knows_no_ros_no_thread_and_no_clock() -> None:
-    tree = ast.parse(inspect.getsource(bt_actions.goal))
+@pytest.mark.parametrize("module", [bt_actions.goal, bt_actions.deadlines])
+def test_the_machine_knows_no_ros_no_thread_and_no_clock(module: ModuleType) -> None:
+    tree = ast.parse(inspect.getsource(module))
     imported = {
         name
         for node in ast.walk(tree)
@@ -148,6 +151,7 @@ def test_the_machine_knows_no_ros_no_thread_and_no_clock() -> None:
         "collections.abc",
         "dataclasses",
         "typing",
+        "bt_actions.deadlines",
         "bt_actions.goal_terms",
         "bt_actions.policy",
     }

@@ -35,6 +35,7 @@ _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _SPECIAL = re.compile(r"([-+]?)\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 _MAX_DIGITS = 400
+_OPENS = re.compile("flow mapping|flow sequence|quoted scalar")
 _INDEXED = re.compile(r"(\$[A-Za-z_]\w*(?:\.\w+)*)\[(\d+)\]")
 
 
@@ -320,7 +321,16 @@ def _report_syntax(source: Source, error: yaml.YAMLError) -> None:
     code, message, hint = _explain(problem, text, column)
     if code == "BT103":
         column = text.find("\t") + 1
-    source.report(code, Span(line, column, line, column + 1), message, hint=hint)
+    span = Span(line, column, line, column + 1)
+    source.report(code, span, message, hint=hint, related=_opened(source, error, code))
+
+
+def _opened(source: Source, error: yaml.YAMLError, code: str) -> Related | None:
+    """Where the brace, bracket or quote stands that is not closed, if it is that."""
+    what, mark = getattr(error, "context", None) or "", getattr(error, "context_mark", None)
+    if code != "BT102" or mark is None or not _OPENS.search(what):
+        return None
+    return Related(Place(source.name, mark.line + 1, mark.column + 1), "opened here")
 
 
 def _explain(problem: str, text: str, column: int) -> tuple[str, str, str | None]:

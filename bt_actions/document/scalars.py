@@ -235,13 +235,14 @@ class Choice:
     def words(self) -> str:
         return f"one of {', '.join(self.options)}"
 
-    def read(self, node: Node, source: Source) -> object:
+    def read(self, node: Node, source: Source, words: str = "") -> object:
+        """`words` say what else may stand here, too."""
         if not isinstance(node, Scalar):
             return wrong_form(self, node, source)
         if node.text in self.options:
             return node.text
         near = did_you_mean(node.text, self.options)
-        hint = None if near else self.words
+        hint = None if near else words or self.words
         source.report(
             "BT110", span_of(node), f"{words_for(node)} is not known here{near}", hint=hint
         )

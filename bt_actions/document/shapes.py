@@ -167,7 +167,7 @@ class OneOf:
 
     def read(self, node: Node, source: Source) -> object:
         if isinstance(node, Scalar):
-            return self.choice.read(node, source)
+            return self.choice.read(node, source, self.words)
         return self.record.read(node, source)
 
     def schema(self) -> Schema:

@@ -6,6 +6,7 @@ Pure functions: no node, no clock of their own unless none is given, and no rclp
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -46,6 +47,9 @@ __all__ = [
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")
+_NUMBER = re.compile(
+    r" *(?P<number>[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?) *(?P<unit>[A-Za-z/%°]{0,9})"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,9 +241,19 @@ def _wrong(kind: Scalar, value: object) -> str | None:
     return None
 
 
+def _number_in(value: object) -> str:
+    """What to write instead of a text that begins with a number; "" for anything else."""
+    found = _NUMBER.fullmatch(value) if isinstance(value, str) and len(value) < 40 else None
+    if found is None:
+        return ""
+    if not found["unit"]:
+        return ": without its quotes it is one"
+    return f": fields of a message have no units, write {found['number']}"
+
+
 def _wrong_float(name: str, value: object) -> str | None:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return f"a number ({name}) is needed, not {show(value)}"
+        return f"a number ({name}) is needed, not {show(value)}{_number_in(value)}"
     try:
         number = float(value)
     except OverflowError:
@@ -253,7 +267,7 @@ def _wrong_integer(name: str, value: object) -> str | None:
     if name == "byte" and isinstance(value, bytes) and len(value) == 1:
         return None
     if isinstance(value, bool) or not isinstance(value, int):
-        return f"a whole number ({name}) is needed, not {show(value)}"
+        return f"a whole number ({name}) is needed, not {show(value)}{_number_in(value)}"
     least, greatest = INTEGERS[name]
     if not least <= value <= greatest:
         return f"{show(value)} does not fit {_an(name)}: {least} to {greatest}"

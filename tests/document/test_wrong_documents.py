@@ -46,6 +46,9 @@ def said(finding: Finding) -> list[str]:
     lines = [f">> {where}{finding.end_column} {finding.severity}[{finding.code}] {finding.message}"]
     if finding.hint:
         lines.append(f"?? {finding.hint}")
+    if finding.related:
+        place = finding.related.place
+        lines.append(f"?? {place.line}:{place.column} {finding.related.message}")
     return lines
 
 

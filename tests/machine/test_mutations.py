@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from bt_actions.attempts import Attempts
+from bt_actions.deadlines import Deadlines
 from bt_actions.goal import TABLE, Goal, Row
 from bt_actions.goal_terms import Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
@@ -191,7 +192,7 @@ def takes_preemption_for_a_failure(patch: Patch) -> None:
 @mutation
 def gives_a_replaced_goal_its_feedback_deadline_back(patch: Patch) -> None:
     def feedback(goal: Goal, now: Any, detail: Any) -> State:
-        goal._arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
+        goal._deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
         return State.EXECUTING
 
     decide(patch, State.EXECUTING, Event.FEEDBACK, feedback)
@@ -204,7 +205,7 @@ def does_not_hear_feedback(patch: Patch) -> None:
 
 @mutation
 def loses_time_when_the_clock_jumps_back(patch: Patch) -> None:
-    patch.setattr(Goal, "_follow_ros_clock", lambda self, now: None)
+    patch.setattr(Deadlines, "follow", lambda self, now: None)
 
 
 @mutation
@@ -250,12 +251,12 @@ def forget(deadline: Event) -> Callable[[Patch], None]:
     """Return the mutation that never arms this deadline."""
 
     def make(patch: Patch) -> None:
-        def arm(goal: Goal, event: Event, seconds: float | None, now: Any) -> None:
+        def arm(deadlines: Deadlines, event: Event, seconds: float | None, now: Any) -> None:
             if event is not deadline:
-                original(goal, event, seconds, now)
+                original(deadlines, event, seconds, now)
 
-        original = Goal._arm
-        patch.setattr(Goal, "_arm", arm)
+        original = Deadlines.arm
+        patch.setattr(Deadlines, "arm", arm)
 
     return make
 

@@ -1,0 +1,64 @@
+"""The deadlines of one goal, on two clocks.
+
+Answers of the server are waited for on the steady clock; what the robot does, on the ROS clock,
+which may stand still or jump back: then what remained of a deadline still remains. It has no clock
+of its own, and does not know what a deadline means (goal.py).
+"""
+
+from __future__ import annotations
+
+from bt_actions.goal_terms import ON_ROS_CLOCK, Event, Now
+
+
+class Deadlines:
+    """Moments by which something must have happened, each named by the event that it is if not."""
+
+    def __init__(self, now: Now) -> None:
+        self._due: dict[Event, float] = {}
+        self._ros_seen = now.ros
+
+    def arm(self, event: Event, seconds: float | None, now: Now) -> None:
+        """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
+        if seconds is not None:
+            self._due[event] = (now.ros if event in ON_ROS_CLOCK else now.steady) + seconds
+
+    def disarm(self, event: Event) -> None:
+        """Forget one."""
+        self._due.pop(event, None)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._due.clear()
+
+    def left(self, now: Now) -> list[tuple[float, Event]]:
+        """Return the seconds until each, the earliest first; negative where it has passed."""
+        return sorted(((self._left(event, now), event) for event in self._due), key=_seconds)
+
+    def take_passed(self, event: Event, now: Now) -> bool:
+        """Whether this one is still set and has passed; it is forgotten then."""
+        if event not in self._due or self._left(event, now) > 0.0:
+            return False
+        del self._due[event]
+        return True
+
+    def postpone(self, seconds: float) -> None:
+        """Give all of them so much more time."""
+        for event in self._due:
+            self._due[event] += seconds
+
+    def follow(self, now: Now) -> None:
+        """Where the ROS clock has jumped back, let the deadlines on it jump with it."""
+        back = self._ros_seen - now.ros
+        if back > 0.0:
+            for event in ON_ROS_CLOCK & self._due.keys():
+                self._due[event] -= back
+        self._ros_seen = now.ros
+
+    def _left(self, event: Event, now: Now) -> float:
+        if event in ON_ROS_CLOCK:  # where the clock has jumped back, no more than what remained
+            return self._due[event] - max(now.ros, self._ros_seen)
+        return self._due[event] - now.steady
+
+
+def _seconds(wait: tuple[float, Event]) -> float:
+    return wait[0]
