@@ -143,7 +143,7 @@ class Goal:
     def owed(self) -> bool:
         """Whether a server that has it must be rid of it before it gets another goal."""
         unknown = self._sent and self.end is End.UNKNOWN and not self._holding
-        return unknown and not self.waited_for
+        return unknown and (self._accepted or not self.waited_for)
 
     @property
     def drains_within(self) -> float:

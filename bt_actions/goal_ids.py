@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _MAGIC = hashlib.sha256(b"bt_actions goal id 1").digest()[:3]
+_HIDDEN = b"\0\0"
+"""Stands for the moment of a start that cannot be read."""
 _lock = threading.Lock()
 _made_by: tuple[int, bytes, itertools.count[int]] | None = None
 
@@ -33,7 +35,12 @@ class Author:
     @property
     def alive(self) -> bool:
         """Whether that process still runs; one that cannot be looked for counts as alive."""
-        return not self.here or _start_of(self.pid) == self.started
+        if not self.here:
+            return True
+        started = _start_of(self.pid)
+        return started == self.started or (
+            started is not None and _HIDDEN in (started, self.started)
+        )
 
 
 def new_goal_id() -> bytes:
@@ -42,7 +49,7 @@ def new_goal_id() -> bytes:
     pid = os.getpid()
     with _lock:
         if _made_by is None or _made_by[0] != pid:  # the first, or after a fork
-            prefix = _MAGIC + _machine() + pid.to_bytes(4, "big") + (_start_of(pid) or b"\0\0")
+            prefix = _MAGIC + _machine() + pid.to_bytes(4, "big") + (_start_of(pid) or _HIDDEN)
             _made_by = (pid, prefix, itertools.count(secrets.randbits(32)))
         return _made_by[1] + (next(_made_by[2]) & 0xFFFFFFFF).to_bytes(4, "big")
 
@@ -72,10 +79,8 @@ def _start_of(pid: int) -> bytes | None:
     """Return a token of the moment a process started; None when there is no such process."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
-    except FileNotFoundError:
+    except OSError:  # there is none, or /proc does not show it, or no file can be opened
         return _without_proc(pid)
-    except OSError:
-        return None
     fields = stat.rpartition(")")[2].split()
     if fields[0] in "ZX":
         return None  # dead, and not yet reaped
@@ -83,12 +88,10 @@ def _start_of(pid: int) -> bytes | None:
 
 
 def _without_proc(pid: int) -> bytes | None:
-    if Path("/proc/self").exists():
-        return None
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
+    except (ProcessLookupError, OverflowError):
         return None
     except OSError:
-        pass
-    return b"\0\0"
+        pass  # it is somebody else's
+    return _HIDDEN

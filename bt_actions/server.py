@@ -51,6 +51,7 @@ class ServerWatch:
         self._unready_since: float | None = None
         self._crowded_since: float | None = None
         self._probed_at = float("-inf")
+        self._sent: dict[int, float] = {}  # probe: when it was sent
         self._answers: dict[int, tuple[int, float]] = {}  # probe: answers, time of the first
         self._both_answered = False
 
@@ -68,10 +69,28 @@ class ServerWatch:
             self.gids = gids
         since = self._crowded_since
         if since is not None and not self._both_answered and now - since >= SLOWEST_START:
-            self.alone = any(
-                count == 1 and now - first >= SETTLED_AFTER
-                for count, first in self._answers.values()
-            )
+            self.alone = self._answered_once(now, float("-inf"))
+
+    def _answered_once(self, now: float, sent_since: float) -> bool:
+        return any(
+            count == 1
+            and now - first >= SETTLED_AFTER
+            and self._sent.get(probe, float("-inf")) >= sent_since
+            for probe, (count, first) in self._answers.items()
+        )
+
+    def alone_since(self, now: float, moment: float) -> bool:
+        """Whether only one server answers, and only one has answered what was sent since `moment`.
+
+        So whoever has answered anything at `moment` is the only one.
+        """
+        return self.state(now) is Server.READY and self.alone and self._answered_once(now, moment)
+
+    def probe_sent(self, now: float, probe: int) -> None:
+        """Take note that a probe with this number goes out."""
+        self._sent[probe] = now
+        if len(self._sent) > PROBES_KEPT:
+            del self._sent[next(iter(self._sent))]
 
     def probe_answered(self, now: float, probe: int) -> None:
         """Take one answer to the probe numbered `probe`."""

@@ -162,7 +162,7 @@ def no_leaks(domain: int) -> Iterator[None]:
     """
     from bt_actions.ros import alarm
     from bt_actions.ros.line import Line
-    from bt_actions.ros.shared import resources_of
+    from bt_actions.ros.shared import domain_of
     from tests.support.waiting import until
 
     def open_goals() -> list[Any]:
@@ -176,7 +176,7 @@ def no_leaks(domain: int) -> Iterator[None]:
     before = threads()
     yield
     until(lambda: not open_goals(), 8.0, what="no goal is open any more")
-    until(lambda: not len(resources_of(domain)), what="no resource is held any more")
+    until(lambda: not len(domain_of(domain).resources), what="no resource is held any more")
     until(lambda: threads() <= before, what="no thread is left")
 
 

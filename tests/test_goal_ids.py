@@ -4,6 +4,10 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
 
 from bt_actions.goal_ids import author_of, new_goal_id
 
@@ -45,6 +49,21 @@ def test_a_pid_that_was_given_to_another_process_is_not_the_author() -> None:
     author = author_of(bytes(ours))
     assert author is not None
     assert not author.alive
+
+
+@pytest.mark.parametrize("error", [PermissionError, FileNotFoundError, OSError])
+def test_a_process_that_cannot_be_looked_at_counts_as_alive(
+    error: type[OSError], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(self: Path, **_: object) -> str:
+        raise error
+
+    author = author_of(new_goal_id())
+    assert author is not None
+    monkeypatch.setattr(Path, "read_text", refused)
+    monkeypatch.setattr("bt_actions.goal_ids._machine", lambda: b"any")
+    assert author.alive
+    assert not replace(author, pid=2**22 + 1).alive, "no such process"
 
 
 def test_an_id_from_another_machine_counts_as_alive() -> None:

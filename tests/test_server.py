@@ -95,6 +95,22 @@ def test_a_second_answer_that_is_late_still_shows_two_servers(watch: ServerWatch
     assert watch.state(5.0) is Server.AMBIGUOUS, "one answer to another probe changes nothing"
 
 
+def test_who_answers_is_alone_only_where_a_later_probe_shows_it(watch: ServerWatch) -> None:
+    """A server that has just started may be silent for long, and then answer all at once."""
+    settle(watch)
+    assert watch.alone
+    watch.probe_sent(9.0, 2)
+    watch.probe_answered(9.0, 2)
+    denied_at = 9.5
+    assert not watch.alone_since(9.5 + SETTLED_AFTER, denied_at), "probe 2 was sent before"
+    watch.probe_sent(9.6, 3)
+    watch.probe_answered(9.6, 3)
+    assert not watch.alone_since(9.6, denied_at), "a second answer may be under way"
+    assert watch.alone_since(9.6 + SETTLED_AFTER, denied_at)
+    watch.probe_answered(9.7 + SETTLED_AFTER, 3)
+    assert not watch.alone_since(9.9 + SETTLED_AFTER, denied_at)
+
+
 def test_what_is_shown_beyond_the_lease_is_a_server(watch: ServerWatch) -> None:
     assert settle(watch).state(1.0 + LEASE + 0.1) is Server.AMBIGUOUS
 

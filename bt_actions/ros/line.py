@@ -20,7 +20,7 @@ from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import Ticket, lock
+from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
 from bt_actions.server import Server, ServerWatch
 from bt_actions.suggest import did_you_mean
 
@@ -33,10 +33,10 @@ LOOK_WHILE_LOST = 1.0
 LOOK_WHILE_ORPHANED = 0.01
 """Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
 its return would matter; nobody spins our node any more, so that the alarm must take the answers."""
+ASK_EVERY = 0.5
+"""Seconds between two questions for a goal while another server is in sight."""
 PROBES_KEPT = 20
 FEEDBACK = "/_action/feedback"
-LOST_KEPT = 100
-"""Goals of one line remembered in case their server, or their request, turns up: the newest."""
 
 _probes = itertools.count(1)
 
@@ -57,6 +57,10 @@ class Line:
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
         self._warned_crowd = False
+        for ticket in traffic.domain.take_lost(name, action_type):
+            ticket.line, ticket.traffic, ticket.was_gone = self, traffic, True
+            self.goals[ticket.goal.id] = ticket
+            alarm.mind(self)
 
     def __repr__(self) -> str:
         return f"<Line {self.name}, {len(self.goals)} goals>"
@@ -97,13 +101,12 @@ class Line:
             elif not self.watch.changed(ticket.sent_to):
                 if self.watch.state(time.monotonic()) is Server.READY:
                     self.tell(ticket, Event.RESULT_UNKNOWN)
-            elif self.watch.alone and ticket.goal.accepted:
-                self.tell(ticket, Event.SERVER_LOST, f"{self.name} was restarted under the goal")
-                self.tell(ticket, Event.SERVER_RESTARTED)
+            elif ticket.denied_at is None:  # by one of several; `_judge` finds out what that means
+                ticket.denied_at = time.monotonic()
 
     def _rival_sent(self, ticket: Ticket) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
-        holders = self.traffic.resources.holders(ticket.goal.resources)
+        holders = self.traffic.domain.resources.holders(ticket.goal.resources)
         newer = holders[holders.index(ticket) + 1 :] if ticket in holders else []
         return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
 
@@ -167,7 +170,7 @@ class Line:
             alarm.wake_by(now.steady + due)
         newly = goal.accepted and not was_accepted and goal.state is State.EXECUTING
         if newly and goal.busy is Busy.REPLACE:
-            for older in self.traffic.resources.holders(goal.resources):
+            for older in self.traffic.domain.resources.holders(goal.resources):
                 if older is ticket:
                     break
                 older.line.tell(older, Event.REPLACED)
@@ -175,7 +178,7 @@ class Line:
     def _carry_out(self, ticket: Ticket, command: Command, message: Any) -> None:
         goal = ticket.goal
         if command is Command.RELEASE:
-            for next_one in self.traffic.resources.release(ticket):
+            for next_one in self.traffic.domain.resources.release(ticket):
                 next_one.line.tell(next_one, Event.GRANTED)
             return
         try:
@@ -204,6 +207,8 @@ class Line:
 
     def _instead(self) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
+        if any(ticket.goal.owed for ticket in self.goals.values()):
+            return ": it is there, but still has a goal that was given up, and would run both"
         node, actions = self.traffic.node, dict[str, str]()
         try:
             for topic, _ in node.get_topic_names_and_types():
@@ -221,9 +226,20 @@ class Line:
 
     # The watch over the server
 
-    def owes_us(self) -> bool:
-        """Whether the server may still run a goal that we gave up: it must be canceled first."""
-        return any(ticket.goal.owed for ticket in self.goals.values())
+    def in_the_way_of(self, ticket: Ticket) -> bool:
+        """Whether a goal that was given up here may still run where `ticket` wants to.
+
+        One that was lost holds nothing any more; should its server be back, it is canceled first.
+        """
+        shares = ticket.goal.busy in (Busy.WAIT, Busy.FAIL)
+        for other in list(self.goals.values()):
+            same = self.shares_server_with(ticket.line)
+            if same or (shares and other.goal.resources & ticket.goal.resources):
+                if other.goal.lost:
+                    self.look(time.monotonic())
+                if other.goal.owed:
+                    return True
+        return False
 
     def in_flight(self) -> int:
         """Count the goal requests that wait for their answer."""
@@ -246,13 +262,16 @@ class Line:
 
     def shares_server_with(self, other: Line) -> bool:
         """Whether both, which belong to two nodes, mean the same action."""
-        same_domain = self.traffic.resources is other.traffic.resources
+        same_domain = self.traffic.domain is other.traffic.domain
         return same_domain and self.name == other.name and self.action_type is other.action_type
 
-    def forget_lost(self) -> None:
-        """Give up on goals whose server is gone: nobody is left whom its return would concern."""
+    def put_away(self) -> None:
+        """Leave lost goals to the next line of this action; give up on those without an answer."""
         for ticket in list(self.goals.values()):
-            if ticket.goal.outcome is not None and not ticket.goal.holding:
+            if ticket.goal.lost:
+                self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
+                self.close_book(ticket.goal)
+            elif ticket.goal.outcome is not None and not ticket.goal.holding:
                 self.tell(ticket, Event.CLOSED)
 
     def _bound_the_lost(self) -> None:
@@ -275,7 +294,7 @@ class Line:
         try:
             ready = self.client.server_is_ready()
             gids = self._shown()
-            valid = self.traffic.node.context.ok()
+            valid = is_valid(self.traffic.node)
         except Exception:  # noqa: BLE001 - InvalidHandle: our own node was destroyed
             valid = False
         if not valid:
@@ -310,12 +329,20 @@ class Line:
             self.client.pump()  # its last words
             how = "was restarted" if watch.gids else "went away"
             self.tell(ticket, Event.SERVER_LOST, f"{self.name} {how} under the goal")
-        elif watch.changed(ticket.sent_to) and watch.alone and now - ticket.asked_at > 0.5:
+        elif not watch.changed(ticket.sent_to):
+            ticket.denied_at = None
+        elif not goal.accepted or watch.state(now) is Server.AMBIGUOUS:
+            pass
+        elif ticket.denied_at is not None and watch.alone_since(now, ticket.denied_at):
+            self.tell(ticket, Event.SERVER_LOST, f"{self.name} was restarted under the goal")
+            self.tell(ticket, Event.SERVER_RESTARTED)
+        elif now - ticket.asked_at > ASK_EVERY:
             ticket.asked_at = now
             self.tell(ticket, Event.SERVER_CHANGED)
 
     def _probe(self) -> None:
         probe = next(_probes)
+        self.watch.probe_sent(time.monotonic(), probe)
         self._last_probes.append(probe)
         if len(self._last_probes) > PROBES_KEPT:
             self.client.forget(self._last_probes.popleft())
@@ -355,3 +382,15 @@ class Line:
                 wait = min(wait, due)
         self._bound_the_lost()
         return max(wait, 0.001)
+
+
+def is_valid(node: Any) -> bool:
+    """Whether the node's context was not shut down.
+
+    Context.ok() would take the context's lock, which rclpy holds while it calls back on shutdown.
+    """
+    handle = node.context.handle
+    if handle is None:
+        return False
+    with handle:  # raises InvalidHandle when it was destroyed
+        return bool(handle.ok())

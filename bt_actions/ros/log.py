@@ -28,7 +28,7 @@ THREAD = "bt_actions-log"
 
 
 class Log:
-    """Takes lines from any thread and never waits."""
+    """Takes lines from any thread; never waits and never raises."""
 
     def __init__(self, name: str) -> None:
         self._logger = rclpy.logging.get_logger(name)
@@ -67,7 +67,11 @@ class Log:
             self._lines.put((level, text[:LONGEST]))
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._write, name=THREAD, daemon=True)
-                self._thread.start()
+                try:
+                    self._thread.start()
+                except RuntimeError:  # there are too many, or the process ends (Python 3.12.1)
+                    self._thread = None
+                    self._write_here()
 
     def _write(self) -> None:
         while True:
@@ -79,21 +83,31 @@ class Log:
                         self._thread = None
                         return
                 continue
-            self._await_room()
-            if level == "info":
-                self._logger.info(text)
-            elif level == "warning":
-                self._logger.warning(text)
-            else:
-                self._logger.error(text)
-            self._lines.task_done()
+            self._room(None)
+            self._say(level, text)
 
-    def _await_room(self) -> None:
+    def _write_here(self) -> None:
+        with contextlib.suppress(queue.Empty):
+            while self._room(0):
+                self._say(*self._lines.get_nowait())
+
+    def _say(self, level: str, text: str) -> None:
+        if level == "info":
+            self._logger.info(text)
+        elif level == "warning":
+            self._logger.warning(text)
+        else:
+            self._logger.error(text)
+        self._lines.task_done()
+
+    def _room(self, patience: int | None) -> bool:
         """Wait until standard error takes a line: rclpy writes with the interpreter's lock held."""
         poll = select.poll()
         poll.register(STDERR, select.POLLOUT)
-        with contextlib.suppress(OSError):
-            poll.poll()
+        try:
+            return bool(poll.poll(patience))
+        except OSError:
+            return True
 
 
 log = Log("bt_actions")

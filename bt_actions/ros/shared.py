@@ -27,13 +27,35 @@ FEEDBACK_KEPT = 100
 lock = threading.RLock()
 changed = threading.Condition(lock)
 """Notified at every change of any goal."""
-_resources: dict[int, Resources[Ticket]] = {}
+LOST_KEPT = 100
+"""Goals of one action remembered in case their server, or their request, turns up: the newest."""
 
 
-def resources_of(domain: int) -> Resources[Ticket]:
-    """Return the table of resources, held per process and ROS domain."""
+class Domain:
+    """What all nodes of this process in one ROS domain share."""
+
+    def __init__(self) -> None:
+        self.resources: Resources[Ticket] = Resources()
+        self._lost: dict[tuple[str, Any], list[Ticket]] = {}
+
+    def keep_lost(self, action: str, action_type: Any, ticket: Ticket) -> None:
+        """Remember a lost goal whose line goes: its server may be back for the next one."""
+        kept = self._lost.setdefault((action, action_type), [])
+        kept.append(ticket)
+        del kept[:-LOST_KEPT]
+
+    def take_lost(self, action: str, action_type: Any) -> list[Ticket]:
+        """Give them to a new line."""
+        return self._lost.pop((action, action_type), [])
+
+
+_domains: dict[int, Domain] = {}
+
+
+def domain_of(number: int) -> Domain:
+    """Return what is shared in the ROS domain of this number."""
     with lock:
-        return _resources.setdefault(domain, Resources())
+        return _domains.setdefault(number, Domain())
 
 
 @dataclass(eq=False, slots=True)
@@ -55,6 +77,8 @@ class Ticket:
     was_gone: bool = False
     """When last looked at, none of the servers it was sent to was there."""
     asked_at: float = float("-inf")
+    denied_at: float | None = None
+    """When a server first did not know it, while another than the one it was sent to is shown."""
     paused_at: float | None = None
 
     @property

@@ -29,9 +29,9 @@ from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
 from bt_actions.ros import alarm
 from bt_actions.ros.clocks import Clocks
-from bt_actions.ros.line import Line
+from bt_actions.ros.line import Line, is_valid
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import Change, Observer, Ticket, changed, lock, resources_of
+from bt_actions.ros.shared import Change, Observer, Ticket, changed, domain_of, lock
 from bt_actions.server import Server
 
 JUST_PAST = 0.1
@@ -49,7 +49,7 @@ class Traffic:
     def __init__(self, node: Node) -> None:
         self.node = node
         self.clocks = Clocks(node)
-        self.resources = resources_of(node.context.get_domain_id())
+        self.domain = domain_of(node.context.get_domain_id())
         self._lines: dict[str, Line] = {}
         self._observers: list[Observer] = []
         self.unaccounted: list[Ticket] = []
@@ -89,7 +89,7 @@ class Traffic:
         with lock:
             line.users -= 1
             if line.users <= 0:
-                line.forget_lost()
+                line.put_away()
             self.drop_if_unused(line)
 
     def drop_if_unused(self, line: Line) -> None:
@@ -129,7 +129,7 @@ class Traffic:
             ticket = Ticket(goal, line, self, owner, _who_begins(), attempt, keeps_feedback)
             line.goals[goal.id] = ticket
             alarm.mind(line)
-            answer = self.resources.request(ticket, goal.resources, busy)
+            answer = self.domain.resources.request(ticket, goal.resources, busy)
             if answer is Answer.GRANTED:
                 line.tell(ticket, Event.GRANTED)
             elif answer is Answer.TAKEN:
@@ -170,10 +170,17 @@ class Traffic:
             ticket.goal.state is State.WAITING_FOR_SERVER
             and not _closing
             and not line.orphaned
-            and self.node.context.ok()
+            and is_valid(self.node)
             and line.watch.state(time.monotonic()) is Server.READY
-            and not line.owes_us()
+            and not self._in_the_way_of(ticket)
             and line.in_flight() < IN_FLIGHT
+        )
+
+    def _in_the_way_of(self, ticket: Ticket) -> bool:
+        """Whether a goal that any node of this process gave up must be canceled first."""
+        others = (line for line in alarm.minded() if isinstance(line, Line))
+        return any(
+            line.in_the_way_of(ticket) for line in others if line.traffic.domain is self.domain
         )
 
     def interrupt(self, ticket: Ticket) -> None:
@@ -238,6 +245,7 @@ class Traffic:
         with lock:
             lines, self._lines = list(self._lines.values()), {}
             for line in lines:
+                line.put_away()
                 for ticket in list(line.goals.values()):
                     line.tell(ticket, Event.CLOSED)
                 line.client.destroy()

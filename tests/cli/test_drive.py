@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import signal
@@ -82,20 +83,28 @@ def test_a_signal_interrupts_and_the_drained_run_has_its_code(
 ) -> None:
     run = Run(FakeRunner(waits=True))
     run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
-    kill_when(run.runner.playing, number)
-    ended = run.go()
+    with killed_when(run.runner.playing, number):
+        ended = run.go()
     assert (ended.code, ended.abandoned) == (code, False)
     assert run.runner.interrupted.is_set()
     assert f"interrupted by {number.name}: canceling 1 goal; Ctrl-C again" in run.out.getvalue()
     assert f"STOPPED after 1.50 s, interrupted by {number.name}" in run.out.getvalue()
 
 
-def kill_when(event: threading.Event, number: signal.Signals) -> None:
+@contextlib.contextmanager
+def killed_when(event: threading.Event, number: signal.Signals) -> Iterator[None]:
+    """Send a signal to this process at an event; one that is late does not hit the next test."""
+
     def kill() -> None:
         event.wait()
         os.kill(os.getpid(), number)
 
-    threading.Thread(target=kill, daemon=True).start()
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with Signals():
+        yield
+        event.set()
+        killer.join()
 
 
 def test_the_handlers_of_before_are_back_after_a_run(story: Story) -> None:
@@ -165,9 +174,11 @@ def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
 def test_one_wish_that_arrives_twice_is_one_wish(story: Story) -> None:
     run = Run(FakeRunner(waits=True))
     run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
-    kill_when(run.runner.playing, signal.SIGINT)
-    kill_when(run.runner.interrupted, signal.SIGINT)  # as a wrapper passes it on
-    assert not run.go().abandoned
+    with (
+        killed_when(run.runner.playing, signal.SIGINT),
+        killed_when(run.runner.interrupted, signal.SIGINT),  # as a wrapper passes it on
+    ):
+        assert not run.go().abandoned
 
 
 def test_an_exception_in_the_tree_is_a_failure_and_is_handed_back(story: Story) -> None:

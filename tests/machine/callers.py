@@ -31,6 +31,7 @@ class Ticket:
     sent_to: frozenset[bytes] = frozenset()
     was_gone: bool = False
     asked_at: float = float("-inf")
+    denied_at: float | None = None
     ledger: Ledger = field(init=False)
 
     def __repr__(self) -> str:
@@ -315,9 +316,8 @@ class Caller:
         if not watch.changed(ticket.sent_to):
             if watch.state(self.world.now.steady) is Server.READY:
                 self.tell(ticket, Event.RESULT_UNKNOWN)
-        elif watch.alone and ticket.goal.accepted:
-            self.tell(ticket, Event.SERVER_LOST, "restarted under the goal")
-            self.tell(ticket, Event.SERVER_RESTARTED)
+        elif ticket.denied_at is None:
+            ticket.denied_at = self.world.now.steady
 
     # What goes on by itself
 
@@ -329,6 +329,7 @@ class Caller:
         if watch.wants_probe(now):
             number = len(self._requests) + 1
             self._requests[number] = None
+            watch.probe_sent(now, number)
             self.world.send("probe", line.action, b"", "", number)
         for ticket in list(line.tickets.values()):
             if ticket.goal.sent:
@@ -344,7 +345,14 @@ class Caller:
                 self.tell(ticket, Event.SERVER_RETURNED)
         elif gone:
             self.tell(ticket, Event.SERVER_LOST, "went away under the goal")
-        elif watch.changed(ticket.sent_to) and watch.alone and now - ticket.asked_at > 0.5:
+        elif not watch.changed(ticket.sent_to):
+            ticket.denied_at = None
+        elif not ticket.goal.accepted or watch.state(now) is Server.AMBIGUOUS:
+            pass
+        elif ticket.denied_at is not None and watch.alone_since(now, ticket.denied_at):
+            self.tell(ticket, Event.SERVER_LOST, "restarted under the goal")
+            self.tell(ticket, Event.SERVER_RESTARTED)
+        elif now - ticket.asked_at > 0.5:
             ticket.asked_at = now
             self.tell(ticket, Event.SERVER_CHANGED)
 

@@ -29,6 +29,7 @@ END_BY_THEMSELVES = [
     "shut_down_in_a_timer",
     "shut_down_in_a_timer_of_a_multithreaded_executor",
     "tick_tock",
+    "shut_down_by_the_context",
     "never_shut_down",
     "just_end",
     "end_with_a_spinning_daemon_thread",
@@ -38,7 +39,7 @@ END_BY_THEMSELVES = [
     "crash_beside_a_runner",
     "end_beside_a_runner",
 ]
-TELL = END_BY_THEMSELVES[:5]
+TELL = END_BY_THEMSELVES[:6]
 CODES = {
     "crash": {1},
     "crash_in_a_timer": {1},

@@ -151,6 +151,15 @@ def tick_in_a_timer_until_done(user: User) -> None:
     rclpy.shutdown()
 
 
+def shut_down_by_the_context(user: User) -> None:
+    """It calls back with its own lock held."""
+    user.node.context.on_shutdown(user.tree.shutdown)
+    user.work()
+    rclpy.shutdown()
+    user.tell()
+    user.node.destroy_node()
+
+
 def never_shut_down(user: User) -> None:
     user.work()
     user.node.destroy_node()
