@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 CHECK = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "check.py"))
-WITHIN = {"parse": 1.0, "check": 2.9, "load": 5.7, "check_large": 57.0, "times_larger": 10.0}
+WITHIN = {"parse": 1.0, "check": 2.9, "load": 5.3, "check_large": 57.0, "times_larger": 10.0}
 
 
 def kept(**took: float) -> list[bool]:
