@@ -90,11 +90,12 @@ class Expression:
             )
         return value
 
-    def span(self, node: ast.AST) -> tuple[int, int]:
+    def span(self, node: ast.expr) -> tuple[int, int]:
         """The columns of a node of `tree` in `text`."""
         origin = self._source.origin
-        start = origin[min(getattr(node, "col_offset", 0), len(origin) - 1)]
-        last = origin[min(max(getattr(node, "end_col_offset", 1) - 1, 0), len(origin) - 1)]
+        end = len(origin) - 1
+        start = origin[min(node.col_offset, end)]
+        last = origin[min(max((node.end_col_offset or 1) - 1, 0), end)]
         return start, max(last + 1, start + 1)
 
     def variable_of(self, node: ast.AST) -> str | None:

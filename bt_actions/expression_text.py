@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 _SIMPLE = re.compile(r"(?:[A-Za-z0-9_ .,+\-*/%<>=()\[\]]|\$(?=[A-Za-z]))*")
 """Texts of which each character keeps its place: nearly all."""
@@ -38,8 +38,7 @@ class ExpressionError(ValueError):
         self.end_column = max(column + 1, end_column or 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(NamedTuple):
     """The text as Python can read it, and where each of its characters came from."""
 
     text: str

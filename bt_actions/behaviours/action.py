@@ -20,7 +20,7 @@ from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.behaviours.conditions import condition_of, expression_of
 from bt_actions.behaviours.node import node_in
 from bt_actions.behaviours.variables import key, read, resolve, variables_in, write
-from bt_actions.expression import ExpressionError
+from bt_actions.expression import Expression, ExpressionError
 from bt_actions.goal_terms import Event
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.ticking import root_of
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 RESULT_SHOWN = 300
 """Characters of a result in a reason."""
+CHANCE = random.Random()
+"""Varies the pauses before retries; one for all leaves, as a seed costs more than a leaf."""
 DEADLINES = {
     Event.QUEUE_DUE: "queue",
     Event.SERVER_DUE: "server",
@@ -89,7 +91,7 @@ class ActionBehaviour(Behaviour):
         timeout: Timeouts | float | None = None,
         retry: Retry | int = 1,
         expect: Callable[[Any], bool] | str | None = None,
-        save: Mapping[str, str] | None = None,
+        save: Mapping[str, str | Expression] | None = None,
         busy: Busy | str = "wait",
         resources: Iterable[str] | None = None,
         on_feedback: Callable[[Any], None] | None = None,
@@ -106,20 +108,19 @@ class ActionBehaviour(Behaviour):
         self.resources = frozenset(resources or ())
         self.on_feedback = on_feedback
         self.expect = expect
-        self.save = dict(save or {})
         self._expect = condition_of(expect, "expect")
         self._expect_text = expect if isinstance(expect, str) else getattr(expect, "text", "")
         self._when = condition_of(self.retry.when, "retry.when")
         self._save = {
             target: expression_of(place, "save") for target, place in (save or {}).items()
         }
+        self.save = {target: place.text for target, place in self._save.items()}
         self._to_save: dict[str, Any] = {}
-        self._chance = random.Random()
         self._traffic: Traffic | None = None
         self._line: Any = None
         self._ticket: Ticket | None = None
         self._left_behind: list[Ticket] = []
-        self._attempts = Attempts(self.retry, self._when, self._chance)
+        self._attempts = Attempts(self.retry, self._when, CHANCE)
         self._tree_closed = False
         self._started = 0.0
         self._outcome: Outcome | None = None
@@ -223,7 +224,7 @@ class ActionBehaviour(Behaviour):
     def initialise(self) -> None:
         """Begin a visit. What an earlier one left behind is drained beside it."""
         self._require_setup()
-        self._attempts = Attempts(self.retry, self._when, self._chance)
+        self._attempts = Attempts(self.retry, self._when, CHANCE)
         self._outcome = None
         self._left_behind, self._ticket = self.open_tickets(), None
         self._begin()

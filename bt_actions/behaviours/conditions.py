@@ -27,8 +27,10 @@ def condition_of(
     return lambda result: expression.holds({"result": result}, read)
 
 
-def expression_of(text: str, what: str) -> Expression:
+def expression_of(text: str | Expression, what: str) -> Expression:
     """Return the text as an expression; raises ValueError, naming `what` it was given for."""
+    if isinstance(text, Expression):
+        return text
     try:
         return Expression(text)
     except ExpressionError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -28,14 +29,10 @@ __all__ = ["LEAVES", "build_action"]
 def build_action(node: TreeNode, context: Context) -> Behaviour:
     """The behaviour of an action, by its name in the document or in place."""
     settings = settings_of(node, context.document)
-    retry = dict(table_of(settings.get("retry")))
-    retry["when"] = context.condition(retry.get("when"), "result")
-    if "outcomes" in retry:
-        retry["outcomes"] = frozenset(retry["outcomes"])
     goal = settings.get("goal", {})
     dynamic = any(True for _ in computed_in(goal))
     save = {
-        context.scope.key(name): place.expression.text
+        context.scope.key(name): place.expression
         for name, place in table_of(settings.get("save")).items()
     }
     resources: Any = settings.get("resources")
@@ -44,13 +41,34 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         _interface(settings["type"], "action", context),
         context.name(settings, "server"),
         context.value(goal) if dynamic else goal,
-        timeout=Timeouts(**table_of(settings.get("timeout"))),
-        retry=Retry(**retry),
+        timeout=_timeouts(tuple(table_of(settings.get("timeout")).items())),
+        retry=_retry(settings, context),
         expect=context.condition(settings.get("expect"), "result"),
         save=save,
         busy=text_of(settings, "busy") or "wait",
         resources=resources,
     )
+
+
+@lru_cache(maxsize=1024)
+def _timeouts(fields: tuple[tuple[str, float | None], ...]) -> Timeouts:
+    """Most nodes of a tree have the timeouts of its action: they share one object."""
+    return Timeouts(**dict(fields))
+
+
+def _retry(settings: Mapping[str, object], context: Context) -> Retry:
+    given = table_of(settings.get("retry"))
+    fields = {key: value for key, value in given.items() if key not in ("outcomes", "when")}
+    if "outcomes" in given:
+        fields["outcomes"] = frozenset(given["outcomes"])
+    if "when" in given:  # reads the variables of one tree, so that no other can share it
+        return Retry(**fields, when=context.condition(given["when"], "result"))
+    return _plain_retry(tuple(fields.items()))
+
+
+@lru_cache(maxsize=1024)
+def _plain_retry(fields: tuple[tuple[str, Any], ...]) -> Retry:
+    return Retry(**dict(fields))
 
 
 def _interface(name: object, kind: str, context: Context) -> Any:
@@ -88,8 +106,6 @@ def _saver(node: TreeNode, context: Context, root: str) -> Callable[[Any], None]
 def _service(node: TreeNode, context: Context) -> Behaviour:
     values = node.values
     timeout = table_of(values.get("timeout"))
-    retry = dict(table_of(values.get("retry")))
-    retry["when"] = context.condition(retry.get("when"), "result")
     return CallService(
         node.name,
         _interface(values["type"], "srv", context),
@@ -97,7 +113,7 @@ def _service(node: TreeNode, context: Context) -> Behaviour:
         context.value(values.get("request", {})),
         server=timeout.get("server", 5.0),
         response=timeout.get("response", 5.0),
-        retry=Retry(**retry),
+        retry=_retry(values, context),
         expect=context.condition(values.get("expect"), "result"),
         save=_saver(node, context, "result"),
     )

@@ -30,9 +30,13 @@ def join_names(*parts: str) -> str:
 
 def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
     """A node's settings over its alias's over the document's defaults, key by key."""
-    declared = document.actions.get(node.alias) if node.alias is not None else None
-    shared = declared.values if declared is not None else {}
-    return merged(merged(document.defaults, shared), node.values)
+    alias = node.alias
+    shared = document.settings.get(alias)
+    if shared is None:
+        declared = document.actions.get(alias) if alias is not None else None
+        own = declared.values if declared is not None else {}
+        shared = document.settings[alias] = merged(document.defaults, own)
+    return merged(shared, node.values)
 
 
 def resources_below(root: TreeNode, document: Document, namespace: str = "") -> dict[str, TreeNode]:

@@ -96,6 +96,8 @@ class Document:
     actions: dict[str, Declared] = field(default_factory=dict)
     topics: dict[str, Declared] = field(default_factory=dict)
     defaults: dict[str, object] = field(default_factory=dict)
+    settings: dict[str | None, dict[str, object]] = field(default_factory=dict)
+    """What each alias (None: no alias) has where a node says nothing; made when first asked for."""
     root: TreeNode | None = None
     imported: list[Document] = field(default_factory=list)
 
