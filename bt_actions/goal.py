@@ -84,7 +84,8 @@ class Goal:
         self.lost = False
         """The server went away under the goal; should it come back, the goal is canceled first."""
         self.waited_for = False
-        """The end of its tree was held up for it, in vain; nobody waits for it again."""
+        """The end of its tree was held up for it, in vain; nobody waits for it again, unless its
+        server comes back."""
         self.dropped = 0
         """Events that came too late, or twice, to mean anything."""
         self._holding = True  # the resources, or a place in the queue for them
@@ -144,6 +145,11 @@ class Goal:
         """Whether a server that has it must be rid of it before it gets another goal."""
         unknown = self._sent and self.end is End.UNKNOWN and not self._holding
         return unknown and (self._accepted or not self.waited_for)
+
+    def bars(self, other: Goal, *, same_server: bool) -> bool:
+        """Whether this goal, given up as it is, must be accounted for before `other` is sent."""
+        shares = other.busy in (Busy.WAIT, Busy.FAIL) and bool(self.resources & other.resources)
+        return self.owed and (same_server or shares)
 
     @property
     def drains_within(self) -> float:
@@ -504,6 +510,7 @@ class Goal:
             self._ask(now)
             return State.CANCELING
         self.end = End.UNKNOWN
+        self.waited_for = False  # there is somebody again who can tell
         if not self._accepted:
             self._suspect, self._judged = True, False
             self._deadlines.arm(Event.ACCEPT_DUE, self._patience, now)

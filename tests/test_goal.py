@@ -766,6 +766,29 @@ def test_a_suspect_that_was_waited_for_in_vain_is_unknown_and_still_canceled_if_
     assert Command.CANCEL in life.on(Event.ACCEPTED)
 
 
+def test_what_was_waited_for_in_vain_bars_others_again_when_its_lost_server_is_back() -> None:
+    life = suspect()
+    life.on(Event.DRAINED)
+    life.on(Event.SERVER_LOST, "gone")
+    assert not life.goal.owed
+    assert life.on(Event.SERVER_RETURNED) == [CANCEL]
+    assert life.goal.owed, "the server may have it after all, and can be asked now"
+
+
+def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -> None:
+    life = executing()
+    base = Goal(b"2", "lift", LIMITS, life.now, resources=frozenset({"base"}))
+    beside = Goal(b"3", "lift", LIMITS, life.now, resources=frozenset({"base"}), busy=Busy.SHARE)
+    own = frozenset({"base", "arm"})
+    life.goal.resources = own
+    life.on(Event.SERVER_LOST, "gone")
+    assert not life.goal.bars(base, same_server=True), "nobody can tell, and it holds nothing"
+    life.on(Event.SERVER_RETURNED)
+    assert life.goal.bars(base, same_server=False)
+    assert not life.goal.bars(beside, same_server=False)
+    assert life.goal.bars(beside, same_server=True)
+
+
 def denied(life: Life) -> None:
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
 

@@ -226,20 +226,19 @@ class Line:
 
     # The watch over the server
 
-    def in_the_way_of(self, ticket: Ticket) -> bool:
-        """Whether a goal that was given up here may still run where `ticket` wants to.
+    def look_for_lost(self, ticket: Ticket) -> None:
+        """See whether goals are back that were lost here, and that `ticket` could run beside."""
+        if any(other.goal.lost for other in self._near(ticket)):
+            self.look(time.monotonic())
 
-        One that was lost holds nothing any more; should its server be back, it is canceled first.
-        """
-        shares = ticket.goal.busy in (Busy.WAIT, Busy.FAIL)
-        for other in list(self.goals.values()):
-            same = self.shares_server_with(ticket.line)
-            if same or (shares and other.goal.resources & ticket.goal.resources):
-                if other.goal.lost:
-                    self.look(time.monotonic())
-                if other.goal.owed:
-                    return True
-        return False
+    def in_the_way_of(self, ticket: Ticket) -> bool:
+        """Whether a goal that was given up here may still run where `ticket` wants to."""
+        same = self.shares_server_with(ticket.line)
+        return any(other.goal.bars(ticket.goal, same_server=same) for other in self._near(ticket))
+
+    def _near(self, ticket: Ticket) -> list[Ticket]:
+        same, wanted = self.shares_server_with(ticket.line), ticket.goal.resources
+        return [t for t in self.goals.values() if same or t.goal.resources & wanted]
 
     def in_flight(self) -> int:
         """Count the goal requests that wait for their answer."""

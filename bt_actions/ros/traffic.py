@@ -177,11 +177,15 @@ class Traffic:
         )
 
     def _in_the_way_of(self, ticket: Ticket) -> bool:
-        """Whether a goal that any node of this process gave up must be canceled first."""
-        others = (line for line in alarm.minded() if isinstance(line, Line))
-        return any(
-            line.in_the_way_of(ticket) for line in others if line.traffic.domain is self.domain
-        )
+        """Whether a goal that any node of this process gave up must be canceled first.
+
+        One that was lost holds nothing any more; should its server be back, it is canceled first.
+        """
+        minded = [line for line in alarm.minded() if isinstance(line, Line)]
+        ours = [line for line in minded if line.traffic.domain is self.domain]
+        for line in ours:
+            line.look_for_lost(ticket)  # all of them first: one may take over another's
+        return any(line.in_the_way_of(ticket) for line in ours)
 
     def interrupt(self, ticket: Ticket) -> None:
         """The tree no longer wants it. Returns at once; the goal is drained."""

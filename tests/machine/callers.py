@@ -46,13 +46,6 @@ class Line:
     watch: ServerWatch = field(default_factory=ServerWatch)
     tickets: dict[bytes, Ticket] = field(default_factory=dict)
 
-    def owes_us(self) -> bool:
-        """Whether the server may still run a goal that we gave up."""
-        return any(
-            ticket.goal.sent and ticket.goal.end is End.UNKNOWN and not ticket.goal.holding
-            for ticket in self.tickets.values()
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class LeafPlan:
@@ -120,6 +113,7 @@ class Caller:
                 ),
                 "look": (lambda: (None,), lambda _: self.attend()),
                 "drained": (self._left_behind, lambda ticket: self.tell(ticket, Event.DRAINED)),
+                "rerun": (lambda: () if self.closed else (None,), lambda _: self.run_again()),
             }
         )
 
@@ -160,7 +154,12 @@ class Caller:
     def _left_behind(self) -> Sequence[Ticket]:
         """Goals that are still waited for, though no leaf has them any more."""
         held = {leaf.ticket for leaf in self.leaves}
-        return [t for t in self.tickets if t not in held and t.goal.outcome is not None]
+        return [t for t in self.tickets if t not in held and self._waits(t.goal)]
+
+    @staticmethod
+    def _waits(goal: Goal) -> bool:
+        """Whether a tree that ends now waits for this goal, which it has given up."""
+        return goal.outcome is not None and (goal.end is End.UNKNOWN or goal.suspect)
 
     def interrupt(self, leaf: Leaf) -> None:
         """What py_trees' terminate(INVALID) does; twice, because it may come twice."""
@@ -168,6 +167,27 @@ class Caller:
             self.tell(leaf.ticket, Event.INTERRUPTED)
             self.judge.interrupted_again(leaf.ticket)
         leaf.ticket = leaf.attempts = None
+
+    def run_again(self) -> None:
+        """The run ends, waits in vain for what is open, and another begins.
+
+        That sees nothing of the servers yet, and knows only the lost ones of the first one's goals.
+        """
+        for leaf in self.leaves:
+            self.interrupt(leaf)
+        for ticket in self.tickets:
+            if self._waits(ticket.goal):
+                self.tell(ticket, Event.DRAINED)
+        for action, before in self.lines.items():
+            line = self.lines[action] = Line(action)
+            for ticket in list(before.tickets.values()):
+                if ticket.goal.lost:
+                    ticket.line, ticket.was_gone = line, True
+                    line.tickets[ticket.goal.id] = ticket
+                else:
+                    self.tell(ticket, Event.CLOSED)
+        for leaf in self.leaves:
+            leaf.line = self.lines[leaf.plan.action]
 
     # What traffic does
 
@@ -206,8 +226,23 @@ class Caller:
             self.tell(ticket, Event.INVALID, "no such variable")
         elif state is Server.AMBIGUOUS:
             self.tell(ticket, Event.SERVER_AMBIGUOUS)
-        elif state is Server.READY and not line.owes_us():
+        elif state is Server.READY and not self._in_the_way_of(ticket):
             self.tell(ticket, Event.SERVER_READY)
+
+    def _in_the_way_of(self, ticket: Ticket) -> bool:
+        """Whether a goal that was given up must be canceled first."""
+        for line in self.lines.values():
+            if any(other.goal.lost for other in line.tickets.values()):
+                self.look(line)
+            same = line is ticket.line
+            if any(t.goal.bars(ticket.goal, same_server=same) for t in line.tickets.values()):
+                return True
+        return False
+
+    def out_of_sight(self, ticket: Ticket) -> bool:
+        """Whether nothing shows any of the servers that a goal was sent to."""
+        action = ticket.line.action
+        return not (ticket.sent_to & self.world.shown(action) and self.world.ready(action))
 
     def tell(self, ticket: Ticket, event: Event, detail: Any = None) -> None:
         """Tell a goal what happened and do what it says."""

@@ -59,11 +59,13 @@ UNUSUAL = {
     "start": 6,
     "cut": 3,
     "lapse": 4,
-    "heal": 4,
+    "outage": 6,
+    "heal": 6,
     "falter": 3,
     "clock": 3,
     "misfortune": 2,
     "drained": 3,
+    "rerun": 2,
 }
 """Kinds of moves and how often they are made. A history has some of the unusual kinds and not the
 others, which finds more than a little of everything would (swarm testing, Groce et al. 2012)."""

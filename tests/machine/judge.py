@@ -70,6 +70,9 @@ class Ledger:
     """Why it may run beside another goal on its resource."""
     crowded: bool = False
     """Its request reached two live servers."""
+    closed: bool = False
+    beside: tuple[Ticket, ...] = ()
+    """Lost goals whose server was out of sight when this one was sent: they may turn up again."""
     jobs: tuple[Job, ...] = ()
 
 
@@ -118,9 +121,8 @@ class Judge:
         if event is Event.REJECTED:
             ledger.refused = True
         if event is Event.CLOSED and before.state is not State.DONE:
-            ledger.excuse = ledger.excuse or "the process ended"
-        if goal.lost:
-            ledger.excuse = ledger.excuse or "its server was lost"
+            ledger.closed = True
+            ledger.excuse = ledger.excuse or "its run, or the process, ended"
         if event is Event.CANCEL_ANSWERED:
             ledger.denied = detail == CANCEL_UNKNOWN_GOAL
         if goal.end is End.NEVER_STARTED is not before.end and event is None:
@@ -312,6 +314,14 @@ class Judge:
 
     def sent(self, ticket: Ticket, reached: int) -> None:
         """A goal request has left for so many live servers."""
+        for other in self.caller.tickets:
+            if other.goal.lost and self.caller.out_of_sight(other):
+                ticket.ledger.beside += (other,)
+            elif other.line is ticket.line and other.goal.outcome and not other.goal.holding:
+                runs = any(job.live and job.server.shown for job in other.ledger.jobs)
+                excused = other.ledger.excuse or other.ledger.crowded
+                rule = f"{other} was given up, and is canceled before {ticket} is sent there"
+                self._hold(not runs or excused, rule)
         if reached > 1:
             ticket.ledger.crowded = True
 
@@ -329,6 +339,7 @@ class Judge:
                     older.goal.busy in (Busy.REPLACE, Busy.SHARE)
                 )
                 excused = any(t.ledger.excuse or t.ledger.crowded for t in (rival, ticket))
+                excused |= rival in ticket.ledger.beside or ticket in rival.ledger.beside
                 self._hold(asked_for or excused, f"{rival} and {ticket} are never live together")
 
     def _ticket(self, job: Job) -> Ticket:
@@ -359,7 +370,7 @@ class Judge:
 
     def _the_end_is_true(self, ticket: Ticket) -> None:
         goal, ledger = ticket.goal, ticket.ledger
-        closed, jobs = self.caller.closed, ledger.jobs
+        closed, jobs = self.caller.closed or ledger.closed, ledger.jobs
         if not closed and not ledger.crowded:
             running = [job for job in jobs if job.live]
             self._hold(not running, f"no goal is left running: {ticket} {goal!r}")

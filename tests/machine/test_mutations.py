@@ -139,6 +139,19 @@ def lets_a_lost_goal_run_on_when_its_server_is_back(patch: Patch) -> None:
 
 
 @mutation
+def sends_beside_a_lost_goal_that_wants_the_same_resource(patch: Patch) -> None:
+    patch.setattr(Goal, "bars", lambda goal, other, *, same_server: goal.owed and same_server)
+
+
+@mutation
+def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
+    def bars(goal: Goal, other: Goal, *, same_server: bool) -> bool:
+        return goal.owed and bool(goal.resources & other.resources)
+
+    patch.setattr(Goal, "bars", bars)
+
+
+@mutation
 def reports_success_though_it_was_interrupted(patch: Patch) -> None:
     decide(patch, State.CANCELING, Event.RESULT, Goal._finished)
 

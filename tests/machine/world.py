@@ -141,6 +141,7 @@ class World:
             "leave": (self._alive, self._leave),
             "start": (self._startable, self.start),
             "cut": (self._connected, lambda server: setattr(server, "cut", True)),
+            "outage": (self._connected, self._outage),
             "lapse": (self._lapsable, lambda server: setattr(server, "shown", False)),
             "falter": (self._alive, self._falter),
             "heal": (lambda: [s for s in self.servers if s.cut and s.alive], self.heal),
@@ -335,6 +336,11 @@ class World:
 
     def _lapsable(self) -> Options:
         return [s for s in self.servers if s.shown and (s.cut or not s.alive)]
+
+    @staticmethod
+    def _outage(server: ModelServer) -> None:
+        """The link is down for longer than the lease, at one blow."""
+        server.cut, server.shown = True, False
 
     @staticmethod
     def _falter(server: ModelServer) -> None:
