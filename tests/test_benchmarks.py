@@ -12,10 +12,16 @@ CHECK = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "check.py"
 WITHIN = {"parse": 1.0, "check": 2.9, "load": 5.3, "check_large": 57.0, "times_larger": 10.0}
 
 
+def rounds(**took: float) -> list[Any]:
+    """Two rounds as told, and one in which everything but the parser was slow."""
+    usual = {**WITHIN, **took}
+    odd = {**usual, "check": 9.0, "load": 30.0, "check_large": 300.0}
+    return [CHECK["Round"](**each) for each in (usual, odd, usual)]
+
+
 def kept(**took: float) -> list[bool]:
     """Which of the promises about parser, build and growth are kept."""
-    seconds: Any = CHECK["Seconds"](**{**WITHIN, **took})
-    return [ratio.holds for ratio in CHECK["ratios"](seconds)]
+    return [promise.holds(rounds(**took)) for promise in CHECK["PROMISES"]]
 
 
 def test_what_is_within_its_limits_holds() -> None:
@@ -26,7 +32,7 @@ def test_what_is_within_its_limits_holds() -> None:
     ("took", "holds"),
     [
         ({"parse": 0.9}, [False, True, True]),
-        ({"load": 6.0}, [True, False, True]),
+        ({"load": 5.9}, [True, False, True]),
         ({"check_large": 60.0}, [True, True, False]),
     ],
 )
@@ -38,7 +44,7 @@ def test_what_is_beyond_a_limit_does_not(took: dict[str, float], holds: list[boo
 def test_the_gate_fails_with_exit_code_1(
     parse: float, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    took = CHECK["Seconds"](**{**WITHIN, "parse": parse})
+    took = rounds(parse=parse)
     monkeypatch.setitem(CHECK["main"].__globals__, "measure", lambda *_: took)
     monkeypatch.setattr("sys.argv", ["check.py"])
     assert CHECK["main"]() == code
@@ -46,10 +52,12 @@ def test_the_gate_fails_with_exit_code_1(
 
 
 def test_every_job_is_measured() -> None:
-    took = CHECK["measure"](200, 400, 2)
-    for seconds in (took.parse, took.check, took.load, took.check_large):
-        assert 0.0 < seconds < float("inf")
-    assert took.times_larger == 2.0
+    measured = CHECK["measure"](200, 400, 2)
+    assert len(measured) == 2
+    for took in measured:
+        for seconds in (took.parse, took.check, took.load, took.check_large):
+            assert 0.0 < seconds < float("inf")
+        assert took.times_larger == 2.0
 
 
 def test_the_tree_that_is_measured_has_so_many_nodes() -> None:
