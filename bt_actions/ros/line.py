@@ -14,12 +14,15 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from rclpy.exceptions import InvalidHandle
+
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import ENDS, STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.log import log
+from bt_actions.ros.lookout import Sight, look_for, publishers
 from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
 from bt_actions.server import Server, ServerWatch
 from bt_actions.suggest import did_you_mean
@@ -30,9 +33,9 @@ if TYPE_CHECKING:
 LOOK_WHILE_WAITING = 0.05
 LOOK_WHILE_RUNNING = 0.2
 LOOK_WHILE_LOST = 1.0
-LOOK_WHILE_ORPHANED = 0.01
+PUMP_EVERY = 0.01
 """Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
-its return would matter; nobody spins our node any more, so that the alarm must take the answers."""
+its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
 PROBES_KEPT = 20
@@ -53,7 +56,8 @@ class Line:
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
         self.orphaned = False
-        self._status_topic = f"{name}/_action/status"
+        self.status_topic = f"{name}/_action/status"
+        self._sight: Sight | None = None  # where the client lives if our node was blind to it
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
         self._warned_crowd = False
@@ -226,6 +230,40 @@ class Line:
 
     # The watch over the server
 
+    def misses(self) -> bool:
+        """Whether a server is wanted that may be there, though nothing shows all of it.
+
+        Not while answers may be under way: in a second, what runs on an absent server is lost.
+        """
+        if self.orphaned or not self.goals or not self.traffic.domain.lost_sight:
+            return False
+        absent = self.watch.state(time.monotonic()) is Server.ABSENT
+        running = (State.SENDING, State.EXECUTING)
+        return absent and all(ticket.goal.state not in running for ticket in self.goals.values())
+
+    def is_waited_for(self) -> bool:
+        """Whether a goal is still to be sent."""
+        return any(not ticket.goal.sent for ticket in self.goals.values())
+
+    def move_to(self, sight: Sight) -> None:
+        """Go on with a client in a participant that sees the server; the alarm takes its answers.
+
+        Nothing that matters is under way in the old one: see `misses`.
+        """
+        client = ActionClient(sight.node, self.action_type, self.name, self)
+        self.close()
+        self.client, self._sight, self.watch = client, sight, ServerWatch()
+        sight.users.add(self)
+        log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
+        alarm.wake_by(time.monotonic())
+
+    def close(self) -> None:
+        """Let go of the client; answers that are still under way are lost."""
+        self.client.destroy()
+        if self._sight is not None:
+            self._sight.left_by(self)
+            self._sight = None
+
     def look_for_lost(self, ticket: Ticket) -> None:
         """See whether goals are back that were lost here, and that `ticket` could run beside."""
         if any(other.goal.lost for other in self._near(ticket)):
@@ -285,8 +323,9 @@ class Line:
 
     def _shown(self) -> frozenset[bytes]:
         """Return the GIDs of the servers in sight; raises where our node is gone."""
-        infos = self.traffic.node.get_publishers_info_by_topic(self._status_topic)
-        return frozenset(bytes(info.endpoint_gid) for info in infos)
+        if self._sight is not None:
+            return self._sight.shows(self.status_topic)
+        return publishers(self.traffic.node, self.status_topic)
 
     def look(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
@@ -310,6 +349,9 @@ class Line:
         state = self.watch.state(now)
         if state is not before:
             self.traffic.notify(None)
+            self.traffic.domain.lost_sight |= state is Server.ABSENT
+        if self.misses():
+            look_for(self, self.traffic.domain.number)
         if state is Server.AMBIGUOUS and not self._warned_crowd:
             self._warned_crowd = True
             log.warning(f"{self.name}: two action servers answer to this name; none is sent to")
@@ -360,20 +402,19 @@ class Line:
 
     def attend(self, now: float) -> float:
         """Do what is due at this line, on the alarm; return the seconds until it wants to again."""
-        waiting = any(not ticket.goal.sent for ticket in self.goals.values())
         if now >= self._look_at:
             self.look(now)
             settling = self.watch.state(now) is Server.SETTLING
-            if waiting or settling:
+            if settling or self.is_waited_for():
                 self._look_at = now + LOOK_WHILE_WAITING
             elif any(not ticket.accounted_for for ticket in self.goals.values()):
                 self._look_at = now + LOOK_WHILE_RUNNING
             else:
                 self._look_at = now + LOOK_WHILE_LOST
-        if self.orphaned:
-            self.client.pump()
-            self._look_at = now + LOOK_WHILE_ORPHANED
         wait = self._look_at - now
+        if self.orphaned or self._sight is not None:
+            self.client.pump()
+            wait = min(wait, PUMP_EVERY)
         for ticket in list(self.goals.values()):
             self.poll(ticket)
             due = ticket.goal.due_in(self.traffic.clocks.now())
@@ -384,12 +425,15 @@ class Line:
 
 
 def is_valid(node: Any) -> bool:
-    """Whether the node's context was not shut down.
+    """Whether the node is there, and its context was not shut down.
 
     Context.ok() would take the context's lock, which rclpy holds while it calls back on shutdown.
     """
     handle = node.context.handle
     if handle is None:
         return False
-    with handle:  # raises InvalidHandle when it was destroyed
-        return bool(handle.ok())
+    try:
+        with node.handle, handle:
+            return bool(handle.ok())
+    except InvalidHandle:  # one of them was destroyed
+        return False

@@ -34,8 +34,11 @@ LOST_KEPT = 100
 class Domain:
     """What all nodes of this process in one ROS domain share."""
 
-    def __init__(self) -> None:
+    def __init__(self, number: int) -> None:
         self.resources: Resources[Ticket] = Resources()
+        self.number = number
+        self.lost_sight = False
+        """A server that was in sight is not any more: what else its process serves may not be."""
         self._lost: dict[tuple[str, Any], list[Ticket]] = {}
 
     def keep_lost(self, action: str, action_type: Any, ticket: Ticket) -> None:
@@ -55,7 +58,10 @@ _domains: dict[int, Domain] = {}
 def domain_of(number: int) -> Domain:
     """Return what is shared in the ROS domain of this number."""
     with lock:
-        return _domains.setdefault(number, Domain())
+        domain = _domains.get(number)
+        if domain is None:
+            domain = _domains[number] = Domain(number)
+        return domain
 
 
 @dataclass(eq=False, slots=True)

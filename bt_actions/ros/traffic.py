@@ -96,7 +96,7 @@ class Traffic:
         """Destroy the client of a line that has no user and no open goal."""
         if line.users <= 0 and not line.goals and self._lines.get(line.name) is line:
             del self._lines[line.name]
-            line.client.destroy()
+            line.close()
 
     # A leaf's calls
 
@@ -252,7 +252,7 @@ class Traffic:
                 line.put_away()
                 for ticket in list(line.goals.values()):
                     line.tell(ticket, Event.CLOSED)
-                line.client.destroy()
+                line.close()
                 alarm.forget(line)
             setattr(self.node, _ON_NODE, None)
 
