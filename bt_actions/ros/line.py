@@ -38,6 +38,8 @@ PUMP_EVERY = 0.01
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
+FOUND_WITHIN = 3.0
+"""Seconds for a server to be ready in a participant that it was just moved to."""
 PROBES_KEPT = 20
 FEEDBACK = "/_action/feedback"
 
@@ -58,6 +60,7 @@ class Line:
         self.orphaned = False
         self.status_topic = f"{name}/_action/status"
         self._sight: Sight | None = None  # where the client lives if our node was blind to it
+        self._moved_at = float("-inf")
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
         self._warned_crowd = False
@@ -235,9 +238,11 @@ class Line:
 
         Not while answers may be under way: in a second, what runs on an absent server is lost.
         """
-        if self.orphaned or not self.goals or not self.traffic.domain.lost_sight:
+        now = time.monotonic()
+        just_moved = now - self._moved_at < FOUND_WITHIN
+        if self.orphaned or just_moved or not self.goals or not self.traffic.domain.lost_sight:
             return False
-        absent = self.watch.state(time.monotonic()) is Server.ABSENT
+        absent = self.watch.state(now) is Server.ABSENT
         running = (State.SENDING, State.EXECUTING)
         return absent and all(ticket.goal.state not in running for ticket in self.goals.values())
 
@@ -253,6 +258,7 @@ class Line:
         client = ActionClient(sight.node, self.action_type, self.name, self)
         self.close()
         self.client, self._sight, self.watch = client, sight, ServerWatch()
+        self._moved_at = time.monotonic()
         sight.users.add(self)
         log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
         alarm.wake_by(time.monotonic())

@@ -129,8 +129,12 @@ class Lookout:
             return
         self._missing.add(line)
         self._bell.notify_all()
-        if self._thread is None:
+        if self._thread is None or not self._thread.is_alive():
             self._thread = _start(self._run)
+
+    def wake(self) -> None:
+        """See whether there is still something to look for; the caller holds the lock."""
+        self._bell.notify_all()
 
     def _run(self) -> None:
         pause = FIRST_AFTER
@@ -140,7 +144,11 @@ class Lookout:
                 if not self._still_missing():
                     self._thread = None
                     return
-            found = self._look()
+            try:
+                found = self._look()
+            except Exception as error:  # noqa: BLE001 - its last user has left meanwhile, or rclpy's
+                log.error(f"a second look for lost servers: {error!r}")
+                found = False
             pause = PAUSE if found or pause < PAUSE else min(2 * pause, LONGEST_PAUSE)
 
     def _wait(self, pause: float) -> None:
@@ -212,6 +220,9 @@ def _close_at_exit() -> None:
     """Let no thread of ours be within Fast DDS, and no participant be open, when Python goes."""
     global _closing
     _closing = True
+    with lock:
+        for lookout in _lookouts.values():
+            lookout.wake()
     for thread in list(_threads):
         thread.join(LASTS)
     for sight in list(_sights):
