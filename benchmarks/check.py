@@ -1,8 +1,9 @@
 """A gate: checking and building a large tree, as ratios to parsing its text with PyYAML's C loader.
 
-    python benchmarks/check.py [--nodes 10000] [--large 100000] [--rounds 5]
+    python benchmarks/check.py [--nodes 10000] [--large 100000] [--rounds 5] [--slack 1.0]
 
-Exits with 1 when a ratio is above its limit. All jobs run in one process, in turn, round after
+Exits with 1 when a ratio is above its limit times the slack, which is for machines that others use
+at the same time. All jobs run in one process, in turn, round after
 round. A ratio is taken within each round, of jobs that ran one after the other, and the median over
 the rounds counts: a machine that is slower for a while makes both slower. Python's garbage
 collector is off for all of them, the parser's own run too.
@@ -68,8 +69,8 @@ class Promise:
         """The median over the rounds."""
         return median(map(self.of, rounds))
 
-    def holds(self, rounds: list[Round]) -> bool:
-        return self.measured(rounds) <= self.at_most
+    def holds(self, rounds: list[Round], slack: float = 1.0) -> bool:
+        return self.measured(rounds) <= self.at_most * slack
 
 
 PROMISES = [
@@ -155,11 +156,12 @@ def main() -> int:
     parser.add_argument("--nodes", type=int, default=10_000)
     parser.add_argument("--large", type=int, default=100_000)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--slack", type=float, default=1.0)
     args = parser.parse_args()
     for number in (args.rounds, MORE_ROUNDS * args.rounds):
         rounds = measure(args.nodes, args.large, number)
         print("\n".join(table(rounds, args.nodes, args.large)), flush=True)
-        if all(promise.holds(rounds) for promise in PROMISES):
+        if all(promise.holds(rounds, args.slack) for promise in PROMISES):
             return 0
     return 1
 

@@ -40,15 +40,21 @@ def test_what_is_beyond_a_limit_does_not(took: dict[str, float], holds: list[boo
     assert kept(**took) == holds
 
 
-@pytest.mark.parametrize(("parse", "code"), [(1.0, 0), (0.9, 1)])
+@pytest.mark.parametrize(
+    ("parse", "slack", "code"), [(1.0, "1", 0), (0.9, "1", 1), (0.9, "1.25", 0), (0.7, "1.25", 1)]
+)
 def test_the_gate_fails_with_exit_code_1(
-    parse: float, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    parse: float,
+    slack: str,
+    code: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     took = rounds(parse=parse)
     monkeypatch.setitem(CHECK["main"].__globals__, "measure", lambda *_: took)
-    monkeypatch.setattr("sys.argv", ["check.py"])
+    monkeypatch.setattr("sys.argv", ["check.py", "--slack", slack])
     assert CHECK["main"]() == code
-    assert ("DOES NOT HOLD" in capsys.readouterr().out) is bool(code)
+    assert ("DOES NOT HOLD" in capsys.readouterr().out) is (parse < 1.0)
 
 
 def test_every_job_is_measured() -> None:
