@@ -8,75 +8,17 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import ENDS, STATUS_SUCCEEDED, Command, Event, State
-from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.policy import Busy, End, Outcome
 from bt_actions.resources import Answer, Resources
 from bt_actions.server import Server, ServerWatch
-from tests.machine.judge import Before, Judge, Ledger
-from tests.machine.world import Job, Message, World
-
-
-@dataclass(eq=False, slots=True)
-class Ticket:
-    """A goal on its way, with what the caller and the judge keep of it."""
-
-    goal: Goal
-    name: str
-    line: Line
-    sent_to: frozenset[bytes] = frozenset()
-    was_gone: bool = False
-    asked_at: float = float("-inf")
-    denied_at: float | None = None
-    ledger: Ledger = field(init=False)
-
-    def __repr__(self) -> str:
-        return self.name
-
-
-@dataclass(eq=False, slots=True)
-class Line:
-    """One action: its watch, and the goals on it."""
-
-    action: str
-    watch: ServerWatch = field(default_factory=ServerWatch)
-    tickets: dict[bytes, Ticket] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class LeafPlan:
-    """How a leaf is made."""
-
-    action: str
-    timeouts: Timeouts = Timeouts()  # noqa: RUF009 - frozen
-    retry: Retry = Retry()  # noqa: RUF009 - frozen
-    resources: frozenset[str] = frozenset()
-    busy: Busy = Busy.WAIT
-
-    def __repr__(self) -> str:
-        limits = ", ".join(f"{f} {getattr(self.timeouts, f)}" for f in Timeouts.__slots__)
-        named = "everything" if Outcome.SERVER_LOST in self.retry.outcomes else "the default"
-        tries = f"{self.retry.attempts} tries, on {named}"
-        return f"{self.action}, {self.busy.value}, {set(self.resources)}; {limits}; {tries}"
-
-
-@dataclass(eq=False, slots=True)
-class Leaf:
-    """One leaf of a tree: visited, ticked, interrupted, visited again."""
-
-    name: str
-    plan: LeafPlan
-    line: Line
-    attempts: Attempts | None = None
-    ticket: Ticket | None = None
-    visits: int = 0
-
-    def __repr__(self) -> str:
-        return self.name
+from tests.machine.judge import Judge
+from tests.machine.parts import Before, Leaf, LeafPlan, Line, Ticket
+from tests.machine.world import NODES, Job, Message, World
 
 
 class Caller:
@@ -86,8 +28,11 @@ class Caller:
         self.world = world
         self.judge = judge
         self.resources: Resources[Ticket] = Resources()
-        self.lines = {action: Line(action) for action in world.actions}
-        self.leaves = [Leaf(f"leaf{i}", p, self.lines[p.action]) for i, p in enumerate(plans)]
+        self.lines = {(a, node): Line(a, node) for a in world.actions for node in NODES}
+        self.leaves = [
+            Leaf(f"leaf{number}", plan, self.lines[plan.action, plan.node])
+            for number, plan in enumerate(plans)
+        ]
         self.tickets: list[Ticket] = []
         self.closed = False
         self.fails_to_send = False
@@ -95,6 +40,7 @@ class Caller:
         self.builds_nonsense = False
         self.unexpected = False
         self._requests: dict[int, Ticket | None] = {}
+        self._askers: dict[int, Line] = {}
         self._chance = random.Random(0)
         world.client = self
         judge.caller = self
@@ -178,8 +124,8 @@ class Caller:
         for ticket in self.tickets:
             if self._waits(ticket.goal):
                 self.tell(ticket, Event.DRAINED)
-        for action, before in self.lines.items():
-            line = self.lines[action] = Line(action)
+        for key, before in self.lines.items():
+            line = self.lines[key] = Line(*key)
             for ticket in list(before.tickets.values()):
                 if ticket.goal.lost:
                     ticket.line, ticket.was_gone = line, True
@@ -187,7 +133,7 @@ class Caller:
                 else:
                     self.tell(ticket, Event.CLOSED)
         for leaf in self.leaves:
-            leaf.line = self.lines[leaf.plan.action]
+            leaf.line = self.lines[leaf.plan.action, leaf.plan.node]
 
     # What traffic does
 
@@ -231,18 +177,30 @@ class Caller:
 
     def _in_the_way_of(self, ticket: Ticket) -> bool:
         """Whether a goal that was given up must be canceled first."""
-        for line in self.lines.values():
-            if any(other.goal.lost for other in line.tickets.values()):
-                self.look(line)
-            same = line is ticket.line
-            if any(t.goal.bars(ticket.goal, same_server=same) for t in line.tickets.values()):
-                return True
-        return False
+        for line in self._looks_at(ticket):
+            self.look(line)
+        return any(
+            other.goal.bars(ticket.goal, same_server=line.action == ticket.line.action)
+            for line in self.lines.values()
+            for other in line.tickets.values()
+        )
 
-    def out_of_sight(self, ticket: Ticket) -> bool:
-        """Whether nothing shows any of the servers that a goal was sent to."""
-        action = ticket.line.action
-        return not (ticket.sent_to & self.world.shown(action) and self.world.ready(action))
+    def _looks_at(self, ticket: Ticket) -> list[Line]:
+        """The lines with lost goals: is one of them back?"""
+        lines = self.lines.values()
+        return [line for line in lines if any(t.goal.lost for t in line.tickets.values())]
+
+    def out_of_sight(self, lost: Ticket, wanted: Ticket) -> bool:
+        """Whether nothing shows any of the servers that a lost goal was sent to.
+
+        Told by who looks before `wanted` is sent.
+        """
+        action, world = lost.line.action, self.world
+        return not any(
+            lost.sent_to & world.shown(action, line.node) and world.ready(action, line.node)
+            for line in [wanted.line, *self._looks_at(wanted)]
+            if line.action == action
+        )
 
     def tell(self, ticket: Ticket, event: Event, detail: Any = None) -> None:
         """Tell a goal what happened and do what it says."""
@@ -291,28 +249,46 @@ class Caller:
                 self.restarts_meanwhile = False
                 self.world.restart(ticket.line.action)
             self.judge.sent(ticket, self._request("goal", ticket))
-            ticket.sent_to |= self.world.shown(ticket.line.action)  # it may have reached these, too
+            line = ticket.line  # it may have reached these, too
+            ticket.sent_to |= self.world.shown(line.action, line.node)
         elif command is Command.CANCEL:
             self._request("cancel", ticket)
         else:
             self._request("result", ticket)
 
     def _request(self, kind: str, ticket: Ticket) -> int:
+        return self._ask(kind, ticket.line, ticket.goal.id, ticket.name, ticket)
+
+    def _ask(self, kind: str, line: Line, goal: bytes, name: str, ticket: Ticket | None) -> int:
         number = len(self._requests) + 1
-        self._requests[number] = ticket
-        return self.world.send(kind, ticket.line.action, ticket.goal.id, ticket.name, number)
+        self._requests[number], self._askers[number] = ticket, line
+        nobody = self.world.servers[0]
+        message = Message(kind, nobody, goal, name, number=number, to_server=True)
+        return self.world.send(message, line.action, line.node)
 
     # What arrives
 
     def receive(self, message: Message) -> None:
         """Pass an answer on, as often as it comes."""
-        line = self.lines[message.server.action]
-        if message.kind == "probe answer":
-            line.watch.probe_answered(self.world.now.steady, message.number)
+        asker = self._askers.get(message.number)
+        if message.kind == "probe answer" and asker is not None:
+            asker.watch.probe_answered(self.world.now.steady, message.number)
             return
-        ticket = self.addressee(line, message)
-        if ticket is None:
-            return
+        if asker is not None:
+            hearing = [asker]
+        else:
+            hearing = [
+                line
+                for line in self.lines.values()
+                if line.action == message.server.action
+                and self.world.in_sight(message.server, line.node)
+            ]
+        for line in hearing:
+            ticket = self.addressee(line, message)
+            if ticket is not None:
+                self._pass_on(ticket, message)
+
+    def _pass_on(self, ticket: Ticket, message: Message) -> None:
         if message.kind == "answer":
             self._goal_answered(ticket, message)
         elif message.kind == "feedback":
@@ -359,17 +335,27 @@ class Caller:
     def look(self, line: Line) -> Server:
         """Observe a server and tell its goals what that means for them."""
         now, watch = self.world.now.steady, line.watch
-        gids = self.world.shown(line.action)
-        watch.observe(now, self.world.ready(line.action), gids)
+        gids = self.world.shown(line.action, line.node)
+        watch.observe(now, self.world.ready(line.action, line.node), gids)
+        self._take_over(line)
         if watch.wants_probe(now):
-            number = len(self._requests) + 1
-            self._requests[number] = None
-            watch.probe_sent(now, number)
-            self.world.send("probe", line.action, b"", "", number)
+            watch.probe_sent(now, len(self._requests) + 1)
+            self._ask("probe", line, b"", "", None)
         for ticket in list(line.tickets.values()):
             if ticket.goal.sent:
                 self._compare(ticket, watch, now)
         return watch.state(now)
+
+    def _take_over(self, line: Line) -> None:
+        """Take lost goals of the other node whose server is in sight here."""
+        for other in self.lines.values():
+            if other is line or other.action != line.action:
+                continue
+            for ticket in list(other.tickets.values()):
+                if ticket.goal.lost and ticket.sent_to & line.watch.gids:
+                    del other.tickets[ticket.goal.id]
+                    ticket.line, ticket.was_gone = line, True
+                    line.tickets[ticket.goal.id] = ticket
 
     def _compare(self, ticket: Ticket, watch: ServerWatch, now: float) -> None:
         goal = ticket.goal
@@ -422,5 +408,6 @@ class Caller:
 
         Not an excuse for goals that are lost already, where one comes back.
         """
-        for ticket in self.lines[action].tickets.values():
-            ticket.ledger.crowded |= not (but_lost and ticket.goal.lost)
+        for line in self.lines.values():
+            for ticket in line.tickets.values() if line.action == action else ():
+                ticket.ledger.crowded |= not (but_lost and ticket.goal.lost)

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 from bt_actions.goal_terms import STATUS_CANCELED, STATUS_SUCCEEDED
 from bt_actions.policy import RETRYABLE, Busy, Retry, Timeouts
-from tests.machine.callers import Caller, LeafPlan
+from tests.machine.callers import Caller
 from tests.machine.judge import Judge, Violation
-from tests.machine.world import CANCELING, UNANSWERED, Mood, World
+from tests.machine.parts import LeafPlan
+from tests.machine.world import CANCELING, NODES, UNANSWERED, Mood, World
 
 ACTIONS = ("move", "lift")
 TIMEOUTS = (
@@ -60,6 +61,8 @@ UNUSUAL = {
     "cut": 3,
     "lapse": 4,
     "outage": 6,
+    "overlook": 3,
+    "notice": 4,
     "heal": 6,
     "falter": 3,
     "clock": 3,
@@ -99,12 +102,13 @@ def random_history(seed: int) -> History:
 def plan(number: int) -> LeafPlan:
     """Return the way to make a leaf that this number stands for."""
     number, action = divmod(number, len(ACTIONS))
+    number, node = divmod(number, len(NODES))
     number, timeouts = divmod(number, len(TIMEOUTS))
     number, retry = divmod(number, len(RETRIES))
     number, busy = divmod(number, len(BUSY))
     resources = number % len(RESOURCES)
     return LeafPlan(
-        ACTIONS[action], TIMEOUTS[timeouts], RETRIES[retry], RESOURCES[resources], BUSY[busy]
+        ACTIONS[action], TIMEOUTS[timeouts], RETRIES[retry], RESOURCES[resources], BUSY[busy], node
     )
 
 
@@ -162,6 +166,7 @@ class Play:
         self.say("the faults end;", "links heal" if heals else "what is cut off is gone")
         world.set_clock("runs")
         world.room = 10_000
+        world.overlooked.clear()
         for server in world.servers:
             server.mood, server.matched = Mood.OBEYS, True
             if server.cut and heals:

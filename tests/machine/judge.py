@@ -6,16 +6,16 @@ no goal's private parts: what it needs of the past it writes down itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from bt_actions.goal import PATIENCE
 from bt_actions.goal_terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
+from tests.machine.parts import Before, Leaf, Ledger, Ticket
 
 if TYPE_CHECKING:
     from bt_actions.attempts import AttemptRecord
-    from tests.machine.callers import Caller, Leaf, Ticket
+    from tests.machine.callers import Caller
     from tests.machine.world import Job
 
 JUST = 1e-6
@@ -29,51 +29,6 @@ _CLAIMS = {
 
 class Violation(AssertionError):
     """A rule was broken."""
-
-
-class Before(NamedTuple):
-    """A goal before a step."""
-
-    state: State
-    outcome: Outcome | None
-    reason: str
-    accepted: bool
-    end: End
-    lost: bool
-
-
-@dataclass(eq=False, slots=True)
-class Ledger:
-    """What the judge has written down of one goal."""
-
-    since: float
-    """When its state began, steady clock."""
-    ros: float
-    forward: float = 0.0
-    """How far the node's clock has gone forward, as the goal saw it."""
-    begun_at: float = 0.0
-    heard_at: float = 0.0
-    """Values of `forward`: at acceptance, and at the last feedback."""
-    polled_at: float = 0.0
-    slow: float = 0.0
-    """The longest time between two polls: a caller that is slow makes deadlines late."""
-    sends: int = 0
-    releases: int = 0
-    cancels: int = 0
-    unwanted: bool = False
-    """Interrupted, or replaced, before it had an outcome."""
-    replaced: bool = False
-    refused: bool = False
-    denied: bool = False
-    """The last answer to a cancel request was: unknown goal."""
-    excuse: str = ""
-    """Why it may run beside another goal on its resource."""
-    crowded: bool = False
-    """Its request reached two live servers."""
-    closed: bool = False
-    beside: tuple[Ticket, ...] = ()
-    """Lost goals whose server was out of sight when this one was sent: they may turn up again."""
-    jobs: tuple[Job, ...] = ()
 
 
 class Judge:
@@ -179,7 +134,8 @@ class Judge:
             in_reach = [
                 job
                 for job in ledger.jobs
-                if job.live and job.server.shown and job.server.matched and not job.server.cut
+                if job.live and job.server.matched and not job.server.cut
+                if self.caller.world.in_sight(job.server, ticket.line.node)
             ]
             self._hold(ledger.crowded or not in_reach, "SERVER_LOST: the server is out of reach")
         if goal.outcome is Outcome.CANCELED_BY_OTHER:
@@ -315,11 +271,15 @@ class Judge:
     def sent(self, ticket: Ticket, reached: int) -> None:
         """A goal request has left for so many live servers."""
         for other in self.caller.tickets:
-            if other.goal.lost and self.caller.out_of_sight(other):
+            if other.goal.lost and self.caller.out_of_sight(other, ticket):
                 ticket.ledger.beside += (other,)
-            elif other.line is ticket.line and other.goal.outcome and not other.goal.holding:
-                runs = any(job.live and job.server.shown for job in other.ledger.jobs)
+            elif other.line.action == ticket.line.action and other.goal.outcome is not None:
+                runs = not other.goal.holding and any(
+                    job.live and self.caller.world.in_sight(job.server, ticket.line.node)
+                    for job in other.ledger.jobs
+                )
                 excused = other.ledger.excuse or other.ledger.crowded
+                excused = excused or (other.goal.waited_for and not other.goal.accepted)
                 rule = f"{other} was given up, and is canceled before {ticket} is sent there"
                 self._hold(not runs or excused, rule)
         if reached > 1:

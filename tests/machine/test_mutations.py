@@ -152,6 +152,21 @@ def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
 
 
 @mutation
+def minds_only_the_goals_of_its_own_node(patch: Patch) -> None:
+    def in_the_way(caller: Caller, ticket: Any) -> bool:
+        caller.look(ticket.line)
+        mine = ticket.line.tickets.values()
+        return any(other.goal.bars(ticket.goal, same_server=True) for other in mine)
+
+    patch.setattr(Caller, "_in_the_way_of", in_the_way)
+
+
+@mutation
+def leaves_a_lost_goal_to_a_node_that_is_not_shown_its_server(patch: Patch) -> None:
+    patch.setattr(Caller, "_take_over", lambda caller, line: None)
+
+
+@mutation
 def reports_success_though_it_was_interrupted(patch: Patch) -> None:
     decide(patch, State.CANCELING, Event.RESULT, Goal._finished)
 

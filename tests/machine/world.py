@@ -8,7 +8,7 @@ no randomness: a move is offered by `World.options` and made by `World.make`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol
 
@@ -25,6 +25,8 @@ from bt_actions.goal_terms import (
 
 UNANSWERED, EXECUTING, CANCELING = 0, 2, 3
 TERMINAL = (STATUS_SUCCEEDED, STATUS_CANCELED, STATUS_ABORTED)
+NODES = (0, 1)
+"""Nodes of the caller's process; each discovers servers for itself."""
 IN_THE_AIR = 30
 """So many messages are under way at most; what is over gets lost."""
 
@@ -124,6 +126,8 @@ class World:
         """How fast the node's clock runs against the steady one; 0 is a paused simulator."""
         self.servers: list[ModelServer] = []
         self.jobs: list[Job] = []
+        self.overlooked: set[tuple[bytes, int]] = set()
+        """Servers that one of the nodes is not shown."""
         self.air: list[Message] = []
         self.room = IN_THE_AIR
         self.actions = actions
@@ -144,6 +148,8 @@ class World:
             "outage": (self._connected, self._outage),
             "lapse": (self._lapsable, lambda server: setattr(server, "shown", False)),
             "falter": (self._alive, self._falter),
+            "overlook": (self._overlookable, self.overlooked.add),
+            "notice": (lambda: sorted(self.overlooked), self.overlooked.discard),
             "heal": (lambda: [s for s in self.servers if s.cut and s.alive], self.heal),
             "wait": (lambda: (0.05, 0.3, 0.3, 0.9, 0.9, None, 3.1), self.wait),
             "clock": (lambda: ("runs", "stops", "crawls", "back", "ahead"), self.set_clock),
@@ -176,35 +182,31 @@ class World:
 
     # What the client does
 
-    def shown(self, action: str) -> frozenset[bytes]:
-        """Return the GIDs that discovery shows."""
-        return frozenset(s.gid for s in self.servers if s.shown and s.action == action)
+    def in_sight(self, server: ModelServer, node: int) -> bool:
+        """Return whether discovery shows a server to a node."""
+        return server.shown and (server.gid, node) not in self.overlooked
 
-    def send(self, kind: str, action: str, goal_id: bytes, name: str, number: int) -> int:
+    def _seen(self, action: str, node: int) -> list[ModelServer]:
+        return [s for s in self.servers if s.action == action and self.in_sight(s, node)]
+
+    def shown(self, action: str, node: int) -> frozenset[bytes]:
+        """Return the GIDs that discovery shows to a node."""
+        return frozenset(server.gid for server in self._seen(action, node))
+
+    def send(self, message: Message, action: str, node: int) -> int:
         """Send a request to whoever is matched; return how many live servers that are."""
-        reached = 0
-        for server in self.servers:
-            if server.shown and server.alive and server.action == action:
-                self._add(Message(kind, server, goal_id, name, None, number, True))
-                reached += 1
-        return reached
+        reached = [server for server in self._seen(action, node) if server.alive]
+        for server in reached:
+            self._add(replace(message, server=server))
+        return len(reached)
 
-    def ready(self, action: str) -> bool:
-        """Return whether discovery shows a server with all its services."""
-        return any(s.shown and s.matched and s.action == action for s in self.servers)
+    def ready(self, action: str, node: int) -> bool:
+        """Return whether discovery shows a node a server with all its services."""
+        return any(server.matched for server in self._seen(action, node))
 
     def _add(self, message: Message) -> None:
         if len(self.air) < self.room:
-            copy = Message(
-                message.kind,
-                message.server,
-                message.goal_id,
-                message.name,
-                message.detail,
-                message.number,
-                message.to_server,
-            )
-            self.air.append(copy)
+            self.air.append(replace(message))
 
     # The network
 
@@ -333,6 +335,10 @@ class World:
     def _leave(self, server: ModelServer) -> None:
         self._kill(server)
         server.shown = False
+
+    def _overlookable(self) -> Options:
+        pairs = [(s.gid, node) for s in self.servers if s.shown for node in NODES]
+        return [pair for pair in pairs if pair not in self.overlooked]
 
     def _lapsable(self) -> Options:
         return [s for s in self.servers if s.shown and (s.cut or not s.alive)]
