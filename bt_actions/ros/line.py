@@ -38,8 +38,6 @@ PUMP_EVERY = 0.01
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
-FOUND_WITHIN = 3.0
-"""Seconds for a server to be ready in a participant that it was just moved to."""
 PROBES_KEPT = 20
 FEEDBACK = "/_action/feedback"
 
@@ -60,7 +58,7 @@ class Line:
         self.orphaned = False
         self.status_topic = f"{name}/_action/status"
         self._sight: Sight | None = None  # where the client lives if our node was blind to it
-        self._moved_at = float("-inf")
+        self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
         self._warned_crowd = False
@@ -236,31 +234,39 @@ class Line:
     def misses(self) -> bool:
         """Whether a server is wanted that may be there, though nothing shows all of it.
 
-        Not while answers may be under way: in a second, what runs on an absent server is lost.
+        Not while answers may be under way: in a second, what runs on an absent server is lost. And
+        not where remapping rules give our node another server than a new participant would find.
         """
-        now = time.monotonic()
-        just_moved = now - self._moved_at < FOUND_WITHIN
-        if self.orphaned or just_moved or not self.goals or not self.traffic.domain.lost_sight:
+        if self.orphaned or not self.goals or self._remapped:
             return False
-        absent = self.watch.state(now) is Server.ABSENT
+        domain = self.traffic.domain
+        known = domain.lost_sight or (self.name, self.action_type) in domain.known
+        absent = self.watch.state(time.monotonic()) is Server.ABSENT
         running = (State.SENDING, State.EXECUTING)
-        return absent and all(ticket.goal.state not in running for ticket in self.goals.values())
+        still = all(ticket.goal.state not in running for ticket in self.goals.values())
+        return known and absent and still
 
     def is_waited_for(self) -> bool:
         """Whether a goal is still to be sent."""
         return any(not ticket.goal.sent for ticket in self.goals.values())
 
-    def move_to(self, sight: Sight) -> None:
+    def client_in(self, sight: Sight) -> ActionClient:
+        """Return a client like our own in another participant."""
+        return ActionClient(sight.node, self.action_type, self.name, self)
+
+    def move_to(self, sight: Sight, client: ActionClient) -> None:
         """Go on with a client in a participant that sees the server; the alarm takes its answers.
 
         Nothing that matters is under way in the old one: see `misses`.
         """
-        client = ActionClient(sight.node, self.action_type, self.name, self)
+        sight.users.add(self)
+        self._go_on_with(client, sight)
+        log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
+
+    def _go_on_with(self, client: ActionClient, sight: Sight | None) -> None:
         self.close()
         self.client, self._sight, self.watch = client, sight, ServerWatch()
-        self._moved_at = time.monotonic()
-        sight.users.add(self)
-        log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
+        self._look_at = 0.0
         alarm.wake_by(time.monotonic())
 
     def close(self) -> None:
@@ -335,14 +341,14 @@ class Line:
 
     def look(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
+        if not is_valid(self.traffic.node):
+            self._orphan()
+            return Server.ABSENT
         try:
             ready = self.client.server_is_ready()
             gids = self._shown()
-            valid = is_valid(self.traffic.node)
-        except Exception:  # noqa: BLE001 - InvalidHandle: our own node was destroyed
-            valid = False
-        if not valid:
-            self._orphan()
+        except Exception:  # noqa: BLE001 - InvalidHandle: it was destroyed since
+            self._come_home()
             return Server.ABSENT
         before = self.watch.state(now)
         self.watch.observe(now, ready, gids)
@@ -356,6 +362,7 @@ class Line:
         if state is not before:
             self.traffic.notify(None)
             self.traffic.domain.lost_sight |= state is Server.ABSENT
+            self.traffic.domain.known.add((self.name, self.action_type))
         if self.misses():
             look_for(self, self.traffic.domain.number)
         if state is Server.AMBIGUOUS and not self._warned_crowd:
@@ -364,6 +371,18 @@ class Line:
         elif state is Server.READY:
             self._warned_crowd = False
         return state
+
+    def _come_home(self) -> None:
+        """The participant that we moved to is gone, if we did; our node is not."""
+        if self._sight is None:
+            self._orphan()
+            return
+        try:
+            client = ActionClient(self.traffic.node, self.action_type, self.name, self)
+        except Exception:  # noqa: BLE001 - or it is gone by now, too
+            self._orphan()
+        else:
+            self._go_on_with(client, None)
 
     def _judge(self, ticket: Ticket, now: float) -> None:
         goal, watch = ticket.goal, self.watch
@@ -420,7 +439,8 @@ class Line:
         wait = self._look_at - now
         if self.orphaned or self._sight is not None:
             self.client.pump()
-            wait = min(wait, PUMP_EVERY)
+            if not all(ticket.accounted_for for ticket in self.goals.values()):
+                wait = min(wait, PUMP_EVERY)
         for ticket in list(self.goals.values()):
             self.poll(ticket)
             due = ticket.goal.due_in(self.traffic.clocks.now())
@@ -428,6 +448,15 @@ class Line:
                 wait = min(wait, due)
         self._bound_the_lost()
         return max(wait, 0.001)
+
+
+def _remapped(node: Any, name: str) -> bool:
+    """Whether rules of this node lead any part of an action elsewhere."""
+    topics = [f"{name}/_action/{part}" for part in ("status", "feedback")]
+    services = [f"{name}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
+    return any(node.resolve_topic_name(topic) != topic for topic in topics) or any(
+        node.resolve_service_name(service) != service for service in services
+    )
 
 
 def is_valid(node: Any) -> bool:

@@ -6,8 +6,9 @@ announcements that are not sent again: the process runs, and stays invisible. A 
 made after the process is back sees it within a second (docs/reliability-settings.md).
 
 So while a server that was in sight is wanted and is not, a new participant looks for it every now
-and then, on a thread of its own. What it finds, the line moves to it (`Line.move_to`); one that
-finds nothing is closed. Nothing is sent and nothing is decided here.
+and then, on a thread of its own. Where a client is ready there, and ours is not, the line goes on
+with that one (`Line.move_to`); a participant that finds nothing is closed. Nothing is sent here,
+and nothing decided about goals.
 """
 
 from __future__ import annotations
@@ -15,34 +16,37 @@ from __future__ import annotations
 import atexit
 import itertools
 import os
+import sys
 import threading
 import time
-import weakref
 from collections.abc import Callable
 from typing import Protocol
 
 from rclpy.context import Context
 from rclpy.node import Node
 
+from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 
-FIRST_AFTER = 0.5
-"""Seconds out of sight until the first look."""
+FIRST_AFTER = 1.5
+"""Seconds out of sight until the first look; a server that was restarted is seen before."""
 PAUSE = 1.0
-"""Seconds between two looks while somebody waits for a server;"""
+"""Seconds between two looks at first, and for a while after somebody begins to wait;"""
+URGENT_FOR = 30.0
+"""so long;"""
 LONGEST_PAUSE = 30.0
-"""while only the return of a lost goal would matter, each pause is twice the last, up to this."""
-LASTS = 2.5
+"""later, each pause is twice the last, up to this."""
+LASTS = 3.0
 """Seconds that a look lasts; what is there comes in sight in 0.1 to 1.0 (measured)."""
 GLANCE = 0.05
 """Seconds between two questions to the graph in a look."""
-AHEAD = 0.5
+AHEAD = 0.7
 """Seconds by which a new participant may be ahead of one that is not blind (0.1 measured)."""
 
 _number = itertools.count(1)
-_sights: weakref.WeakSet[Sight] = weakref.WeakSet()
-_threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+_sights: set[Sight] = set()
+_threads: set[threading.Thread] = set()
 _lookouts: dict[int, Lookout] = {}
 _closing = False  # the process ends
 
@@ -53,13 +57,16 @@ class Seeker(Protocol):
     status_topic: str
 
     def misses(self) -> bool:
-        """Whether a server is wanted, and none is in sight, by now."""
+        """Whether a server is wanted, and is not in sight, by now."""
 
     def is_waited_for(self) -> bool:
         """Whether somebody wants to send a goal."""
 
-    def move_to(self, sight: Sight) -> None:
-        """Go on from the participant that sees the server."""
+    def client_in(self, sight: Sight) -> ActionClient:
+        """A client like its own in another participant."""
+
+    def move_to(self, sight: Sight, client: ActionClient) -> None:
+        """Go on with this client."""
 
 
 class Sight:
@@ -67,23 +74,25 @@ class Sight:
 
     def __init__(self, domain: int) -> None:
         """Raises what rclpy raises where it cannot be made."""
-        self._context = Context()
-        self._context.init(domain_id=domain)
+        context = Context()
+        context.init(args=_enclave(), domain_id=domain)
         name = f"bt_actions_lookout_{os.getpid()}_{next(_number)}"
         try:
             self.node = Node(
                 name,
-                context=self._context,
+                context=context,
                 use_global_arguments=False,
                 enable_rosout=False,
                 start_parameter_services=False,
             )
         except BaseException:
-            self._context.try_shutdown()
+            context.try_shutdown()
             raise
         self.users: set[Seeker] = set()
-        self._closed = False
-        _sights.add(self)
+        self.closed = False
+        self._context = context
+        with lock:
+            _sights.add(self)
 
     def shows(self, topic: str) -> frozenset[bytes]:
         """The GIDs of who publishes a topic."""
@@ -93,14 +102,15 @@ class Sight:
         """Close it when nobody uses it any more; on another thread, as the caller has the lock."""
         self.users.discard(user)
         if not self.users:
-            _start(self.close)
+            _start(self.close)  # or else at exit
 
     def close(self) -> None:
-        """Take the participant away."""
+        """Take the participant away, unless somebody uses it by now."""
         with lock:
-            if self._closed:
+            if self.closed or (self.users and not _closing):
                 return
-            self._closed = True
+            self.closed = True
+            _sights.discard(self)
         self.node.destroy_node()
         self._context.try_shutdown()
 
@@ -121,14 +131,14 @@ class Lookout:
         self._missing: set[Seeker] = set()
         self._bell = threading.Condition(lock)
         self._thread: threading.Thread | None = None
+        self._urgent_since: float | None = None
         self._told = False
 
     def add(self, line: Seeker) -> None:
         """Look for what this line misses, too."""
-        if line in self._missing:
-            return
-        self._missing.add(line)
-        self._bell.notify_all()
+        if line not in self._missing:
+            self._missing.add(line)
+            self._bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             self._thread = _start(self._run)
 
@@ -142,64 +152,87 @@ class Lookout:
             with lock:
                 self._wait(pause)
                 if not self._still_missing():
-                    self._thread = None
+                    self._thread = self._urgent_since = None
                     return
             try:
                 found = self._look()
-            except Exception as error:  # noqa: BLE001 - its last user has left meanwhile, or rclpy's
-                log.error(f"a second look for lost servers: {error!r}")
+            except Exception as error:  # noqa: BLE001 - no resources, no permission, rclpy's
                 found = False
+                if not self._told:
+                    self._told = True
+                    log.warning(f"no second look for lost servers: {error!r}")
             pause = PAUSE if found or pause < PAUSE else min(2 * pause, LONGEST_PAUSE)
 
     def _wait(self, pause: float) -> None:
-        """Wait for the next look; no longer than a moment while somebody waits for a server."""
+        """Wait for the next look; no longer than a moment when somebody begins to wait."""
         started = time.monotonic()
         while self._still_missing():
-            urgent = any(line.is_waited_for() for line in self._missing)
-            left = started + (min(pause, PAUSE) if urgent else pause) - time.monotonic()
+            left = started + (min(pause, PAUSE) if self._is_urgent() else pause) - time.monotonic()
             if left <= 0.0:
                 return
             self._bell.wait(min(left, PAUSE))
+
+    def _is_urgent(self) -> bool:
+        now = time.monotonic()
+        if not any(line.is_waited_for() for line in self._missing):
+            self._urgent_since = None
+        elif self._urgent_since is None:
+            self._urgent_since = now
+        return self._urgent_since is not None and now - self._urgent_since < URGENT_FOR
 
     def _still_missing(self) -> bool:
         self._missing = {line for line in self._missing if not _closing and line.misses()}
         return bool(self._missing)
 
     def _look(self) -> bool:
-        """Make a participant and wait until it shows something that is missed."""
+        """Make a participant, and wait until clients in it are ready that ours are missing."""
+        sight = Sight(self._domain)
         try:
-            sight = Sight(self._domain)
-        except Exception as error:  # noqa: BLE001 - no resources, no permission, a closing process
-            if not self._told:
-                self._told = True
-                log.warning(f"no second look for lost servers: {error!r}")
-            return False
-        try:
+            look = _Look(sight)
             until = time.monotonic() + LASTS
-            shown_since: dict[Seeker, float] = {}
-            while time.monotonic() < until and self._find(sight, shown_since):
+            while time.monotonic() < until:
+                with lock:
+                    lines = set(self._missing) if self._still_missing() else set()
+                    look.go_on(lines)
+                if not lines:
+                    break
                 time.sleep(GLANCE)
-        finally:
             with lock:
-                unused = not sight.users
-            if unused:
-                sight.close()
-        return not unused
+                look.clear_up()
+        finally:
+            sight.close()
+        return bool(sight.users)
 
-    def _find(self, sight: Sight, shown_since: dict[Seeker, float]) -> bool:
-        """Move the lines over whose servers are in sight; return whether any is missing still."""
-        with lock:
-            lines = list(self._missing) if self._still_missing() else []
-        shown = [line for line in lines if sight.shows(line.status_topic)]
-        with lock:
-            now = time.monotonic()
-            since = [shown_since.setdefault(line, now) for line in shown if line.misses()]
-            if since and now - min(since) >= AHEAD:
-                for line in shown:  # all at once: what one has lost may be in the way of another
-                    if line.misses():
-                        line.move_to(sight)
-                        self._missing.discard(line)
-        return bool(lines)
+
+class _Look:
+    """One look: clients on trial in a new participant. All of it under the lock."""
+
+    def __init__(self, sight: Sight) -> None:
+        self._sight = sight
+        self._clients: dict[Seeker, ActionClient] = {}
+        self._ready_since: dict[Seeker, float] = {}
+
+    def go_on(self, lines: set[Seeker]) -> None:
+        """Try clients where a server is shown; move all lines that one is ready for, together.
+
+        Together, because what one of them has lost may be in the way of another's next goal.
+        """
+        now = time.monotonic()
+        for line in lines:
+            if line not in self._clients and self._sight.shows(line.status_topic):
+                self._clients[line] = line.client_in(self._sight)
+            if line in self._clients and self._clients[line].server_is_ready():
+                self._ready_since.setdefault(line, now)
+        ready = [line for line in lines if line in self._ready_since]
+        if any(now - self._ready_since[line] >= AHEAD for line in ready):
+            for line in ready:
+                line.move_to(self._sight, self._clients.pop(line))
+
+    def clear_up(self) -> None:
+        """Destroy the clients that nobody took."""
+        for client in self._clients.values():
+            client.destroy()
+        self._clients.clear()
 
 
 def publishers(node: Node, topic: str) -> frozenset[bytes]:
@@ -208,10 +241,24 @@ def publishers(node: Node, topic: str) -> frozenset[bytes]:
     return frozenset(bytes(info.endpoint_gid) for info in infos)
 
 
-def _start(what: Callable[[], None]) -> threading.Thread:
+def _enclave() -> list[str]:
+    """What must be the same in every context of a process; all else is about other nodes."""
+    words = sys.argv
+    if "--enclave" not in words[:-1]:
+        return []
+    return ["--ros-args", "--enclave", words[words.index("--enclave") + 1]]
+
+
+def _start(what: Callable[[], None]) -> threading.Thread | None:
+    """Start a thread; None where there can be no more."""
     thread = threading.Thread(target=what, name="bt_actions-lookout", daemon=True)
-    thread.start()
-    _threads.add(thread)
+    with lock:
+        _threads.difference_update([each for each in _threads if not each.is_alive()])
+        try:
+            thread.start()
+        except RuntimeError:
+            return None
+        _threads.add(thread)
     return thread
 
 
@@ -219,13 +266,16 @@ def _start(what: Callable[[], None]) -> threading.Thread:
 def _close_at_exit() -> None:
     """Let no thread of ours be within Fast DDS, and no participant be open, when Python goes."""
     global _closing
-    _closing = True
     with lock:
+        _closing = True
         for lookout in _lookouts.values():
             lookout.wake()
-    for thread in list(_threads):
+        threads = list(_threads)
+    for thread in threads:
         thread.join(LASTS)
-    for sight in list(_sights):
+    with lock:
+        sights = list(_sights)
+    for sight in sights:
         sight.close()
 
 

@@ -39,6 +39,8 @@ class Domain:
         self.number = number
         self.lost_sight = False
         """A server that was in sight is not any more: what else its process serves may not be."""
+        self.known: set[tuple[str, Any]] = set()
+        """Names and types of the actions that had a server once."""
         self._lost: dict[tuple[str, Any], list[Ticket]] = {}
 
     def keep_lost(self, action: str, action_type: Any, ticket: Ticket) -> None:

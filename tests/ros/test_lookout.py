@@ -7,7 +7,7 @@ has the real thing, which Fast DDS does to a node in about every second trial.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -15,6 +15,7 @@ import pytest
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros import line, lookout
 from bt_actions.ros.lookout import Sight
+from bt_actions.ros.shared import lock
 from tests.support.trees import in_turn
 from tests.support.waiting import holds_for, until
 
@@ -114,3 +115,130 @@ def _domain(node: Any) -> Any:
     from bt_actions.ros.traffic import Traffic
 
     return Traffic.of(node).domain
+
+
+class TestMoves:
+    """Lines that are moved by hand, as the lookout moves them."""
+
+    @pytest.fixture
+    def moved(self, serve: Any, name: str, node: Any) -> Iterator[Any]:
+        """A line in a participant of its own."""
+        serve()
+        leaf = MoveRobot("keeps the line", 0.1, action_name=name)
+        leaf.setup(node=node)
+        sight = Sight(_domain(node).number)
+        with lock:
+            leaf._line.move_to(sight, leaf._line.client_in(sight))
+        yield leaf._line
+        leaf.shutdown()
+        until(lambda: sight.closed)
+
+    def goes(self, name: str, node: Any) -> None:
+        """A goal succeeds."""
+        leaf = MoveRobot("goes", 0.1, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.run(10.0)
+        assert leaf.outcome is Outcome.SUCCEEDED
+
+    def test_goals_go_and_come(self, moved: Any, name: str, node: Any) -> None:
+        self.goes(name, node)
+
+    def test_a_participant_that_is_used_again_is_not_closed(
+        self, moved: Any, name: str, node: Any
+    ) -> None:
+        sight = moved._sight
+        with lock:  # the thread that closes it has to wait
+            sight.left_by(moved)
+            sight.users.add(moved)
+        until(lambda: not lookouts())
+        assert not sight.closed
+        self.goes(name, node)
+
+    def test_a_line_whose_participant_is_gone_goes_back_to_its_node(
+        self, moved: Any, name: str, node: Any
+    ) -> None:
+        sight = moved._sight
+        sight.users.clear()
+        sight.close()
+        self.goes(name, node)
+        assert moved._sight is None
+        assert not moved.orphaned
+
+    def test_without_another_thread_no_resource_is_lost(
+        self, moved: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        sight = moved._sight
+
+        def no_more(_thread: threading.Thread) -> None:
+            raise RuntimeError("can't start new thread")
+
+        with lock, monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, "start", no_more)
+            moved._go_on_with(line.ActionClient(node, moved.action_type, name, moved), None)
+        assert not sight.closed
+        self.goes(name, node)
+        sight.close()
+
+
+def test_an_action_that_had_a_server_once_is_looked_for(
+    serve: Any, name: str, node: Any, blind: Blind, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also by a line that is newer than the loss, where no other line saw it."""
+    serve()
+    monkeypatch.setattr(_domain(node), "lost_sight", False)
+    for again in (False, True):
+        leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=20.0))
+        leaf.setup(node=node)
+        if again:
+            blind(leaf)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.run(30.0)
+        assert leaf.outcome is Outcome.SUCCEEDED
+
+
+def test_whoever_else_publishes_a_status_topic_moves_nobody(
+    name: str, node: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A recording that is played, or a server of another type."""
+    from action_msgs.msg import GoalStatusArray
+
+    monkeypatch.setattr(_domain(node), "lost_sight", True)
+    monkeypatch.setattr(lookout, "FIRST_AFTER", 0.1)
+    tried: list[Any] = []
+    monkeypatch.setattr(
+        line.Line,
+        "client_in",
+        lambda self, sight: (
+            tried.append(self) or line.ActionClient(sight.node, self.action_type, self.name, self)
+        ),
+    )
+    publisher = node.create_publisher(GoalStatusArray, f"{name}/_action/status", 1)
+    leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=4.0))
+    leaf.setup(node=node)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.run(10.0)
+        assert tried
+        assert leaf._line._sight is None
+    assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
+    node.destroy_publisher(publisher)
+
+
+def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
+    """A participant without the rules would find another robot."""
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+    context = Context()
+    rule = f"{name}/_action/send_goal:=/other/move/_action/send_goal"
+    context.init(args=["--ros-args", "-r", rule], domain_id=domain)
+    remapped = Node("remapped", context=context)
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    leaf.setup(node=remapped)
+    leaf._line.traffic.domain.lost_sight = True
+    with lock:
+        leaf._line.goals[b"waits"] = None
+        assert not leaf._line.misses()
+        leaf._line.goals.clear()
+    leaf.shutdown()
+    remapped.destroy_node()
+    context.shutdown()
