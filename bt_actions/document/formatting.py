@@ -6,9 +6,10 @@ back, so that formatting can never change what a tree means.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from collections.abc import Mapping as MappingType
 
+from bt_actions.document.comments import comments_of, scalars_of
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.model import ACTION_KEYS, KINDS, NODE, NODES, TOP_KEYS
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose
@@ -104,8 +105,9 @@ class _Layout:
     def __init__(self, source: Source, root: Node) -> None:
         self._source = source
         self._lines: list[str] = []
-        self._scalars = {(s.line, s.column): s for s in _scalars(root)}
-        self._comments = dict(_comments(source, list(self._scalars.values())))
+        comments = list(comments_of(source, scalars_of(root)))
+        self._behind = {one.line: one for one in comments if not one.alone}
+        self._alone = {one.line: one for one in comments if one.alone}
         self._used: set[int] = set()
 
     def head(self) -> None:
@@ -164,7 +166,7 @@ class _Layout:
             self._put(f"{head} {self._raw(value)}", line, value.line)
         else:
             lines = range(value.line, value.end_line + 1)
-            if len(lines) > 1 and any(at in self._comments for at in lines[:-1]):
+            if len(lines) > 1 and any(at in self._behind or at in self._alone for at in lines[:-1]):
                 raise FormatError(f"line {value.line}: a comment inside {{ }} or [ ]")
             text = f"{head} {self._flow(value, shape)}"
             self._put(text, line, value.end_line)
@@ -211,11 +213,10 @@ class _Layout:
         block: list[str] = []
         at = line - 1
         while at > 0 and at not in self._used:
-            text = (self._source.line(at) or "").strip()
-            if text.startswith("#"):
+            if at in self._alone:
                 self._used.add(at)
-                block.append(" " * indent + text)
-            elif text:
+                block.append(" " * indent + self._alone[at].text)
+            elif (self._source.line(at) or "").strip():
                 break
             elif not block or block[-1]:
                 block.append("")
@@ -228,55 +229,17 @@ class _Layout:
     def _put(self, text: str, *lines: int) -> None:
         """A line, with the comments that stood behind what is on it."""
         for line in lines:
-            if line in self._comments and line not in self._used:
+            if line in self._behind and line not in self._used:
                 self._used.add(line)
-                column, comment = self._comments[line]
-                text = f"{text.ljust(column - 1)}{'' if len(text) < column - 1 else '  '}{comment}"
+                comment = self._behind[line]
+                column = comment.column - 1
+                text = f"{text.ljust(column)}{'' if len(text) < column else '  '}{comment.text}"
         self._lines.append(text)
 
     def finish(self) -> str:
         """The text; comments at the end of the file stay there."""
-        rest = []
-        for at, line in enumerate(self._source.lines, 1):
-            text = line.strip()
-            if text.startswith("#") and at not in self._used:
-                rest.append(text)
-                self._used.add(at)
+        rest = [one.text for at, one in self._alone.items() if at not in self._used]
         return "\n".join([*self._lines, *rest]) + "\n"
-
-
-def _scalars(root: Node) -> Iterator[Scalar]:
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, Scalar):
-            yield node
-        elif isinstance(node, Listing):
-            stack.extend(node.items)
-        elif isinstance(node, Mapping):
-            for key, value in node.pairs:
-                stack += [key, value]
-
-
-def _comments(source: Source, scalars: list[Scalar]) -> Iterator[tuple[int, tuple[int, str]]]:
-    """The comments that stand behind something, by line, with their columns."""
-    covered: dict[int, list[tuple[int, int]]] = {}
-    tall: set[int] = set()
-    for scalar in scalars:
-        if scalar.line == scalar.end_line:
-            covered.setdefault(scalar.line, []).append((scalar.column - 1, scalar.end_column - 1))
-        else:
-            tall.update(range(scalar.line + 1, scalar.end_line + (scalar.end_column > 1)))
-    for number, line in enumerate(source.lines, 1):
-        if number in tall or line.lstrip().startswith("#"):
-            continue
-        at = line.find("#")
-        while at >= 0:
-            inside = any(start <= at < end for start, end in covered.get(number, ()))
-            if not inside and line[at - 1] in " \t":
-                yield number, (at + 1, line[at:].rstrip())
-                break
-            at = line.find("#", at + 1)
 
 
 def _compare(source: Source, root: Node, text: str) -> None:
@@ -285,21 +248,9 @@ def _compare(source: Source, root: Node, text: str) -> None:
     formatted = compose(again)
     if formatted is None or again.findings or _data(formatted) != _data(root):
         raise FormatError("the text holds anchors, tags or forms that cannot be kept")
-    before = sorted(_all_comments(source, root))
-    if sorted(_all_comments(again, formatted)) != before:
+    before = sorted(one.text for one in comments_of(source, scalars_of(root)))
+    if sorted(one.text for one in comments_of(again, scalars_of(formatted))) != before:
         raise FormatError("a comment stands where it could not be kept")
-
-
-def _all_comments(source: Source, root: Node) -> Iterator[str]:
-    scalars = list(_scalars(root))
-    tall: set[int] = set()
-    for scalar in scalars:
-        tall.update(range(scalar.line + 1, scalar.end_line + (scalar.end_column > 1)))
-    for number, line in enumerate(source.lines, 1):
-        if line.lstrip().startswith("#") and number not in tall:
-            yield line.strip()
-    for _, (_, comment) in _comments(source, scalars):
-        yield comment
 
 
 def _data(node: Node) -> object:

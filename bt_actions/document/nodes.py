@@ -125,6 +125,7 @@ def compose(source: Source) -> Node | None:
     except yaml.YAMLError as error:
         _report_syntax(source, error)
         return None
+    source.root = composer.root
     return composer.root
 
 

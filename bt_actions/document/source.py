@@ -9,9 +9,13 @@ import re
 import stat
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bt_actions.document.findings import DocumentError, Finding, Related, Severity, Span
 from bt_actions.document.rules import RULES
+
+if TYPE_CHECKING:
+    from bt_actions.document.nodes import Node
 
 __all__ = ["MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "read_source", "source_of"]
 
@@ -36,6 +40,8 @@ class Source:
     findings: list[Finding] = field(default_factory=list)
     anchored: bool = False
     """Whether the text names parts of itself (&name); known after it was composed."""
+    root: Node | None = None
+    """The text as YAML nodes, after it was composed."""
     _lines: list[str] | None = None
 
     @property

@@ -210,3 +210,17 @@ def test_mutated_trees_are_answered_with_findings() -> None:
             _words(check_bytes(text.encode()))
         except Exception as error:
             raise AssertionError(f"seed {seed}: {error!r} for\n{text}") from error
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_the_time_for_ignores_grows_with_their_number_and_no_faster(alone: bool) -> None:
+    def seconds(count: int) -> float:
+        ignore = "# bt: ignore[BT304] an operator stops it"
+        node = f"    {ignore}\n    - retry: R\n" if alone else f"    - retry: R  {ignore}\n"
+        node += "      child: {check: $ready}\n"
+        text = "tree: t\ninputs: {ready: bool}\nroot:\n  sequence: S\n  children:\n" + node * count
+        started = time.process_time()
+        assert check_bytes(text.encode()) == []
+        return time.process_time() - started
+
+    assert seconds(8000) < 8 * seconds(2000) + 0.5
