@@ -21,7 +21,6 @@ examples:
 exit codes:
   0 nothing found   1 something found   2 a file cannot be read
 """
-_STDIN_LIMIT = 64 * 1024 * 1024
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -70,12 +69,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(tree: str, *, types: bool) -> list[Finding]:
-    from bt_actions.document import DocumentError, check_file, check_source, source_of
+    from bt_actions.document import DocumentError, check_file, check_source
+    from bt_actions.document.source import read_stream
 
     if tree != "-":
         return check_file(tree, types=types)
     try:
-        source = source_of(sys.stdin.buffer.read(_STDIN_LIMIT), "<stdin>")
+        source = read_stream(getattr(sys.stdin, "buffer", None), "<stdin>")
     except DocumentError as error:
         return list(error.findings)
     return check_source(source, types=types)

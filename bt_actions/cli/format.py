@@ -57,12 +57,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _formatted(name: str) -> tuple[str, str]:
-    from bt_actions.document import DocumentError, read_source, source_of
+    from bt_actions.document import DocumentError
     from bt_actions.document.formatting import FormatError, format_source
+    from bt_actions.document.source import read_source, read_stream
 
     try:
-        source = source_of(sys.stdin.buffer.read(), "<stdin>") if name == "-" else None
-        if source is None:
+        if name == "-":
+            source = read_stream(getattr(sys.stdin, "buffer", None), "<stdin>")
+        else:
             source = read_source(Path(name), name)
         return source.text, format_source(source)
     except DocumentError as error:

@@ -162,7 +162,7 @@ def _found(path: PathLike) -> Path:
     try:
         return find_tree(path)
     except TreeNotFoundError as error:
-        source = Source(os.fspath(path), "")
+        source = Source(os.fspath(path) or '""', "")
         hint = None if "mean" in str(error) else f"installed are {', '.join(installed_trees())}"
         source.report("BT100", Span(1, 1, 1, 2), str(error), hint=hint)
         raise DocumentError(source.findings) from None

@@ -135,6 +135,35 @@ def test_check_reads_standard_input(
     assert capsys.readouterr().out.startswith("<stdin>:9:17: error[BT114]")
 
 
+@pytest.mark.parametrize("command", ["check", "format"])
+def test_standard_input_that_is_closed_is_told(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", None)
+    assert main([command, "-"]) == 2
+    said = capsys.readouterr()
+    assert "<stdin>:1:1: error[BT100]: this is closed" in said.out + said.err
+
+
+@pytest.mark.parametrize("command", ["check", "format"])
+def test_standard_input_is_read_within_bounds(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Path("/dev/zero").open() as endless:
+        monkeypatch.setattr("sys.stdin", endless)
+        assert main([command, "-"]) == 2
+    said = capsys.readouterr()
+    assert "<stdin>:1:1: error[BT100]: this is larger than 32 MiB" in said.out + said.err
+
+
+@pytest.mark.parametrize("command", ["check", "run", "render", "format"])
+def test_an_empty_name_is_told(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, ""]) == 2
+    said = capsys.readouterr()
+    assert "Traceback" not in said.out + said.err
+    assert said.out + said.err != ""
+
+
 def test_explain_prints_a_page_or_the_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "bt203"]) == 0
     assert capsys.readouterr().out.startswith("BT203: a message has no such field (error)")
