@@ -198,8 +198,7 @@ def rules_page() -> str:
         rule = RULES[code]
         lines += [f"## {code}", "", f"*{rule.severity}*: {rule.title}", "", page.text, ""]
         for word, example in (("Wrong", page.wrong), ("Right", page.right)):
-            if example:
-                lines += [f"{word}:", "", "```yaml", example.rstrip("\n"), "```", ""]
+            lines += [f"{word}:", "", f"```{page.language}", example.rstrip("\n"), "```", ""]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

@@ -54,7 +54,7 @@ class Workspace:
         found = list(self._unreadable)
         for source in self._sources:
             found += sorted(source.findings, key=lambda one: (one.line, one.column, one.code))
-        return found
+        return list(dict.fromkeys(found))  # what an alias repeats is wrong once
 
     def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
         key = (_key(source.path or Path(source.name)), False)

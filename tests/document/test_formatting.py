@@ -125,7 +125,7 @@ def test_the_sample_trees_are_in_canonical_form(path: Path) -> None:
     assert formatted(path.read_text(encoding="utf-8")) == path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("code", sorted(code for code in PAGES if PAGES[code].right))
+@pytest.mark.parametrize("code", sorted(code for code in PAGES if PAGES[code].language == "yaml"))
 def test_formatting_twice_changes_nothing_more(code: str) -> None:
     once = formatted(PAGES[code].right)
     assert formatted(once) == once

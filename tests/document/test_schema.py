@@ -52,7 +52,9 @@ def test_it_takes_the_example_of_each_kind(kind: str) -> None:
     assert complaints("tree: t\nroot:\n" + textwrap.indent(KINDS[kind].example, "  ")) == []
 
 
-@pytest.mark.parametrize("code", sorted(code for code, page in PAGES.items() if page.right))
+@pytest.mark.parametrize(
+    "code", sorted(code for code, page in PAGES.items() if page.language == "yaml")
+)
 def test_it_takes_the_right_example_of_each_rule(code: str) -> None:
     assert complaints(PAGES[code].right) == []
 
