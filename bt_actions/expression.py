@@ -34,6 +34,15 @@ MAX_LENGTH = 2000
 """Characters in one expression."""
 _MAX_DEPTH = 60
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
+_ANSWERS = frozenset({"result", "feedback", "message"})
+_FOREIGN = {
+    "null": "there is no 'null' here",
+    "TRUE": "write 'true'",
+    "FALSE": "write 'false'",
+    "AND": "write 'and'",
+    "OR": "write 'or'",
+    "NOT": "write 'not'",
+}
 Variable = Callable[[str], object]
 _Roots = Mapping[str, object]
 _Closure = Callable[[_Roots, Variable], object]
@@ -176,11 +185,7 @@ class Expression:
         if node.id in _CONSTANTS:
             return _constant(_CONSTANTS[node.id])
         if node.id not in self.roots:
-            known = ", ".join(sorted(self.roots))
-            given = f"; {known} can be used bare" if known else ""
-            raise self._refusal(
-                node, f"unknown name {node.id!r}: a variable is written ${node.id}{given}"
-            )
+            raise self._refusal(node, _unknown_name(node.id, self.roots))
         return _root(node.id, *self.span(node))
 
     def _compile_bool(
@@ -278,8 +283,21 @@ def _syntax(text: str, column: int, error: SyntaxError) -> str:
     return "this is not an expression"
 
 
+def _unknown_name(name: str, roots: Iterable[str]) -> str:
+    known = ", ".join(sorted(roots))
+    if name in _FOREIGN:
+        return _FOREIGN[name]
+    if name in _ANSWERS:
+        instead = f"{known} can be used" if known else "save what it holds, and read that as $name"
+        return f"there is no {name} here: {instead}"
+    given = f"; {known} can be used bare" if known else ""
+    return f"unknown name {name!r}: a variable is written ${name}{given}"
+
+
 def _why_not(node: ast.expr) -> str:
     if isinstance(node, ast.Call):
+        if isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
+            return f"{node.func.id}() takes values only, not {node.keywords[0].arg or '**'}="
         return "only len, abs, min and max can be called"
     if isinstance(node, ast.Constant) and node.value is None:
         return "there is no 'None' here"

@@ -108,7 +108,24 @@ def _read_scalar(node: Scalar, source: Source) -> object:
         return _computed(node, source, text[2:], 2)
     if _VARIABLE.fullmatch(text):
         return _computed(node, source, text, 0)
+    if node.plain and _lacks_space(text):
+        span = inner_span(node, source, 0, 1)
+        quotes = "" if "$" in text else ", or put it in quotes to mean the text"
+        hint = f"write '= {text[1:]}'{quotes}"
+        source.report("BT114", span, "'=' computes only with a space behind it", hint=hint)
+        return BAD
     return _interpolated(node, source)
+
+
+def _lacks_space(text: str) -> bool:
+    """Whether a text is an expression but for the space behind its '='."""
+    if not text.startswith("="):
+        return False
+    try:
+        _expression(text[1:], frozenset())
+    except ExpressionError:
+        return False
+    return True
 
 
 def names_file(text: str) -> bool:
@@ -168,6 +185,8 @@ def _interpolated(node: Scalar, source: Source) -> object:
         if match[1] is None:
             span = inner_span(node, source, match.start(), match.end())
             hint = "write $(name) inside a text, and $$ for a dollar sign"
+            if _lacks_space(text):
+                hint = f"write '= {text[1:]}' with a space to compute it"
             source.report("BT115", span, "this dollar sign refers to nothing", hint=hint)
             return BAD
         written = "$" + match[1].strip()

@@ -237,6 +237,12 @@ def test_a_value_that_does_not_fit_is_a_value_error(text: str, kind: str) -> Non
         parse_input(text, kind)
 
 
+def test_a_computed_value_on_the_command_line_needs_its_space_too() -> None:
+    assert parse_input("[= 1 + 1]", "int32[]") == [2]
+    with pytest.raises(ValueError, match=r"'=' computes only with a space behind it"):
+        parse_input("[=1 + 1]", "int32[]")
+
+
 def test_two_loads_of_a_tree_share_nothing(load: Load) -> None:
     text = """
     tree: t
