@@ -162,7 +162,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
         ),
         "BT116": Page(
             "A '#' behind a space begins a comment, wherever it stands. Put the text in quotes "
-            "where it belongs to it.",
+            "where it belongs to it. Where a space follows the '#', a comment was meant, and "
+            "nothing is said; nor is it behind numbers, times and single words of the language.",
             _tree("root: \n  success: Part #3\n"),
             _tree('root: \n  success: "Part #3"\n'),
         ),

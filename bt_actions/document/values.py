@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
 from bt_actions.document.source import Source, read_source
@@ -83,7 +84,12 @@ _DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
 def read_value(node: Node, source: Source) -> object:
     """Plain data with `Computed` and `Interpolated` in it, or BAD after reporting what is wrong."""
     if isinstance(node, Scalar):
-        return _read_scalar(node, source)
+        value = _read_scalar(node, source)
+        if isinstance(value, (str, Interpolated)):
+            warn_cut(node, source, "text")
+        elif isinstance(value, Computed) and value.start:  # $name alone may be a number
+            warn_cut(node, source, "expression")
+        return value
     bad = False
     if isinstance(node, Listing):
         items = [read_value(item, source) for item in node.items]
@@ -215,7 +221,7 @@ def read_expression(
         return _expression(text, roots)
     except ExpressionError as error:
         span = inner_span(node, source, start + error.column, start + error.end_column)
-        source.report("BT114", span, error.message, hint=_cut_hint(node, source))
+        source.report("BT114", span, error.message, hint=cut_hint(node, source))
         return None
 
 
@@ -223,13 +229,6 @@ def read_expression(
 def _expression(text: str, roots: frozenset[str]) -> Expression:
     """An expression never changes, and a tree says the same thing in many places."""
     return Expression(text, roots=roots)
-
-
-def _cut_hint(node: Scalar, source: Source) -> str | None:
-    line = source.line(node.end_line) or ""
-    if node.plain and line[node.end_column - 1 :].lstrip().startswith("#"):
-        return "the '#' after it begins a comment: put the text in quotes"
-    return None
 
 
 def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
