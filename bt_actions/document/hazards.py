@@ -101,8 +101,9 @@ class _Hazards:
     def _parallel(self, node: TreeNode) -> None:
         taken: dict[str, TreeNode] = {}
         for child in node.children:
-            for resource, user in resources_below(child, self._document).items():
-                first = taken.get(resource)
+            below = resources_below(child, self._document)
+            for resource, user in below.items():
+                first = taken.get(resource.lstrip("/"))
                 if first is None:
                     continue
                 place = first.place
@@ -114,8 +115,8 @@ class _Hazards:
                     hint="busy: share, where both may run at once",
                 )  # fmt: skip
                 break
-            for resource, user in resources_below(child, self._document).items():
-                taken.setdefault(resource, user)
+            for resource, user in below.items():
+                taken.setdefault(resource.lstrip("/"), user)
 
     # BT305, BT306, BT307
 
@@ -133,7 +134,7 @@ class _Hazards:
 
     def _reactive(self, node: TreeNode, kind: str) -> None:
         for at, child in enumerate(node.children[:-1]):
-            action = next((n for n in child.walk() if _is_action(n)), None)
+            action = _restarted(child)
             later = any(_takes_time(n) for other in node.children[at + 1 :] for n in other.walk())
             can = self._verdicts.of(child)
             if action is not None and later and (can.succeed if kind == "sequence" else can.fail):
@@ -162,7 +163,10 @@ class _Hazards:
         seen = {*document.inputs, *document.topics}
         writers = Counter(write.name for n in root.walk() for write in self._checker.writes_of(n))
 
-        def visit(node: TreeNode, around: frozenset[str]) -> None:
+        def below(node: TreeNode) -> set[str]:
+            return {write.name for n in node.walk() for write in self._checker.writes_of(n)}
+
+        def visit(node: TreeNode, around: frozenset[str], later: frozenset[str]) -> None:
             kind = node.kind.name if node.kind is not None else ""
             own = {write.name for write in self._checker.writes_of(node)}
             each = kind == "for_each"
@@ -175,13 +179,17 @@ class _Hazards:
             self._early(node, known)
             if each:
                 seen.update(own)
-            if kind in _LOOPS or node.values.get("memory") is False:
-                around |= {write.name for n in node.walk() for write in self._checker.writes_of(n)}
+            if kind == "repeat":  # a read in its first round has nothing yet
+                later |= below(node)
+            elif kind in _LOOPS or node.values.get("memory") is False:
+                around |= below(node)
+            if kind not in ("repeat", "sequence"):  # who may go on after a read that failed
+                around |= later
             for child in node.children:
-                visit(child, around)
+                visit(child, around, later)
             seen.update(own)
 
-        visit(root, frozenset())
+        visit(root, frozenset(), frozenset())
 
     def _early(self, node: TreeNode, known: Callable[[str], bool]) -> None:
         checker = self._checker
@@ -244,6 +252,19 @@ def _key_of(written: object, node: TreeNode, name: str) -> object:
 
 def _is_action(node: TreeNode) -> bool:
     return node.alias is not None or (node.kind is not None and node.kind.name == "action")
+
+
+def _restarted(root: TreeNode) -> TreeNode | None:
+    """The first action below that is sent again when `root` begins anew, or the tree it is in."""
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        inner = node.included.root if node.included is not None else None
+        if _is_action(node) or (inner is not None and _restarted(inner) is not None):
+            return node
+        if node.kind is None or node.kind.name != "run_once":
+            stack.extend(reversed(node.children))
+    return None
 
 
 def _takes_time(node: TreeNode) -> bool:
