@@ -15,6 +15,8 @@ __all__ = ["cut_hint", "warn_cut"]
 def warn_cut(node: Scalar, source: Source, what: str) -> None:
     """Say so where a comment begins without a space behind its '#'; `what` was cut."""
     rest = _behind(node, source)
+    if not rest:
+        return
     mark = rest.lstrip()
     if len(mark) < 2 or mark[0] != "#" or mark[1] in " \t#!":
         return
@@ -34,7 +36,6 @@ def cut_hint(node: Scalar, source: Source) -> str | None:
 
 
 def _behind(node: Scalar, source: Source) -> str:
-    """What stands behind a plain text on its line."""
-    if not node.plain:
-        return ""
-    return (source.line(node.end_line) or "")[node.end_column - 1 :]
+    """What stands behind a plain text on its line, if a '#' is on that."""
+    line = source.line(node.end_line) if node.plain else None
+    return "" if line is None or "#" not in line else line[node.end_column - 1 :]
