@@ -103,7 +103,7 @@ def examine(kind: FieldType, data: object, hole: Hole | None = None) -> list[Pro
     `hole` is asked first about each value, with the type it must have: True means that it is
     settled there (a variable, whose type the caller checks).
     """
-    filler = _Filler(time.time_ns, hole)
+    filler = _Filler(time.time_ns, hole, makes=False)
     filler.convert(kind, data, ())
     return filler.problems
 
@@ -133,10 +133,12 @@ def dotted(path: Iterable[str | int]) -> str:
 class _Filler:
     """Walks type and data together; collects problems instead of raising at the first."""
 
-    def __init__(self, now: Callable[[], int], hole: Hole | None) -> None:
+    def __init__(self, now: Callable[[], int], hole: Hole | None, *, makes: bool = True) -> None:
+        """With `makes=False` only the problems count: what a hole stands for is not there yet."""
         self.problems: list[Problem] = []
         self._now = now
         self._hole = hole
+        self._makes = makes
         self._owner: type | None = None
 
     def convert(self, kind: FieldType, value: object, path: Path) -> Any:
@@ -165,7 +167,7 @@ class _Filler:
             self._bad(path, f"the fields of a {short_name(cls)} are needed, not {show(value)}")
             return None
         known = describe(cls)
-        message: Any = cls()
+        message: Any = cls() if self._makes else None
         outer, self._owner = self._owner, cls
         for name, item in value.items():
             kind = known.get(name) if isinstance(name, str) else None
@@ -174,7 +176,7 @@ class _Filler:
                 continue
             before = len(self.problems)
             converted = self.convert(kind, item, (*path, name))
-            if len(self.problems) == before and converted is not None:
+            if self._makes and len(self.problems) == before and converted is not None:
                 setattr(message, name, converted)
         self._owner = outer
         return message
