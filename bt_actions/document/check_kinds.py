@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import FLOAT, INTEGER, named
 from bt_actions.document.nodes import Mapping as YamlMapping
-from bt_actions.document.nodes import span_of
+from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.tree import TreeNode
 from bt_actions.document.types import TypeNameError, fits, parse_type
 from bt_actions.document.values import BAD, Computed, computed_in, locate
@@ -210,9 +210,10 @@ def _python(checker: Checker, node: TreeNode) -> None:
         return
     wrong = wrong_arguments(cls, arguments)
     if wrong is not None:
-        name, text = wrong
-        at = node.key if not name else locate(node.written["arguments"], (name,), at_key=True)
-        checker.source.report("BT215", span_of(at), text)
+        at: Node = node.key
+        if wrong.name:
+            at = locate(node.written["arguments"], (wrong.name,), at_key=wrong.at_key)
+        checker.source.report("BT215", span_of(at), wrong.text)
 
 
 CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
