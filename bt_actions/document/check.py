@@ -28,7 +28,7 @@ from bt_actions.document.values import (
 )
 from bt_actions.document.writes import Write, writes_of
 from bt_actions.ros.fields import FieldType, Message
-from bt_actions.suggest import did_you_mean, listing
+from bt_actions.suggest import closest, listing
 
 __all__ = ["Checker", "Read"]
 
@@ -298,6 +298,7 @@ class Checker:
         for problem in examine(kind, value, hole):
             at = locate(node, problem.path, at_key=problem.at_key)
             if report_braces(at, self.source):
+                self.source.unread.nodes.append(at)
                 continue
             code = "BT203" if problem.at_key else "BT204"
             text = problem.text
@@ -336,9 +337,13 @@ class Checker:
         if self.document.node.get("root") is None:
             return  # a library's words are read with the names of whoever imports it
         span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
-        near = did_you_mean(name, self.variables).replace("mean '", "mean '$")
+        meant = closest(name, self.variables)
+        near = f"; did you mean '${meant}'?" if meant else ""
         hint = None
-        if not near:
+        if meant:
+            self.source.unread.meant.add(meant)
+        else:
+            self.source.unread.variables = True
             known = listing(f"${known}" for known in self.variables)
             hint = (
                 f"this tree has {known}" if known else "this tree has no inputs and saves nothing"

@@ -18,6 +18,7 @@ from bt_actions.document.ignores import apply_ignores
 from bt_actions.document.inputs import TreeInput, check_inputs, inputs_of
 from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.tree import Document
+from bt_actions.document.unread import Doubts
 from bt_actions.document.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -133,10 +134,9 @@ def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[
         for document in workspace.documents:
             checker = Checker(document, types=types, python=python)
             checker.check()
-            sound = not document.source.has_errors
-            if sound:  # what is wrong already would be told twice
-                find_hazards(checker)
-            apply_ignores(document.source, complete=sound)
+            doubts = Doubts(document)
+            find_hazards(checker, doubts)
+            apply_ignores(document.source, complete=not doubts.any)
     except TooManyErrors:
         return workspace.findings
     return workspace.findings

@@ -257,7 +257,9 @@ class _Composer:
         elif frame.key is None:
             frame.key = self._key(frame, node)
         else:
-            if frame.key is not _REFUSED:
+            if frame.key is _REFUSED:
+                self._source.unread.nodes.append(node)
+            else:
                 owner.pairs.append((frame.key, node))
             frame.key = None
 
@@ -288,6 +290,7 @@ class _Composer:
                 if not isinstance(merged, Mapping):
                     message = "'<<' merges a mapping, or a list of mappings"
                     self._source.report("BT109", span_of(merged), message)
+                    self._source.unread.nodes.append(merged)
                     continue
                 for inner_key, inner_value in merged.pairs:
                     if inner_key.text not in own:

@@ -9,11 +9,17 @@ import re
 import stat
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bt_actions.document.findings import DocumentError, Finding, Related, Severity, Span
 from bt_actions.document.rules import RULES
 
-__all__ = ["MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "read_source", "source_of"]
+if TYPE_CHECKING:
+    from bt_actions.document.nodes import Node
+
+__all__ = [
+    "MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "Unread", "read_source", "source_of",
+]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
 """The largest file that is read; a tree of 100,000 nodes has about a third of it."""
@@ -26,6 +32,21 @@ class TooManyErrors(Exception):
     """A document has more errors than anybody wants to read; they are in its source."""
 
 
+@dataclass(slots=True)
+class Unread:
+    """What was reported and is read no further; `unread.py` says what follows from it."""
+
+    nodes: list[Node] = field(default_factory=list)
+    meant: set[str] = field(default_factory=set)
+    """Names that unknown ones probably stand for."""
+    names: bool = False
+    """Whether any name may have been declared: in a file that is not there, as a loop's item."""
+    variables: bool = False
+    """Whether a variable is unknown, and nothing says which is meant."""
+    actions: bool = False
+    """Whether a node's kind is unknown."""
+
+
 @dataclass(slots=True, eq=False)
 class Source:
     """A document's text, the name it is known by, and the findings in it so far."""
@@ -36,6 +57,7 @@ class Source:
     findings: list[Finding] = field(default_factory=list)
     anchored: bool = False
     """Whether the text names parts of itself (&name); known after it was composed."""
+    unread: Unread = field(default_factory=Unread)
     _lines: list[str] | None = None
 
     @property

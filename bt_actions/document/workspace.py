@@ -137,6 +137,7 @@ class Workspace:
         for name, node in zip(names, nodes, strict=True):
             library = self._library(str(name), node, document.source, chain)
             if library is None:
+                document.source.unread.names = True
                 continue
             document.imported.append(library)
             for theirs, ours in (
