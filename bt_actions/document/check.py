@@ -17,6 +17,7 @@ from bt_actions.document.shape import report_braces
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.types import TypeNameError, fits, interface_of, parse_type
+from bt_actions.document.unread import Doubts
 from bt_actions.document.values import (
     BAD,
     Computed,
@@ -52,6 +53,8 @@ class Checker:
         """With `python=False` a ``python:`` node is an error, and its module is not imported."""
         self.document = document
         self.source = document.source
+        self.doubts = Doubts(document)
+        self._doubts_of: dict[int, Doubts] = {}
         self.types = types
         self.python = python
         self.variables: dict[str, FieldType | None] = {}
@@ -149,6 +152,13 @@ class Checker:
                     self.source.report("BT205", span_of(node), str(error))
         return self._interfaces[known]
 
+    def doubts_of(self, included: Document) -> Doubts:
+        """What is not certain about a tree that this one includes."""
+        known = self._doubts_of.get(id(included))
+        if known is None:
+            known = self._doubts_of[id(included)] = Doubts(included)
+        return known
+
     def writes_of(self, node: TreeNode) -> tuple[Write, ...]:
         """The variables that a node writes."""
         return self._writes.get(id(node), ())
@@ -183,7 +193,8 @@ class Checker:
             for name, (start, end) in computed.expression.variable_spans:
                 read = Read(name, computed, start, end)
                 self.reads.setdefault(id(declared), []).append(read)
-                if name not in self.variables and node is not None:
+                unknown = name not in self.variables and not self.doubts.declares(name)
+                if unknown and node is not None:
                     text = f"the imported action {declared.name!r} reads ${name}, which is not here"
                     related = Related(declared.place, "declared here")
                     self.source.report("BT202", span_of(node), text, related=related)
@@ -334,10 +345,11 @@ class Checker:
         return infer(expression, roots, self.variables.get, report)
 
     def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
-        if self.document.node.get("root") is None:
+        if self.document.node.get("root") is None or self.doubts.declares(name):
             return  # a library's words are read with the names of whoever imports it
         span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
-        meant = closest(name, self.variables)
+        maybe = self.doubts.declared
+        meant = closest(name, self.variables) or closest(name, maybe)
         near = f"; did you mean '${meant}'?" if meant else ""
         hint = None
         if meant:
@@ -345,9 +357,8 @@ class Checker:
         else:
             self.source.unread.variables = True
             known = listing(f"${known}" for known in self.variables)
-            hint = (
-                f"this tree has {known}" if known else "this tree has no inputs and saves nothing"
-            )
+            nothing = None if maybe else "this tree has no inputs and saves nothing"
+            hint = f"this tree has {known}" if known else nothing
         self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
 
 

@@ -12,7 +12,7 @@ from bt_actions.document.nodes import Mapping as YamlMapping
 from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.tree import TreeNode
 from bt_actions.document.types import TypeNameError, fits, parse_type
-from bt_actions.document.values import BAD, Computed, computed_in, locate
+from bt_actions.document.values import Computed, computed_in, locate
 from bt_actions.ros.fields import FieldType, Listing, Message
 from bt_actions.suggest import did_you_mean, listing
 
@@ -31,8 +31,12 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
             checker.value(None, given, written)
         return
     if isinstance(given, dict) and isinstance(written, YamlMapping):
+        doubts = checker.doubts_of(included)
         for key, inner in written.pairs:
             declared = included.inputs.get(key.text)
+            if declared is None and doubts.declares(key.text):
+                checker.value(None, given.get(key.text), inner)
+                continue
             if declared is None:
                 near = did_you_mean(key.text, included.inputs)
                 known = listing(included.inputs)
@@ -53,7 +57,7 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
                 except TypeNameError:
                     kind = None  # reported where it is declared
             checker.value(kind, given.get(key.text), inner)
-    if given is not BAD and (given is None or isinstance(given, dict)):
+    if (given is None and not checker.doubts.own(node)) or isinstance(given, dict):
         for name, declared in included.inputs.items():
             if "default" not in declared.values and name not in (given or {}):
                 checker.source.report(
@@ -75,6 +79,8 @@ def _outputs(checker: Checker, node: TreeNode) -> None:
         if not isinstance(output, str):
             continue
         declared = included.outputs.get(output)
+        if declared is None and checker.doubts_of(included).declares(output):
+            continue
         if declared is None:
             near = did_you_mean(output, included.outputs)
             known = listing(included.outputs)

@@ -134,7 +134,7 @@ def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[
         for document in workspace.documents:
             checker = Checker(document, types=types, python=python)
             checker.check()
-            doubts = Doubts(document)
+            doubts = Doubts(document)  # anew: the checker found more
             find_hazards(checker, doubts)
             apply_ignores(document.source, complete=not doubts.any)
     except TooManyErrors:

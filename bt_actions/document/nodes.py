@@ -190,6 +190,8 @@ class _Composer:
             node.plain = False
             if tag not in ("!", "tag:yaml.org,2002:str"):
                 self._report("BT109", event, f"the tag {tag!r} has no meaning in a tree")
+                self._source.settled.add(_event_span(event))
+                self._source.unread.nodes.append(node)
         _place(node, event)
         if event.anchor is not None:
             self._source.anchored = True

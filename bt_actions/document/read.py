@@ -16,6 +16,7 @@ from bt_actions.document.shape import words_for
 from bt_actions.document.shapes import Key, read_keys, report_unknown_key
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.unread import Doubts
 from bt_actions.document.values import BAD
 from bt_actions.suggest import closest, did_you_mean, listing
 
@@ -117,7 +118,7 @@ class _Reader:
     def __init__(self, document: Document) -> None:
         self._source = document.source
         self._actions = document.actions
-        self._topics = document.topics
+        self._doubts = Doubts(document)
 
     def node(self, written: Node) -> TreeNode | None:
         node = self._node(written)
@@ -179,10 +180,12 @@ class _Reader:
             hint = "one key of a node is its kind, such as 'sequence: name'"
             self._source.report("BT111", _first(written), "this node has no kind", hint=hint)
             return
+        self._source.unread.actions = True
+        if any(self._doubts.declares(word.text) for word in words):
+            return
         known = [*KINDS, *self._actions]
         key = next((word for word in words if closest(word.text, known)), words[0])
         near = did_you_mean(key.text, known)
-        self._source.unread.actions = True
         own = listing(self._actions)
         hint = f"this tree's actions are {own}" if own else "this tree declares no actions"
         message = f"no kind of node and no action is called {key.text!r}{near}"

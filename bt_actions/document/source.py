@@ -58,6 +58,8 @@ class Source:
     anchored: bool = False
     """Whether the text names parts of itself (&name); known after it was composed."""
     unread: Unread = field(default_factory=Unread)
+    settled: set[Span] = field(default_factory=set)
+    """Scalars about which enough was said."""
     _lines: list[str] | None = None
 
     @property
@@ -82,6 +84,8 @@ class Source:
         related: Related | None = None,
     ) -> None:
         """File a finding; its severity is its rule's. Raises TooManyErrors after `MAX_ERRORS`."""
+        if span in self.settled:
+            return
         if len(self.findings) >= MAX_ERRORS and RULES[code].severity is Severity.ERROR:
             raise TooManyErrors
         line = self.line(span.line)

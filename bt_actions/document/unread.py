@@ -18,6 +18,8 @@ from bt_actions.document.tree import Document, TreeNode
 __all__ = ["Doubts"]
 
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
+_NAME = re.compile(r"[A-Za-z0-9_ -]+")
+"""What somebody may have written as a name, and no expression."""
 _KNOWN = ("root", "inputs", "outputs", "actions", "topics")
 """Keys at the top of a tree whose values say nothing about the settings of all actions."""
 
@@ -52,7 +54,12 @@ class Doubts:
 
     def declares(self, name: str) -> bool:
         """Whether a name may be declared in what could not be read."""
-        return any(part.names for part in self._parts) or name in self._all_words().declared
+        return any(part.names for part in self._parts) or name in self.declared
+
+    @property
+    def declared(self) -> set[str]:
+        """The words of what could not be read that may be names."""
+        return self._all_words().declared
 
     def mentions(self, name: str) -> bool:
         """Whether a name may stand in what could not be read, or be what an unknown one means."""
@@ -148,11 +155,12 @@ def _collect(nodes: list[Node], words: _Words) -> None:
         seen.add(id(node))
         if isinstance(node, Mapping):
             for key, value in node.pairs:
-                words.declared.add(key.text)
-                words.mentioned.add(key.text)
-                waiting.append(value)
+                waiting += (key, value)
         elif isinstance(node, Listing):
             waiting.extend(node.items)
         elif isinstance(node, Scalar):
-            words.mentioned.update(_WORD.findall(node.text))
+            found = _WORD.findall(node.text)
+            words.mentioned.update(found)
             words.declared.add(node.text)
+            if _NAME.fullmatch(node.text):
+                words.declared.update(found)
