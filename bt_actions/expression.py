@@ -17,6 +17,7 @@ from bt_actions.expression_values import (
     COMPARE,
     FUNCTIONS,
     MAX_BITS,
+    ONE_VALUE,
     UNARY,
     bounded,
     call,
@@ -165,6 +166,8 @@ class Expression:
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
                 if not args:
                     raise self._refusal(node, f"{name}() needs a value")
+                if len(args) > 1 and name in ONE_VALUE:
+                    raise self._refusal(node, f"{name}() takes one value, not {len(args)}")
                 return self._guard(node, call(name), *(part(arg) for arg in args))
         raise self._refusal(node, _why_not(node))
 

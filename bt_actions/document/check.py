@@ -23,11 +23,13 @@ from bt_actions.document.values import (
     Computed,
     Interpolated,
     computed_in,
+    constant_of,
     inner_span,
     locate,
     names_file,
 )
 from bt_actions.document.writes import Write, writes_of
+from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import FieldType, Message
 from bt_actions.suggest import closest, listing
 
@@ -292,10 +294,13 @@ class Checker:
         def hole(item: object, wanted: FieldType, _path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):
                 given = self.expression(item, {})
+                said = item.expression.text.strip()
                 if not fits(given, wanted):
-                    said = item.expression.text.strip()
                     text = f"{named(wanted)} is needed, and {said} is {named(given)}"
                     self.source.report("BT204", span_of(item.node), text)
+                elif (constant := constant_of(item)) is not None:
+                    for problem in examine(wanted, constant):
+                        self.source.report("BT204", span_of(item.node), problem.text)
                 return True
             if isinstance(item, Interpolated):
                 for part in computed_in(item):
@@ -333,8 +338,6 @@ class Checker:
             self.reads.setdefault(id(self._reader), []).append(Read(name, computed, start, end))
             if name not in self.variables:
                 self._unknown(name, computed, start, end)
-        if not self.types and not roots and not expression.names:
-            return None
 
         def report(code: str, message: str, start: int, end: int) -> None:
             span = inner_span(
@@ -342,6 +345,14 @@ class Checker:
             )
             self.source.report(code, span, message)
 
+        if not expression.names and not expression.roots:
+            try:
+                computed.evaluate(lambda _name: None)
+            except ExpressionError as error:
+                report("BT206", error.message, error.column, error.end_column)
+                return None
+        if not self.types and not roots and not expression.names:
+            return None
         return infer(expression, roots, self.variables.get, report)
 
     def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:

@@ -12,7 +12,7 @@ from bt_actions.document.nodes import Mapping as YamlMapping
 from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.tree import TreeNode
 from bt_actions.document.types import TypeNameError, fits, parse_type
-from bt_actions.document.values import Computed, computed_in, locate
+from bt_actions.document.values import Computed, computed_in, constant_of, locate
 from bt_actions.ros.fields import FieldType, Listing, Message
 from bt_actions.suggest import did_you_mean, listing
 
@@ -26,6 +26,11 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
     included = node.included
     given = node.values.get("with")
     written = node.written.get("with")
+    if isinstance(given, Computed):
+        kind = checker.expression(given, {})
+        if kind is not None:
+            said = f"a mapping of inputs to values is needed, and this is {named(kind)}"
+            checker.source.report("BT204", span_of(given.node), said)
     if included is None:
         if isinstance(given, dict) and written is not None:
             checker.value(None, given, written)
@@ -102,7 +107,9 @@ def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
     return lambda checker, node: checker.condition(node.values.get(key), {})
 
 
-def _number_of(key: str, wanted: FieldType) -> Callable[[Checker, TreeNode], None]:
+def _number_of(
+    key: str, wanted: FieldType, least: float = 0
+) -> Callable[[Checker, TreeNode], None]:
     def check(checker: Checker, node: TreeNode) -> None:
         value = node.values.get(key)
         if not isinstance(value, Computed):
@@ -111,11 +118,20 @@ def _number_of(key: str, wanted: FieldType) -> Callable[[Checker, TreeNode], Non
         if not fits(given, wanted):
             text = f"{named(wanted)} is needed, and this is {named(given)}"
             checker.source.report("BT204", span_of(value.node), text)
+            return
+        number = constant_of(value)
+        if isinstance(number, (int, float)) and not least <= number < float("inf"):
+            text = f"at least {least:g} is needed, not {number}"
+            checker.source.report("BT110", span_of(value.node), text)
 
     return check
 
 
 def _for_each(checker: Checker, node: TreeNode) -> None:
+    item, index = node.values.get("as", "item"), node.values.get("index")
+    if item == index and "index" in node.written:
+        text = f"the item and its index are both called {item!r}"
+        checker.source.report("BT216", span_of(node.written["index"]), text)
     items = node.values.get("in")
     if isinstance(items, Computed):
         kind = checker.expression(items, {})
@@ -232,7 +248,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "publish": _publish,
         "python": _python,
         "repeat": _number_of("times", INTEGER),
-        "retry": _number_of("attempts", INTEGER),
+        "retry": _number_of("attempts", INTEGER, 1),
         "service": _service,
         "set": _set,
         "subtree": _subtree,

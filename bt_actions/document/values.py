@@ -25,6 +25,7 @@ __all__ = [
     "Interpolated",
     "Lookup",
     "computed_in",
+    "constant_of",
     "inner_span",
     "locate",
     "names_file",
@@ -261,6 +262,16 @@ def computed_in(value: object) -> Iterator[Computed]:
     elif isinstance(value, list):
         for item in value:
             yield from computed_in(item)
+
+
+def constant_of(computed: Computed) -> object:
+    """The value of an expression over nothing but numbers and texts; None for any other."""
+    if computed.expression.names or computed.expression.roots:
+        return None
+    try:
+        return computed.evaluate(lambda _name: None)
+    except ExpressionError:
+        return None
 
 
 def resolve(value: object, variable: Lookup) -> object:
