@@ -28,7 +28,7 @@ from bt_actions.document.values import (
     locate,
     names_file,
 )
-from bt_actions.document.writes import Write, writes_of
+from bt_actions.document.writes import Write, infer_variables, writes_of
 from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import FieldType, Message
 from bt_actions.suggest import closest, listing
@@ -167,19 +167,12 @@ class Checker:
 
     def _collect(self) -> None:
         """The variables that nodes write, with their types as far as they are known."""
-        written: list[Write] = []
         for node in self.document.nodes():
             writes = tuple(writes_of(node, self.document))
             if writes:
                 self._writes[id(node)] = writes
-                written += writes
-        for write in written:
-            self.variables.setdefault(write.name, None)
-        # Twice, since a value may be computed from one that is written further down.
-        for _ in range(2):
-            open_ones = [write for write in written if self.variables[write.name] is None]
-            for write in open_ones:
-                self.variables[write.name] = write.type_in(self)
+        written = (write for writes in self._writes.values() for write in writes)
+        infer_variables(written, self)
 
     # Nodes
 
