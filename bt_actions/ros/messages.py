@@ -209,7 +209,7 @@ class _Filler:
     def _scalar(self, kind: Scalar, value: object, path: Path) -> Any:
         if type(value).__module__ == "numpy" and hasattr(value, "item"):
             value = value.item()
-        if isinstance(value, str) and kind.name not in ("string", "wstring") and self._owner:
+        if isinstance(value, str) and kind.name not in ("string", "wstring"):
             try:
                 value = constant(value, self._owner)
             except ValueError as error:

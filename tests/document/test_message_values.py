@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
 
 from bt_actions.document import check_source, source_of
+from tests.document.conftest import tick
+
+Load = Callable[..., Behaviour]
 
 
 def said(type_name: str, message: str, inputs: str = "a: float64, u: uint8") -> list[str]:
@@ -35,3 +42,43 @@ def test_a_variable_may_stand_in_an_array_of_numbers(type_name: str, message: st
 def test_a_variable_in_an_array_must_fit_its_items() -> None:
     found = said("std_msgs/msg/Int32MultiArray", "{data: [1, $a]}")
     assert found == ["BT204 an int32 is needed, and $a is a float64"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "MoveRobot.Feedback.STATUS_MOVING",
+        "robot_control_interfaces/action/MoveRobot.Feedback.STATUS_MOVING",
+        "BatteryState.POWER_SUPPLY_STATUS_FULL",
+    ],
+)
+def test_a_constant_may_be_named_where_any_number_is_needed(name: str) -> None:
+    assert said("std_msgs/msg/UInt8", f"{{data: {name}}}") == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("MoveRobot.Feedback.STATUS_MOVIN", "; did you mean 'STATUS_MOVING'?"),
+        ("MoveRobt.Feedback.STATUS_MOVING", "no message class 'MoveRobt.Feedback' is known here"),
+        ("STATUS_MOVING", "has no constant 'STATUS_MOVING'"),
+    ],
+)
+def test_a_constant_that_is_not_there_is_told(name: str, text: str) -> None:
+    (found,) = said("std_msgs/msg/UInt8", f"{{data: {name}}}")
+    assert text in found
+
+
+def test_a_variable_with_a_type_takes_a_constant_by_its_name(load: Load) -> None:
+    root = load(
+        """
+        tree: t
+        outputs: {status: uint8}
+        root:
+          sequence: S
+          children:
+            - set: {status: MoveRobot.Feedback.STATUS_MOVING}
+            - check: $status == 1
+        """
+    )
+    assert tick(root) is Status.SUCCESS
