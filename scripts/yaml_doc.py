@@ -84,7 +84,7 @@ In the fields of a message:
 |---|---|
 | builtin_interfaces/Time | `now`, seconds, or `{{sec, nanosec}}` |
 | builtin_interfaces/Duration | `500 ms`, seconds, or `{{sec, nanosec}}` |
-| geometry_msgs/Quaternion | `{{yaw: 90 deg}}`, with `roll` and `pitch`, or `{{x, y, z, w}}` |
+| geometry_msgs/Quaternion | `{{yaw: 90 deg}}` (`$a`: radians), `roll`, `pitch`; or its fields |
 | a number with constants | `STATUS_MOVING`, `MoveRobot.Feedback.STATUS_MOVING`, `pkg/msg/X.NAME` |
 
 @messages

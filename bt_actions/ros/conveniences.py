@@ -17,14 +17,14 @@ from bt_actions.ros.interfaces import Kind, UnknownInterface, installed, interfa
 from bt_actions.suggest import did_you_mean
 from bt_actions.units import parse_angle, parse_duration
 
-__all__ = ["constant", "duration_of", "quaternion_of", "time_of"]
+__all__ = ["ANGLES", "constant", "duration_of", "quaternion_of", "time_of"]
 
 _BILLION = 1_000_000_000
 _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
 _PARTS = ("Goal", "Result", "Feedback", "Request", "Response")
 _KINDS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
                            "Request": "srv", "Response": "srv"}  # fmt: skip
-_ANGLES = ("roll", "pitch", "yaw")
+ANGLES = ("roll", "pitch", "yaw")
 
 
 def time_of(value: object, now: Callable[[], int]) -> object:
@@ -55,12 +55,12 @@ def _seconds(value: object) -> object:
 
 def quaternion_of(value: object) -> object:
     """``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields."""
-    if not isinstance(value, Mapping) or not any(name in value for name in _ANGLES):
+    if not isinstance(value, Mapping) or not any(name in value for name in ANGLES):
         return value
     for name in value:
-        if name not in _ANGLES:
+        if name not in ANGLES:
             raise ValueError(f"roll, pitch and yaw stand alone: {name!r} cannot be beside them")
-    roll, pitch, yaw = (parse_angle(value.get(name, 0.0)) / 2 for name in _ANGLES)
+    roll, pitch, yaw = (parse_angle(value.get(name, 0.0)) / 2 for name in ANGLES)
     sin_r, cos_r, sin_p, cos_p = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     sin_y, cos_y = math.sin(yaw), math.cos(yaw)
     return {

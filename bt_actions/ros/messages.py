@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bt_actions.ros.conveniences import constant, duration_of, quaternion_of, time_of
+from bt_actions.ros.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
 from bt_actions.ros.fields import (
     FLOATS,
     INTEGERS,
@@ -157,7 +157,7 @@ class _Filler:
         if isinstance(value, cls):
             return value
         try:
-            value = self._convenience(cls, value)
+            value = self._convenience(cls, value, path)
         except ValueError as error:
             self._bad(path, str(error))
             return None
@@ -181,7 +181,7 @@ class _Filler:
         self._owner = outer
         return message
 
-    def _convenience(self, cls: type, value: object) -> object:
+    def _convenience(self, cls: type, value: object, path: Path) -> object:
         """What may be written instead of the fields of a time, a duration or a quaternion."""
         name = interface_name(cls)
         if name == "builtin_interfaces/msg/Time":
@@ -189,8 +189,20 @@ class _Filler:
         if name == "builtin_interfaces/msg/Duration":
             return duration_of(value)
         if name == "geometry_msgs/msg/Quaternion":
-            return quaternion_of(value)
+            return quaternion_of(self._without_holes(value, path))
         return value
+
+    def _without_holes(self, value: object, path: Path) -> object:
+        """Angles of which some are settled elsewhere: numbers, in radians."""
+        if self._hole is None or not isinstance(value, Mapping):
+            return value
+        if not any(name in value for name in ANGLES):
+            return value
+        radians = Scalar("float64")
+        return {
+            name: 0.0 if self._hole(angle, radians, (*path, str(name))) else angle
+            for name, angle in value.items()
+        }
 
     def _listing(self, kind: Listing, value: object, path: Path) -> Any:
         to_list = getattr(value, "tolist", None)

@@ -82,3 +82,39 @@ def test_a_variable_with_a_type_takes_a_constant_by_its_name(load: Load) -> None
         """
     )
     assert tick(root) is Status.SUCCESS
+
+
+@pytest.mark.parametrize("angle", ["$a", "= $a * 2", "90 deg", "$u"])
+def test_a_variable_may_be_an_angle_in_radians(angle: str) -> None:
+    message = f"{{orientation: {{yaw: {angle}, roll: 10 deg}}}}"
+    assert said("geometry_msgs/msg/Pose", message) == []
+
+
+@pytest.mark.parametrize(
+    ("angles", "text"),
+    [
+        ("{yaw: $s}", "BT204 a float64 is needed, and $s is a string"),
+        ("{yaw: $nope}", "BT202 there is no variable $nope"),
+        ("{yaw: $a, w: 1}", "BT204 roll, pitch and yaw stand alone: 'w' cannot be beside them"),
+        ("{yaw: $a, roll: far}", "BT204 an angle is needed, such as '90 deg', not 'far'"),
+    ],
+)
+def test_a_variable_that_is_no_angle_is_told(angles: str, text: str) -> None:
+    inputs = "a: float64, s: string"
+    assert said("geometry_msgs/msg/Pose", f"{{orientation: {angles}}}", inputs) == [text]
+
+
+def test_an_angle_that_a_variable_gives_becomes_a_quaternion(load: Load) -> None:
+    root = load(
+        """
+        tree: t
+        inputs: {a: {type: float64, default: 1.0}}
+        outputs: {turn: geometry_msgs/msg/Quaternion}
+        root:
+          sequence: S
+          children:
+            - set: {turn: {yaw: = $a * 2}}
+            - check: $turn.z > 0.84 and $turn.z < 0.85
+        """
+    )
+    assert tick(root) is Status.SUCCESS
