@@ -75,7 +75,8 @@ Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, 
 `float64[<=3]`. A whole number is a fine float; a fraction is no whole number.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
-`abs`, `min` and `max`, and `true` and `false`. In `expect`, `save` and `when` the bare name
+`abs`, `min` and `max`, `true` and `false`, and constants (`MoveRobot.Result.STATUS_FAULT`). In
+`expect`, `save` and `when` the bare name
 `result` is the result; in `until` and `save` of `wait_for_message`, `message` is the message.
 
 In the fields of a message:

@@ -338,7 +338,7 @@ class Checker:
             )
             self.source.report(code, span, message)
 
-        if not expression.names and not expression.roots:
+        if not expression.names and not expression.roots and not expression.constants:
             try:
                 computed.evaluate(lambda _name: None)
             except ExpressionError as error:
@@ -346,7 +346,7 @@ class Checker:
                 return None
         if not self.types and not roots and not expression.names:
             return None
-        return infer(expression, roots, self.variables.get, report)
+        return infer(expression, roots, self.variables.get, report, types=self.types)
 
     def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
         if self.document.node.get("root") is None or self.doubts.declares(name):

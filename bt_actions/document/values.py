@@ -204,7 +204,13 @@ def read_expression(
 @lru_cache(maxsize=4096)
 def _expression(text: str, roots: frozenset[str]) -> Expression:
     """An expression never changes, and a tree says the same thing in many places."""
-    return Expression(text, roots=roots)
+    return Expression(text, roots=roots, constants=_named_constant)
+
+
+def _named_constant(name: str) -> object:
+    from bt_actions.ros.conveniences import constant  # here, so that reading a tree needs no ROS
+
+    return constant(name, None)
 
 
 def _cut_hint(node: Scalar, source: Source) -> str | None:
@@ -266,7 +272,8 @@ def computed_in(value: object) -> Iterator[Computed]:
 
 def constant_of(computed: Computed) -> object:
     """The value of an expression over nothing but numbers and texts; None for any other."""
-    if computed.expression.names or computed.expression.roots:
+    expression = computed.expression
+    if expression.names or expression.roots or expression.constants:
         return None
     try:
         return computed.evaluate(lambda _name: None)

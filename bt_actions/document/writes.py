@@ -43,7 +43,8 @@ class Write:
         if not isinstance(self.value, Computed):
             return type_of_literal(self.value)
         roots = {} if self.root is None else {self.root: _root_type(self.node, self.root, checker)}
-        return infer(self.value.expression, roots, checker.variables.get, lambda *_: None)
+        return infer(self.value.expression, roots, checker.variables.get, lambda *_: None,
+                     types=checker.types)  # fmt: skip
 
     def _item_type(self, checker: Checker) -> FieldType | None:
         """The type of what a for_each gives its child."""
@@ -52,7 +53,8 @@ class Write:
             return kinds.pop() if len(kinds) == 1 else None
         if not isinstance(self.value, Computed):
             return None
-        kind = infer(self.value.expression, {}, checker.variables.get, lambda *_: None)
+        kind = infer(self.value.expression, {}, checker.variables.get, lambda *_: None,
+                     types=checker.types)  # fmt: skip
         return kind.item if isinstance(kind, Listing) else None
 
     def _output_type(self, checker: Checker) -> FieldType | None:

@@ -9,6 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.document import check_source, source_of
+from bt_actions.expression import Expression, ExpressionError
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]
@@ -118,3 +119,34 @@ def test_an_angle_that_a_variable_gives_becomes_a_quaternion(load: Load) -> None
         """
     )
     assert tick(root) is Status.SUCCESS
+
+
+def test_a_constant_of_a_message_may_stand_in_an_expression(load: Load) -> None:
+    root = load(
+        """
+        tree: t
+        inputs: {status: {type: uint8, default: 1}}
+        root:
+          sequence: S
+          children:
+            - check: $status == MoveRobot.Feedback.STATUS_MOVING
+            - check: $status in [MoveRobot.Result.STATUS_CANCELED, 7]
+        """
+    )
+    assert tick(root) is Status.SUCCESS
+
+
+def test_without_types_no_constant_is_looked_up() -> None:
+    text = b"tree: t\nroot: {check: 1 == NoSuch.Result.STATUS}\n"
+    assert check_source(source_of(text, "t"), types=False) == []
+    assert [one.code for one in check_source(source_of(text, "t"))] == ["BT203"]
+
+
+def test_a_constant_that_is_not_there_has_no_value() -> None:
+    def none_there(name: str) -> object:
+        raise ValueError(f"no {name}")
+
+    expression = Expression("A.B == 1", roots=(), constants=none_there)
+    assert expression.constants == ["A.B"]
+    with pytest.raises(ExpressionError, match=r"no A\.B"):
+        expression.evaluate({}, lambda name: name)
