@@ -17,6 +17,7 @@ from bt_actions.expression_values import (
     COMPARE,
     FUNCTIONS,
     MAX_BITS,
+    ONE_VALUE,
     UNARY,
     bounded,
     call,
@@ -52,13 +53,25 @@ class Expression:
     """An expression that was read and found well-formed.
 
     `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `names` are
-    the variables it reads, without the dollar sign; `tree` is its syntax tree, for type-checkers.
+    the variables it reads, without the dollar sign, `constants` the constants of messages; `tree`
+    is its syntax tree, for type-checkers.
     """
 
-    __slots__ = ("_evaluate", "_source", "_spans", "names", "roots", "text", "tree")
+    __slots__ = ("_constants", "_evaluate", "_source", "_spans", "constants", "names", "roots",
+                 "text", "tree")  # fmt: skip
 
-    def __init__(self, text: str, *, roots: Iterable[str] = frozenset({"result"})) -> None:
+    def __init__(
+        self,
+        text: str,
+        *,
+        roots: Iterable[str] = frozenset({"result"}),
+        constants: Callable[[str], object] | None = None,
+    ) -> None:
+        """`constants` gives the value of ``MoveRobot.Result.STATUS_FAULT``, or raises ValueError;
+        it is asked when the expression is evaluated."""
         self.text = text
+        self._constants = constants
+        self.constants: list[str] = []
         self.roots = frozenset(roots)
         if len(text) > MAX_LENGTH:
             raise ExpressionError(f"longer than {MAX_LENGTH} characters", 0, len(text))
@@ -113,6 +126,24 @@ class Expression:
             return node.id[1:]
         return None
 
+    def constant_of(self, node: ast.AST) -> str | None:
+        """The dotted name of the constant that a node of `tree` stands for, or None."""
+        names: list[str] = []
+        inner = node
+        while isinstance(inner, ast.Attribute):
+            names.append(inner.attr)
+            inner = inner.value
+        if self._constants is None or not names or not isinstance(inner, ast.Name):
+            return None
+        if not (names[0].isupper() and inner.id[0].isupper()) or inner.id in self.roots:
+            return None
+        return ".".join([inner.id, *reversed(names)])
+
+    def constant(self, name: str) -> object:
+        """The value of a constant by its dotted name. Raises ValueError."""
+        assert self._constants is not None
+        return self._constants(name)
+
     def _parse(self) -> ast.expr:
         source = self._source
         stripped = source.text.lstrip()
@@ -153,6 +184,9 @@ class Expression:
                 return lambda _roots, _variable: value
             case ast.Name():
                 return self._compile_name(node, names)
+            case ast.Attribute() if (name := self.constant_of(node)) is not None:
+                self.constants.append(name)
+                return self._guard(node, self.constant, _constant(name))
             case ast.Attribute(value=inner, attr=attr):
                 if attr.startswith("_"):
                     raise self._refusal(
@@ -174,6 +208,8 @@ class Expression:
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
                 if not args:
                     raise self._refusal(node, f"{name}() needs a value")
+                if len(args) > 1 and name in ONE_VALUE:
+                    raise self._refusal(node, f"{name}() takes one value, not {len(args)}")
                 return self._guard(node, call(name), *(part(arg) for arg in args))
         raise self._refusal(node, _why_not(node))
 

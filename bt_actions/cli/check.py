@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import Exit, columns, write
+from bt_actions.cli.common import Exit, columns, prints_apart, write
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -54,7 +54,9 @@ def run(args: argparse.Namespace) -> int:
     seen = set()
     unreadable = False
     for tree in args.trees:
-        for finding in _check(tree, types=not args.no_types):
+        with prints_apart():
+            found = _check(tree, types=not args.no_types)
+        for finding in found:
             if finding not in seen:  # trees share what they include
                 seen.add(finding)
                 findings.append(finding)

@@ -223,6 +223,8 @@ class _Composer:
             node.plain = False
             if tag not in ("!", "tag:yaml.org,2002:str"):
                 self._report("BT109", event, f"the tag {tag!r} has no meaning in a tree")
+                self._source.settled.add(_event_span(event))
+                self._source.unread.nodes.append(node)
         _place(node, event)
         if event.anchor is not None:
             self._source.anchored = True
@@ -298,7 +300,9 @@ class _Composer:
         elif frame.key is None:
             frame.key = self._key(frame, node)
         else:
-            if frame.key is not _REFUSED:
+            if frame.key is _REFUSED:
+                self._source.unread.nodes.append(node)
+            else:
                 owner.pairs.append((frame.key, node))
             frame.key = None
 
@@ -329,6 +333,7 @@ class _Composer:
                 if not isinstance(merged, Mapping):
                     message = "'<<' merges a mapping, or a list of mappings"
                     self._source.report("BT109", span_of(merged), message)
+                    self._source.unread.nodes.append(merged)
                     continue
                 for inner_key, inner_value in merged.pairs:
                     if inner_key.text not in own:

@@ -191,6 +191,14 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("root: {success: Done}  # bt: ignore[BT304] no longer a retry\n"),
             _tree(_SUCCESS),
         ),
+        "BT121": Page(
+            "The names of topics, services, actions and namespaces are letters, digits and "
+            "underscores between slashes; no part begins with a digit. '/' at the beginning makes "
+            "a name absolute, '~/' one of the node's own. ROS refuses all others when the tree "
+            "starts.",
+            _tree("root: {publish: the lamp, type: std_msgs/msg/Bool}\n"),
+            _tree("root: {publish: the_lamp, type: std_msgs/msg/Bool}\n"),
+        ),
         "BT201": Page(
             "No kind of node has this name, and the tree declares no action of this name.",
             _move("root:\n  sequence: Work\n  children:\n    - mvoe: Go\n    - move: Back\n"),

@@ -20,14 +20,9 @@ if TYPE_CHECKING:
     from bt_actions.document.nodes import Node
 
 __all__ = [
-    "MAX_BYTES",
-    "MAX_ERRORS",
-    "Source",
-    "TooManyErrors",
-    "read_source",
-    "read_stream",
+    "MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "Unread", "read_source", "read_stream",
     "source_of",
-]
+]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
 """The largest file that is read; a tree of 100,000 nodes has about a third of it."""
@@ -42,6 +37,21 @@ class TooManyErrors(Exception):
     """A document has more errors than anybody wants to read; they are in its source."""
 
 
+@dataclass(slots=True)
+class Unread:
+    """What was reported and is read no further; `unread.py` says what follows from it."""
+
+    nodes: list[Node] = field(default_factory=list)
+    meant: set[str] = field(default_factory=set)
+    """Names that unknown ones probably stand for."""
+    names: bool = False
+    """Whether any name may have been declared: in a file that is not there, as a loop's item."""
+    variables: bool = False
+    """Whether a variable is unknown, and nothing says which is meant."""
+    actions: bool = False
+    """Whether a node's kind is unknown."""
+
+
 @dataclass(slots=True, eq=False)
 class Source:
     """A document's text, the name it is known by, and the findings in it so far."""
@@ -54,6 +64,9 @@ class Source:
     """Whether the text names parts of itself (&name); known after it was composed."""
     root: Node | None = None
     """The text as YAML nodes, after it was composed."""
+    unread: Unread = field(default_factory=Unread)
+    settled: set[Span] = field(default_factory=set)
+    """Scalars about which enough was said."""
     _lines: list[str] | None = None
 
     @property
@@ -78,6 +91,8 @@ class Source:
         related: Related | None = None,
     ) -> None:
         """File a finding; its severity is its rule's. Raises TooManyErrors after `MAX_ERRORS`."""
+        if span in self.settled:
+            return
         if len(self.findings) >= MAX_ERRORS and RULES[code].severity is Severity.ERROR:
             raise TooManyErrors
         line = self.line(span.line)

@@ -26,6 +26,7 @@ __all__ = [
     "Interpolated",
     "Lookup",
     "computed_in",
+    "constant_of",
     "inner_span",
     "locate",
     "names_file",
@@ -228,7 +229,13 @@ def read_expression(
 @lru_cache(maxsize=4096)
 def _expression(text: str, roots: frozenset[str]) -> Expression:
     """An expression never changes, and a tree says the same thing in many places."""
-    return Expression(text, roots=roots)
+    return Expression(text, roots=roots, constants=_named_constant)
+
+
+def _named_constant(name: str) -> object:
+    from bt_actions.ros.conveniences import constant  # here, so that reading a tree needs no ROS
+
+    return constant(name, None)
 
 
 def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
@@ -279,6 +286,17 @@ def computed_in(value: object) -> Iterator[Computed]:
     elif isinstance(value, list):
         for item in value:
             yield from computed_in(item)
+
+
+def constant_of(computed: Computed) -> object:
+    """The value of an expression over nothing but numbers and texts; None for any other."""
+    expression = computed.expression
+    if expression.names or expression.roots or expression.constants:
+        return None
+    try:
+        return computed.evaluate(lambda _name: None)
+    except ExpressionError:
+        return None
 
 
 def resolve(value: object, variable: Lookup) -> object:

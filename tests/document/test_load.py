@@ -296,6 +296,23 @@ def test_a_subtree_whose_input_has_no_value_fails_and_says_why(load: Load) -> No
     assert root.feedback_message == "$a has no value"
 
 
+def test_a_subtree_that_is_given_no_mapping_fails_and_says_why(load: Load) -> None:
+    root = load(
+        """
+        tree: t
+        root:
+          for_each: E
+          in: [{home: 1.0}, 5]
+          child: {subtree: inner.yaml, with: $item}
+        """,
+        inner="tree: inner\ninputs: {home: float64}\nroot: {check: $home > 0.5}\n",
+    )
+    assert tick(root) is Status.FAILURE
+    assert root.children[0].feedback_message == (
+        "'with' needs a mapping of inputs to values, not 5"
+    )
+
+
 def test_a_subtree_that_starts_again_has_forgotten_its_values(load: Load) -> None:
     root = load(
         """

@@ -21,7 +21,7 @@ from bt_actions.document.source import Source
 ROOT = Path(__file__).parents[2]
 SCHEMA = jsonschema.Draft202012Validator(json_schema())
 MODELINE = re.compile(r"# yaml-language-server: \$schema=(\S+?\.json)")
-OF_FORM = {"BT106", "BT107", "BT108", "BT109", "BT110", "BT112", "BT113"}
+OF_FORM = {"BT106", "BT107", "BT108", "BT109", "BT110", "BT112", "BT113", "BT121"}
 """Rules that a schema can know."""
 
 
