@@ -5,6 +5,7 @@ from bt_actions.streams import open_closed_streams as _open_closed_streams
 _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout's encoding
 
 # ruff: noqa: E402 - see above
+import bt_actions.behaviours.ports as _ports  # noqa: F401 - makes the tags of XML trees known
 from bt_actions.attempts import AttemptRecord
 from bt_actions.behaviours.action import ActionBehaviour, Progress
 from bt_actions.behaviours.gripper import Gripper

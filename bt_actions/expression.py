@@ -17,6 +17,7 @@ from bt_actions.expression_values import (
     COMPARE,
     FUNCTIONS,
     MAX_BITS,
+    ONE_VALUE,
     UNARY,
     bounded,
     call,
@@ -34,6 +35,15 @@ MAX_LENGTH = 2000
 """Characters in one expression."""
 _MAX_DEPTH = 60
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
+_ANSWERS = frozenset({"result", "feedback", "message"})
+_FOREIGN = {
+    "null": "there is no 'null' here",
+    "TRUE": "write 'true'",
+    "FALSE": "write 'false'",
+    "AND": "write 'and'",
+    "OR": "write 'or'",
+    "NOT": "write 'not'",
+}
 Variable = Callable[[str], object]
 _Roots = Mapping[str, object]
 _Closure = Callable[[_Roots, Variable], object]
@@ -43,13 +53,25 @@ class Expression:
     """An expression that was read and found well-formed.
 
     `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `names` are
-    the variables it reads, without the dollar sign; `tree` is its syntax tree, for type-checkers.
+    the variables it reads, without the dollar sign, `constants` the constants of messages; `tree`
+    is its syntax tree, for type-checkers.
     """
 
-    __slots__ = ("_evaluate", "_source", "_spans", "names", "roots", "text", "tree")
+    __slots__ = ("_constants", "_evaluate", "_source", "_spans", "constants", "names", "roots",
+                 "text", "tree")  # fmt: skip
 
-    def __init__(self, text: str, *, roots: Iterable[str] = frozenset({"result"})) -> None:
+    def __init__(
+        self,
+        text: str,
+        *,
+        roots: Iterable[str] = frozenset({"result"}),
+        constants: Callable[[str], object] | None = None,
+    ) -> None:
+        """`constants` gives the value of ``MoveRobot.Result.STATUS_FAULT``, or raises ValueError;
+        it is asked when the expression is evaluated."""
         self.text = text
+        self._constants = constants
+        self.constants: list[str] = []
         self.roots = frozenset(roots)
         if len(text) > MAX_LENGTH:
             raise ExpressionError(f"longer than {MAX_LENGTH} characters", 0, len(text))
@@ -104,6 +126,24 @@ class Expression:
             return node.id[1:]
         return None
 
+    def constant_of(self, node: ast.AST) -> str | None:
+        """The dotted name of the constant that a node of `tree` stands for, or None."""
+        names: list[str] = []
+        inner = node
+        while isinstance(inner, ast.Attribute):
+            names.append(inner.attr)
+            inner = inner.value
+        if self._constants is None or not names or not isinstance(inner, ast.Name):
+            return None
+        if not (names[0].isupper() and inner.id[0].isupper()) or inner.id in self.roots:
+            return None
+        return ".".join([inner.id, *reversed(names)])
+
+    def constant(self, name: str) -> object:
+        """The value of a constant by its dotted name. Raises ValueError."""
+        assert self._constants is not None
+        return self._constants(name)
+
     def _parse(self) -> ast.expr:
         source = self._source
         stripped = source.text.lstrip()
@@ -144,6 +184,9 @@ class Expression:
                 return lambda _roots, _variable: value
             case ast.Name():
                 return self._compile_name(node, names)
+            case ast.Attribute() if (name := self.constant_of(node)) is not None:
+                self.constants.append(name)
+                return self._guard(node, self.constant, _constant(name))
             case ast.Attribute(value=inner, attr=attr):
                 if attr.startswith("_"):
                     raise self._refusal(
@@ -165,6 +208,8 @@ class Expression:
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
                 if not args:
                     raise self._refusal(node, f"{name}() needs a value")
+                if len(args) > 1 and name in ONE_VALUE:
+                    raise self._refusal(node, f"{name}() takes one value, not {len(args)}")
                 return self._guard(node, call(name), *(part(arg) for arg in args))
         raise self._refusal(node, _why_not(node))
 
@@ -176,11 +221,7 @@ class Expression:
         if node.id in _CONSTANTS:
             return _constant(_CONSTANTS[node.id])
         if node.id not in self.roots:
-            known = ", ".join(sorted(self.roots))
-            given = f"; {known} can be used bare" if known else ""
-            raise self._refusal(
-                node, f"unknown name {node.id!r}: a variable is written ${node.id}{given}"
-            )
+            raise self._refusal(node, _unknown_name(node.id, self.roots))
         return _root(node.id, *self.span(node))
 
     def _compile_bool(
@@ -278,8 +319,21 @@ def _syntax(text: str, column: int, error: SyntaxError) -> str:
     return "this is not an expression"
 
 
+def _unknown_name(name: str, roots: Iterable[str]) -> str:
+    known = ", ".join(sorted(roots))
+    if name in _FOREIGN:
+        return _FOREIGN[name]
+    if name in _ANSWERS:
+        instead = f"{known} can be used" if known else "save what it holds, and read that as $name"
+        return f"there is no {name} here: {instead}"
+    given = f"; {known} can be used bare" if known else ""
+    return f"unknown name {name!r}: a variable is written ${name}{given}"
+
+
 def _why_not(node: ast.expr) -> str:
     if isinstance(node, ast.Call):
+        if isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
+            return f"{node.func.id}() takes values only, not {node.keywords[0].arg or '**'}="
         return "only len, abs, min and max can be called"
     if isinstance(node, ast.Constant) and node.value is None:
         return "there is no 'None' here"

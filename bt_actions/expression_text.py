@@ -12,6 +12,11 @@ from typing import NamedTuple
 _SIMPLE = re.compile(r"(?:[A-Za-z0-9_ .,+\-*/%<>=()\[\]]|\$(?=[A-Za-z]))*")
 """Texts of which each character keeps its place: nearly all."""
 _INDEX = re.compile(r"[A-Za-z_)\]]\w*\.[0-9]")
+_RUN_ON = re.compile(
+    r"""'[^']*'|"[^"]*"|(?<![\w.$])(?:0[xX][0-9a-fA-F]+?|[\d.][\d._]*(?:[eE][+-]?\d+)?[jJ]?)"""
+    r"(and|else|for|if|in|is|not|or)\b"
+)
+"""A number and a word without a space between: Python reads it so far, and warns."""
 _BAD_WORDS = {
     "&&": "write 'and'",
     "||": "write 'or'",
@@ -48,6 +53,9 @@ class Source(NamedTuple):
 
 def translate(text: str) -> Source:
     """`$name` becomes `_name`, and the `.0` of `$name.0` becomes `[0]`, keeping the places."""
+    for match in _RUN_ON.finditer(text):
+        if match[1]:
+            raise ExpressionError(f"a space is missing before {match[1]!r}", *match.span(1))
     if _SIMPLE.fullmatch(text) and "<>" not in text and not _INDEX.search(text):
         variables_at = [at for at, char in enumerate(text) if char == "$"] if "$" in text else []
         return Source(text.replace("$", "_"), range(len(text) + 1), frozenset(variables_at))

@@ -18,6 +18,9 @@ MAX_BITS = 256
 MAX_ITEMS = 10_000
 FUNCTIONS: dict[str, Callable[..., object]] = {"len": len, "abs": abs, "min": min, "max": max}
 
+ONE_VALUE = frozenset({"len", "abs"})
+"""The functions that take no list of arguments."""
+
 
 def call(name: str) -> Callable[..., object]:
     function = FUNCTIONS[name]

@@ -75,7 +75,8 @@ Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, 
 `float64[<=3]`. A whole number is a fine float; a fraction is no whole number.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
-`abs`, `min` and `max`, and `true` and `false`. In `expect`, `save` and `when` the bare name
+`abs`, `min` and `max`, `true` and `false`, and constants (`MoveRobot.Result.STATUS_FAULT`). In
+`expect`, `save` and `when` the bare name
 `result` is the result; in `until` and `save` of `wait_for_message`, `message` is the message.
 
 In the fields of a message:
@@ -84,7 +85,7 @@ In the fields of a message:
 |---|---|
 | builtin_interfaces/Time | `now`, seconds, or `{{sec, nanosec}}` |
 | builtin_interfaces/Duration | `500 ms`, seconds, or `{{sec, nanosec}}` |
-| geometry_msgs/Quaternion | `{{yaw: 90 deg}}`, with `roll` and `pitch`, or `{{x, y, z, w}}` |
+| geometry_msgs/Quaternion | `{{yaw: 90 deg}}` (`$a`: radians), `roll`, `pitch`; or its fields |
 | a number with constants | `STATUS_MOVING`, `MoveRobot.Feedback.STATUS_MOVING`, `pkg/msg/X.NAME` |
 
 @messages
@@ -198,8 +199,7 @@ def rules_page() -> str:
         rule = RULES[code]
         lines += [f"## {code}", "", f"*{rule.severity}*: {rule.title}", "", page.text, ""]
         for word, example in (("Wrong", page.wrong), ("Right", page.right)):
-            if example:
-                lines += [f"{word}:", "", "```yaml", example.rstrip("\n"), "```", ""]
+            lines += [f"{word}:", "", f"```{page.language}", example.rstrip("\n"), "```", ""]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

@@ -1,7 +1,7 @@
 """MoveRobot and Gripper with py_trees ports, for py_trees' own XML trees.
 
-Importing this module makes the tags `MoveRobot` and `Gripper` known to
-`py_trees.parsers.behaviour_tree_xml`. py_trees marks ports as experimental; nothing else here
+Importing this module, as `import bt_actions` does, makes the tags `MoveRobot` and `Gripper` known
+to `py_trees.parsers.behaviour_tree_xml`. py_trees marks ports as experimental; nothing else here
 depends on them.
 """
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import Exit, columns, write
+from bt_actions.cli.common import Exit, columns, prints_apart, write
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -21,7 +21,6 @@ examples:
 exit codes:
   0 nothing found   1 something found   2 a file cannot be read
 """
-_STDIN_LIMIT = 64 * 1024 * 1024
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -55,7 +54,9 @@ def run(args: argparse.Namespace) -> int:
     seen = set()
     unreadable = False
     for tree in args.trees:
-        for finding in _check(tree, types=not args.no_types):
+        with prints_apart():
+            found = _check(tree, types=not args.no_types)
+        for finding in found:
             if finding not in seen:  # trees share what they include
                 seen.add(finding)
                 findings.append(finding)
@@ -70,12 +71,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(tree: str, *, types: bool) -> list[Finding]:
-    from bt_actions.document import DocumentError, check_file, check_source, source_of
+    from bt_actions.document import DocumentError, check_file, check_source
+    from bt_actions.document.source import read_stream
 
     if tree != "-":
         return check_file(tree, types=types)
     try:
-        source = source_of(sys.stdin.buffer.read(_STDIN_LIMIT), "<stdin>")
+        source = read_stream(getattr(sys.stdin, "buffer", None), "<stdin>")
     except DocumentError as error:
         return list(error.findings)
     return check_source(source, types=types)

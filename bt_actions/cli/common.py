@@ -172,7 +172,8 @@ def load(
                 inputs[name] = parse_input(text, kind)
             except ValueError as error:
                 raise BadInput(f"--set {name}={text}: {error}") from error
-        return load_tree(tree, inputs, python=python)
+        with prints_apart():
+            return load_tree(tree, inputs, python=python)
     except DocumentError as error:
         raise BadInput(findings_text(error), prefixed=False) from error
     except (InputError, TreeNotFoundError) as error:
@@ -182,6 +183,11 @@ def load(
 def findings_text(error: DocumentError) -> str:
     """What is wrong with a document, for standard error."""
     return "\n".join(finding.text(columns(sys.stderr)) for finding in error.findings)
+
+
+def prints_apart() -> contextlib.AbstractContextManager[object]:
+    """While a tree is read: what the modules that it names print goes to standard error."""
+    return contextlib.redirect_stdout(sys.stderr)
 
 
 def columns(stream: TextIO) -> int:

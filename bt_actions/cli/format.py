@@ -43,26 +43,40 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Format the files that `args` name."""
-    changed = False
+    changed = failed = False
     for name in args.files:
-        before, after = _formatted(name)
-        if name == "-" and not args.check:
-            write(after)
-        elif before != after:
-            changed = True
-            note(f"{name}: {'would change' if args.check else 'formatted'}")
-            if not args.check:
-                _replace(Path(name), after)
+        try:
+            changed |= _format(name, check=args.check)
+        except BadInput as error:  # the other files are no worse for it
+            note(f"bt-actions: {error}" if error.prefixed else str(error))
+            failed = True
+    if failed:
+        return Exit.BAD_INPUT
     return Exit.FAILURE if args.check and changed else Exit.SUCCESS
 
 
+def _format(name: str, *, check: bool) -> bool:
+    """Format one file, or only look with `check`; return whether it changes."""
+    before, after = _formatted(name)
+    if name == "-" and not check:
+        write(after)
+    elif before != after:
+        if not check:
+            _replace(Path(name), after)
+        note(f"{name}: {'would change' if check else 'formatted'}")
+        return True
+    return False
+
+
 def _formatted(name: str) -> tuple[str, str]:
-    from bt_actions.document import DocumentError, read_source, source_of
+    from bt_actions.document import DocumentError
     from bt_actions.document.formatting import FormatError, format_source
+    from bt_actions.document.source import read_source, read_stream
 
     try:
-        source = source_of(sys.stdin.buffer.read(), "<stdin>") if name == "-" else None
-        if source is None:
+        if name == "-":
+            source = read_stream(getattr(sys.stdin, "buffer", None), "<stdin>")
+        else:
             source = read_source(Path(name), name)
         return source.text, format_source(source)
     except DocumentError as error:

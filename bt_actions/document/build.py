@@ -163,7 +163,9 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     written = [declared.name for declared in included.outputs.values()]
 
     def begin() -> None:
-        values = table_of(_resolved(given, context))
+        values = _resolved(given, context)
+        if not isinstance(values, dict):
+            raise ValueError(f"'with' needs a mapping of inputs to values, not {values!r:.60}")
         inputs = check_inputs(included, values, types=context.types)
         for name in written:
             if name not in inputs:

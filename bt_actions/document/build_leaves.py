@@ -17,8 +17,9 @@ from bt_actions.behaviours.service import CallService
 from bt_actions.behaviours.topics import Publish, WaitForMessage
 from bt_actions.behaviours.waiting import Wait, WaitUntil
 from bt_actions.document.build_names import settings_of, text_of
-from bt_actions.document.classes import find_behaviour
+from bt_actions.document.classes import ClassError, make_behaviour
 from bt_actions.document.context import Context, plain_name, table_of, written_text
+from bt_actions.document.nodes import span_of
 from bt_actions.document.tree import TreeNode
 from bt_actions.document.values import Computed, computed_in
 from bt_actions.policy import Retry, Timeouts
@@ -169,9 +170,17 @@ def _log(node: TreeNode, context: Context) -> Behaviour:
 
 
 def _python(node: TreeNode, _context: Context) -> Behaviour:
+    """What cannot be made is reported to the document's source, and `Failure` stands for it."""
     path = text_of(node.values, "python")
-    arguments = table_of(node.values.get("arguments"))
-    return find_behaviour(path)(name=node.name or path.rpartition(".")[2], **arguments)
+    name = node.name or path.rpartition(".")[2]
+    try:
+        return make_behaviour(path, name, table_of(node.values.get("arguments")))
+    except ClassError as error:
+        code, at = "BT214", node.written["python"]
+        if "arguments" in node.written:
+            code, at = "BT215", node.written["arguments"]
+        node.source.report(code, span_of(at), str(error))
+        return Failure(name)
 
 
 def _plain(

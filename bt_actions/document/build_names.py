@@ -17,11 +17,11 @@ def text_of(values: Mapping[str, object], key: str) -> str:
 
 
 def join_names(*parts: str) -> str:
-    """ROS names put together; an absolute one begins anew."""
+    """ROS names put together; an absolute one, and one of the node's own (~), begins anew."""
     joined = ""
     for part in parts:
         trimmed = part if part == "/" else part.rstrip("/")
-        if trimmed.startswith("/") or not joined:
+        if trimmed.startswith(("/", "~")) or not joined:
             joined = trimmed
         elif trimmed:
             joined = f"{joined.rstrip('/')}/{trimmed}"

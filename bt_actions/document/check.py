@@ -17,18 +17,21 @@ from bt_actions.document.shape import report_braces
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.types import TypeNameError, fits, interface_of, parse_type
+from bt_actions.document.unread import Doubts
 from bt_actions.document.values import (
     BAD,
     Computed,
     Interpolated,
     computed_in,
+    constant_of,
     inner_span,
     locate,
     names_file,
 )
-from bt_actions.document.writes import Write, writes_of
+from bt_actions.document.writes import Write, infer_variables, writes_of
+from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import FieldType, Message
-from bt_actions.suggest import did_you_mean, listing
+from bt_actions.suggest import closest, listing
 
 __all__ = ["Checker", "Read"]
 
@@ -52,6 +55,8 @@ class Checker:
         """With `python=False` a ``python:`` node is an error, and its module is not imported."""
         self.document = document
         self.source = document.source
+        self.doubts = Doubts(document)
+        self._doubts_of: dict[int, Doubts] = {}
         self.types = types
         self.python = python
         self.variables: dict[str, FieldType | None] = {}
@@ -149,25 +154,25 @@ class Checker:
                     self.source.report("BT205", span_of(node), str(error))
         return self._interfaces[known]
 
+    def doubts_of(self, included: Document) -> Doubts:
+        """What is not certain about a tree that this one includes."""
+        known = self._doubts_of.get(id(included))
+        if known is None:
+            known = self._doubts_of[id(included)] = Doubts(included)
+        return known
+
     def writes_of(self, node: TreeNode) -> tuple[Write, ...]:
         """The variables that a node writes."""
         return self._writes.get(id(node), ())
 
     def _collect(self) -> None:
         """The variables that nodes write, with their types as far as they are known."""
-        written: list[Write] = []
         for node in self.document.nodes():
             writes = tuple(writes_of(node, self.document))
             if writes:
                 self._writes[id(node)] = writes
-                written += writes
-        for write in written:
-            self.variables.setdefault(write.name, None)
-        # Twice, since a value may be computed from one that is written further down.
-        for _ in range(2):
-            open_ones = [write for write in written if self.variables[write.name] is None]
-            for write in open_ones:
-                self.variables[write.name] = write.type_in(self)
+        written = (write for writes in self._writes.values() for write in writes)
+        infer_variables(written, self)
 
     # Nodes
 
@@ -183,7 +188,8 @@ class Checker:
             for name, (start, end) in computed.expression.variable_spans:
                 read = Read(name, computed, start, end)
                 self.reads.setdefault(id(declared), []).append(read)
-                if name not in self.variables and node is not None:
+                unknown = name not in self.variables and not self.doubts.declares(name)
+                if unknown and node is not None:
                     text = f"the imported action {declared.name!r} reads ${name}, which is not here"
                     related = Related(declared.place, "declared here")
                     self.source.report("BT202", span_of(node), text, related=related)
@@ -281,10 +287,13 @@ class Checker:
         def hole(item: object, wanted: FieldType, _path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):
                 given = self.expression(item, {})
+                said = item.expression.text.strip()
                 if not fits(given, wanted):
-                    said = item.expression.text.strip()
                     text = f"{named(wanted)} is needed, and {said} is {named(given)}"
                     self.source.report("BT204", span_of(item.node), text)
+                elif (constant := constant_of(item)) is not None:
+                    for problem in examine(wanted, constant):
+                        self.source.report("BT204", span_of(item.node), problem.text)
                 return True
             if isinstance(item, Interpolated):
                 for part in computed_in(item):
@@ -298,6 +307,7 @@ class Checker:
         for problem in examine(kind, value, hole):
             at = locate(node, problem.path, at_key=problem.at_key)
             if report_braces(at, self.source):
+                self.source.unread.nodes.append(at)
                 continue
             code = "BT203" if problem.at_key else "BT204"
             text = problem.text
@@ -321,8 +331,6 @@ class Checker:
             self.reads.setdefault(id(self._reader), []).append(Read(name, computed, start, end))
             if name not in self.variables:
                 self._unknown(name, computed, start, end)
-        if not self.types and not roots and not expression.names:
-            return None
 
         def report(code: str, message: str, start: int, end: int) -> None:
             span = inner_span(
@@ -330,19 +338,31 @@ class Checker:
             )
             self.source.report(code, span, message)
 
-        return infer(expression, roots, self.variables.get, report)
+        if not expression.names and not expression.roots and not expression.constants:
+            try:
+                computed.evaluate(lambda _name: None)
+            except ExpressionError as error:
+                report("BT206", error.message, error.column, error.end_column)
+                return None
+        if not self.types and not roots and not expression.names:
+            return None
+        return infer(expression, roots, self.variables.get, report, types=self.types)
 
     def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
-        if self.document.node.get("root") is None:
+        if self.document.node.get("root") is None or self.doubts.declares(name):
             return  # a library's words are read with the names of whoever imports it
         span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
-        near = did_you_mean(name, self.variables).replace("mean '", "mean '$")
+        maybe = self.doubts.declared
+        meant = closest(name, self.variables) or closest(name, maybe)
+        near = f"; did you mean '${meant}'?" if meant else ""
         hint = None
-        if not near:
+        if meant:
+            self.source.unread.meant.add(meant)
+        else:
+            self.source.unread.variables = True
             known = listing(f"${known}" for known in self.variables)
-            hint = (
-                f"this tree has {known}" if known else "this tree has no inputs and saves nothing"
-            )
+            nothing = None if maybe else "this tree has no inputs and saves nothing"
+            hint = f"this tree has {known}" if known else nothing
         self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
 
 

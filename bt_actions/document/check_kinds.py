@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import FLOAT, INTEGER, named
 from bt_actions.document.nodes import Mapping as YamlMapping
-from bt_actions.document.nodes import span_of
+from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.tree import TreeNode
 from bt_actions.document.types import TypeNameError, fits, parse_type
-from bt_actions.document.values import BAD, Computed, computed_in, locate
+from bt_actions.document.values import Computed, computed_in, constant_of, locate
 from bt_actions.ros.fields import FieldType, Listing, Message
 from bt_actions.suggest import did_you_mean, listing
 
@@ -26,13 +26,22 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
     included = node.included
     given = node.values.get("with")
     written = node.written.get("with")
+    if isinstance(given, Computed):
+        kind = checker.expression(given, {})
+        if kind is not None:
+            said = f"a mapping of inputs to values is needed, and this is {named(kind)}"
+            checker.source.report("BT204", span_of(given.node), said)
     if included is None:
         if isinstance(given, dict) and written is not None:
             checker.value(None, given, written)
         return
     if isinstance(given, dict) and isinstance(written, YamlMapping):
+        doubts = checker.doubts_of(included)
         for key, inner in written.pairs:
             declared = included.inputs.get(key.text)
+            if declared is None and doubts.declares(key.text):
+                checker.value(None, given.get(key.text), inner)
+                continue
             if declared is None:
                 near = did_you_mean(key.text, included.inputs)
                 known = listing(included.inputs)
@@ -53,7 +62,7 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
                 except TypeNameError:
                     kind = None  # reported where it is declared
             checker.value(kind, given.get(key.text), inner)
-    if given is not BAD and (given is None or isinstance(given, dict)):
+    if (given is None and not checker.doubts.own(node)) or isinstance(given, dict):
         for name, declared in included.inputs.items():
             if "default" not in declared.values and name not in (given or {}):
                 checker.source.report(
@@ -75,6 +84,8 @@ def _outputs(checker: Checker, node: TreeNode) -> None:
         if not isinstance(output, str):
             continue
         declared = included.outputs.get(output)
+        if declared is None and checker.doubts_of(included).declares(output):
+            continue
         if declared is None:
             near = did_you_mean(output, included.outputs)
             known = listing(included.outputs)
@@ -96,7 +107,9 @@ def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
     return lambda checker, node: checker.condition(node.values.get(key), {})
 
 
-def _number_of(key: str, wanted: FieldType) -> Callable[[Checker, TreeNode], None]:
+def _number_of(
+    key: str, wanted: FieldType, least: float = 0
+) -> Callable[[Checker, TreeNode], None]:
     def check(checker: Checker, node: TreeNode) -> None:
         value = node.values.get(key)
         if not isinstance(value, Computed):
@@ -105,11 +118,20 @@ def _number_of(key: str, wanted: FieldType) -> Callable[[Checker, TreeNode], Non
         if not fits(given, wanted):
             text = f"{named(wanted)} is needed, and this is {named(given)}"
             checker.source.report("BT204", span_of(value.node), text)
+            return
+        number = constant_of(value)
+        if isinstance(number, (int, float)) and not least <= number < float("inf"):
+            text = f"at least {least:g} is needed, not {number}"
+            checker.source.report("BT110", span_of(value.node), text)
 
     return check
 
 
 def _for_each(checker: Checker, node: TreeNode) -> None:
+    item, index = node.values.get("as", "item"), node.values.get("index")
+    if item == index and "index" in node.written:
+        text = f"the item and its index are both called {item!r}"
+        checker.source.report("BT216", span_of(node.written["index"]), text)
     items = node.values.get("in")
     if isinstance(items, Computed):
         kind = checker.expression(items, {})
@@ -210,9 +232,10 @@ def _python(checker: Checker, node: TreeNode) -> None:
         return
     wrong = wrong_arguments(cls, arguments)
     if wrong is not None:
-        name, text = wrong
-        at = node.key if not name else locate(node.written["arguments"], (name,), at_key=True)
-        checker.source.report("BT215", span_of(at), text)
+        at: Node = node.key
+        if wrong.name:
+            at = locate(node.written["arguments"], (wrong.name,), at_key=wrong.at_key)
+        checker.source.report("BT215", span_of(at), wrong.text)
 
 
 CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
@@ -225,7 +248,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "publish": _publish,
         "python": _python,
         "repeat": _number_of("times", INTEGER),
-        "retry": _number_of("attempts", INTEGER),
+        "retry": _number_of("attempts", INTEGER, 1),
         "service": _service,
         "set": _set,
         "subtree": _subtree,

@@ -1,23 +1,37 @@
-"""A user's own behaviour class by its name, and whether arguments fit it."""
+"""A user's own behaviour class by its name, whether arguments fit it, and one made of it.
+
+The module and the constructor are foreign code: whatever they raise becomes a `ClassError`.
+"""
 
 from __future__ import annotations
 
 import importlib
 import inspect
 import re
+import types
+import typing
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
 
 from bt_actions.suggest import did_you_mean
 
-__all__ = ["ClassError", "find_behaviour", "wrong_arguments"]
+__all__ = ["ClassError", "Misfit", "find_behaviour", "make_behaviour", "wrong_arguments"]
 
 _PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", re.ASCII)
 
 
 class ClassError(ValueError):
-    """There is no such class, or it is no behaviour."""
+    """There is no such class, or it is no behaviour, or none can be made of it."""
+
+
+class Misfit(NamedTuple):
+    """What does not fit a constructor: the argument (or an empty text), and why."""
+
+    name: str
+    text: str
+    at_key: bool = True
 
 
 def find_behaviour(path: str) -> type[Behaviour]:
@@ -27,15 +41,10 @@ def find_behaviour(path: str) -> type[Behaviour]:
     module_name, _, name = path.rpartition(".")
     try:
         module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        raise ClassError(
-            f"there is no module {error.name!r} where Python looks; install its package, or put "
-            "the folder it is in on PYTHONPATH"
-        ) from None
-    except Exception as error:  # noqa: BLE001 - the user's module may raise anything
-        raise ClassError(
-            f"importing {module_name!r} raised {type(error).__name__}: {error}"
-        ) from None
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # noqa: BLE001 - the user's module may raise anything
+        raise ClassError(_not_imported(module_name, error)) from None
     found = getattr(module, name, None)
     if found is None:
         near = did_you_mean(name, [word for word in vars(module) if not word.startswith("_")])
@@ -47,13 +56,43 @@ def find_behaviour(path: str) -> type[Behaviour]:
     return found
 
 
-def wrong_arguments(
-    cls: type[Behaviour], arguments: Mapping[str, object]
-) -> tuple[str, str] | None:
-    """The argument that does not fit the constructor (or an empty text) and why, or None."""
+def _not_imported(module_name: str, error: BaseException) -> str:
+    if isinstance(error, ModuleNotFoundError) and error.name is not None:
+        return (
+            f"there is no module {error.name!r} where Python looks; install its package, or put "
+            "the folder it is in on PYTHONPATH"
+        )
+    return f"importing {module_name!r} raised {_shown(error)}"
+
+
+def _shown(error: BaseException) -> str:
     try:
-        parameters = inspect.signature(cls).parameters
-    except (TypeError, ValueError):
+        text = str(error)
+    except Exception:  # noqa: BLE001 - a foreign error's text may raise anything
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def make_behaviour(path: str, name: str, arguments: Mapping[str, object]) -> Behaviour:
+    """A behaviour of the class that `path` names. Raises ClassError."""
+    cls = find_behaviour(path)
+    try:
+        made: object = cls(name=name, **arguments)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise ClassError(f"making a {cls.__name__} raised {_shown(error)}") from error
+    if not isinstance(made, Behaviour):
+        raise ClassError(f"{path!r} makes no behaviour, but a {type(made).__name__}")
+    if not hasattr(made, "children") or not hasattr(made, "parent"):
+        raise ClassError(f"the constructor of {cls.__name__} does not call super().__init__(name)")
+    return made
+
+
+def wrong_arguments(cls: type[Behaviour], arguments: Mapping[str, object]) -> Misfit | None:
+    """The first thing that keeps the constructor from taking the arguments, or None."""
+    parameters = _parameters(cls)
+    if parameters is None:
         return None
     named = {
         name: parameter
@@ -61,15 +100,55 @@ def wrong_arguments(
         if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
     }
     takes_any = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values())
-    for name in arguments:
+    for name, value in arguments.items():
         if name == "name":
-            return name, "the name is given as the node's 'name'"
+            return Misfit(name, "the name is given as the node's 'name'")
         if name not in named and not takes_any:
             near = did_you_mean(name, named) or f"; it takes {', '.join(named)}"
-            return name, f"{cls.__name__} takes no argument {name!r}{near}"
+            return Misfit(name, f"{cls.__name__} takes no argument {name!r}{near}")
+        if name in named and not _takes(named[name].annotation, value):
+            wanted = _annotation(named[name].annotation)
+            text = f"{cls.__name__} takes a {name!r} of type {wanted}, not {value!r:.60}"
+            return Misfit(name, text, at_key=False)
     for name, parameter in named.items():
         if parameter.default is parameter.empty and name != "name" and name not in arguments:
-            return "", f"{cls.__name__} needs the argument {name!r}"
+            return Misfit("", f"{cls.__name__} needs the argument {name!r}")
+    for name, parameter in parameters.items():
+        if parameter.kind is parameter.POSITIONAL_ONLY and parameter.default is parameter.empty:
+            return Misfit("", f"{cls.__name__} takes {name!r} by its position only")
     if "name" not in named and not takes_any:
-        return "", f"{cls.__name__} takes no name"
+        return Misfit("", f"{cls.__name__} takes no name")
     return None
+
+
+def _parameters(cls: type[Behaviour]) -> Mapping[str, inspect.Parameter] | None:
+    """The parameters of a constructor, their types resolved where that is possible."""
+    try:
+        return inspect.signature(cls, eval_str=True).parameters
+    except Exception:  # noqa: BLE001 - an annotation may be any code, and name what is not there
+        pass
+    try:
+        return inspect.signature(cls).parameters
+    except (TypeError, ValueError):
+        return None
+
+
+def _takes(annotation: object, value: object) -> bool:
+    """Whether a value is of the annotated type; what cannot be told is taken."""
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return any(_takes(part, value) for part in typing.get_args(annotation))
+    plain = typing.get_origin(annotation) or annotation
+    if plain is None or plain is types.NoneType:
+        return value is None
+    if plain is float:
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+    if plain is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    for kind in (bool, str, list, dict):
+        if plain is kind:
+            return isinstance(value, kind)
+    return True
+
+
+def _annotation(annotation: object) -> str:
+    return annotation.__name__ if isinstance(annotation, type) else str(annotation)

@@ -29,10 +29,12 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
     wanted = os.fspath(name_or_path)
     if wanted.startswith("package://"):
         return _in_package(wanted)
+    if not wanted:
+        raise TreeNotFoundError("the name of a tree is needed, not an empty text")
     path = Path(wanted)
     base = Path() if beside is None else beside
     candidates = [path if path.is_absolute() else base / path]
-    if path.suffix not in _SUFFIXES:
+    if path.suffix not in _SUFFIXES and candidates[0].name:
         candidates += [candidates[0].with_name(path.name + suffix) for suffix in _SUFFIXES]
     is_name = len(path.parts) == 1
     if is_name and path.suffix in _SUFFIXES:

@@ -13,6 +13,7 @@ from bt_actions.document.check import Checker
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.nodes import Mapping, span_of
 from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.unread import Doubts
 from bt_actions.document.values import inner_span
 from bt_actions.document.verdicts import Verdicts, budget
 
@@ -24,17 +25,18 @@ _BUSY = frozenset(
 )
 
 
-def find_hazards(checker: Checker) -> None:
-    """Report the hazards of a document that was checked."""
+def find_hazards(checker: Checker, doubts: Doubts) -> None:
+    """Report the hazards of a document that was checked, but for those that are not certain."""
     document = checker.document
     if document.root is None:
         return
-    _Hazards(checker).look(document.root)
+    _Hazards(checker, doubts).look(document.root)
 
 
 class _Hazards:
-    def __init__(self, checker: Checker) -> None:
+    def __init__(self, checker: Checker, doubts: Doubts) -> None:
         self._checker = checker
+        self._doubts = doubts
         self._document: Document = checker.document
         self._source = checker.source
         self._verdicts = Verdicts()
@@ -62,9 +64,8 @@ class _Hazards:
                     self._look_at_action(node)
             elif kind == "parallel":
                 self._parallel(node)
-            elif kind == "retry" and "attempts" not in node.values and not inside:
-                hint = "attempts: N, or a 'timeout' around it"
-                self._report("BT304", span_of(node.key), "this retry never gives up", hint=hint)
+            elif kind == "retry" and not inside:
+                self._retry(node)
             elif kind in ("sequence", "fallback"):
                 self._unreachable(node, kind)
                 if node.values.get("memory") is False:
@@ -74,11 +75,20 @@ class _Hazards:
                 inside = True
             stack.extend((child, inside) for child in reversed(node.children))
 
+    # BT304
+
+    def _retry(self, node: TreeNode) -> None:
+        if "attempts" not in node.values and not self._doubts.own(node):
+            hint = "attempts: N, or a 'timeout' around it"
+            self._report("BT304", span_of(node.key), "this retry never gives up", hint=hint)
+
     # BT301
 
     def _look_at_action(self, node: TreeNode) -> None:
         timeout = settings_of(node, self._document).get("timeout", {})
         if not isinstance(timeout, dict) or "result" in timeout:
+            return
+        if self._doubts.below(node):
             return
         if node.alias is not None:
             self._unbounded.setdefault(node.alias, node)
@@ -101,9 +111,10 @@ class _Hazards:
     def _parallel(self, node: TreeNode) -> None:
         taken: dict[str, TreeNode] = {}
         for child in node.children:
-            for resource, user in resources_below(child, self._document).items():
-                first = taken.get(resource)
-                if first is None:
+            below = resources_below(child, self._document)
+            for resource, user in below.items():
+                first = taken.get(resource.lstrip("/"))
+                if first is None or self._doubts.below(node):
                     continue
                 place = first.place
                 where = user if user.source is self._source else child
@@ -114,8 +125,8 @@ class _Hazards:
                     hint="busy: share, where both may run at once",
                 )  # fmt: skip
                 break
-            for resource, user in resources_below(child, self._document).items():
-                taken.setdefault(resource, user)
+            for resource, user in below.items():
+                taken.setdefault(resource.lstrip("/"), user)
 
     # BT305, BT306, BT307
 
@@ -123,7 +134,7 @@ class _Hazards:
         for child, after in zip(node.children, node.children[1:], strict=False):
             can = self._verdicts.of(child)
             ends = not can.fail if kind == "fallback" else not can.succeed
-            if ends:
+            if ends and not self._doubts.below(child):
                 how = "fails" if kind == "fallback" else "succeeds"
                 self._report(
                     "BT305", span_of(after.key), "this child is never reached",
@@ -133,10 +144,11 @@ class _Hazards:
 
     def _reactive(self, node: TreeNode, kind: str) -> None:
         for at, child in enumerate(node.children[:-1]):
-            action = next((n for n in child.walk() if _is_action(n)), None)
+            action = _restarted(child)
             later = any(_takes_time(n) for other in node.children[at + 1 :] for n in other.walk())
             can = self._verdicts.of(child)
-            if action is not None and later and (can.succeed if kind == "sequence" else can.fail):
+            again = can.succeed if kind == "sequence" else can.fail
+            if action is not None and later and again and not self._doubts.below(node):
                 self._report(
                     "BT306", span_of(action.key),
                     f"this starts again at each tick while a later child of {node.name!r} runs",
@@ -148,7 +160,7 @@ class _Hazards:
         if not isinstance(after, float) or not node.children:
             return
         needed = budget(node.children[0], self._document)
-        if after < needed:
+        if after < needed and not self._doubts.below(node):
             self._report(
                 "BT307", span_of(node.written["after"]),
                 f"{after:g} s are less than the {needed:g} s that what it holds may take",
@@ -162,26 +174,33 @@ class _Hazards:
         seen = {*document.inputs, *document.topics}
         writers = Counter(write.name for n in root.walk() for write in self._checker.writes_of(n))
 
-        def visit(node: TreeNode, around: frozenset[str]) -> None:
+        def below(node: TreeNode) -> set[str]:
+            return {write.name for n in node.walk() for write in self._checker.writes_of(n)}
+
+        def visit(node: TreeNode, around: frozenset[str], later: frozenset[str]) -> None:
             kind = node.kind.name if node.kind is not None else ""
             own = {write.name for write in self._checker.writes_of(node)}
             each = kind == "for_each"
 
             def known(name: str) -> bool:
-                if name in seen:
+                if name in seen or self._doubts.unknown_action or self._doubts.mentions(name):
                     return True
                 return name in around and (name not in own or writers[name] > 1)
 
             self._early(node, known)
             if each:
                 seen.update(own)
-            if kind in _LOOPS or node.values.get("memory") is False:
-                around |= {write.name for n in node.walk() for write in self._checker.writes_of(n)}
+            if kind == "repeat":  # a read in its first round has nothing yet
+                later |= below(node)
+            elif kind in _LOOPS or node.values.get("memory") is False:
+                around |= below(node)
+            if kind not in ("repeat", "sequence"):  # who may go on after a read that failed
+                around |= later
             for child in node.children:
-                visit(child, around)
+                visit(child, around, later)
             seen.update(own)
 
-        visit(root, frozenset())
+        visit(root, frozenset(), frozenset())
 
     def _early(self, node: TreeNode, known: Callable[[str], bool]) -> None:
         checker = self._checker
@@ -199,30 +218,36 @@ class _Hazards:
     # BT308 to BT311
 
     def _unused(self) -> None:
-        checker, document = self._checker, self._document
+        checker, document, doubts = self._checker, self._document, self._doubts
         read = {one.name for reads in checker.reads.values() for one in reads}
         written = {w.name for node in document.nodes() for w in self._checker.writes_of(node)}
-        for name, declared in document.inputs.items():
-            if name not in read and name not in document.outputs:
-                self._report("BT308", span_of(declared.key), f"nothing reads the input {name!r}")
+        if not doubts.unknown_variable:
+            self._unread(read)
         for name in self._own(document.actions):
-            if name not in self._used:
+            if name not in self._used and not doubts.unknown_action and not doubts.mentions(name):
                 key = document.actions[name].key
                 self._report("BT309", span_of(key), f"no node uses the action {name!r}")
-        for name in self._own(document.topics):
-            if name not in read:
-                key = document.topics[name].key
-                self._report("BT309", span_of(key), f"nothing reads the topic {name!r}")
         for name, declared in document.outputs.items():
-            if name not in written and name not in document.inputs:
+            given = name in written or name in document.inputs
+            if not given and not doubts.unknown_action and not doubts.mentions(name):
                 text = f"nothing writes the output {name!r}"
                 self._report("BT311", span_of(declared.key), text)
+
+    def _unread(self, read: set[str]) -> None:
+        document, doubts = self._document, self._doubts
+        for name, declared in document.inputs.items():
+            if name not in read and name not in document.outputs and not doubts.mentions(name):
+                self._report("BT308", span_of(declared.key), f"nothing reads the input {name!r}")
+        for name in self._own(document.topics):
+            if name not in read and not doubts.mentions(name):
+                key = document.topics[name].key
+                self._report("BT309", span_of(key), f"nothing reads the topic {name!r}")
         known = read | set(document.outputs) | set(document.inputs) | set(document.topics)
         for node in document.nodes():
             if node.kind is not None and node.kind.name == "for_each":
                 continue
             for write in self._checker.writes_of(node):
-                if write.name not in known:
+                if write.name not in known and not doubts.mentions(write.name):
                     known.add(write.name)
                     at = _key_of(write.written, node, write.name)
                     text = f"nothing reads ${write.name}"
@@ -244,6 +269,19 @@ def _key_of(written: object, node: TreeNode, name: str) -> object:
 
 def _is_action(node: TreeNode) -> bool:
     return node.alias is not None or (node.kind is not None and node.kind.name == "action")
+
+
+def _restarted(root: TreeNode) -> TreeNode | None:
+    """The first action below that is sent again when `root` begins anew, or the tree it is in."""
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        inner = node.included.root if node.included is not None else None
+        if _is_action(node) or (inner is not None and _restarted(inner) is not None):
+            return node
+        if node.kind is None or node.kind.name != "run_once":
+            stack.extend(reversed(node.children))
+    return None
 
 
 def _takes_time(node: TreeNode) -> bool:

@@ -7,8 +7,10 @@ error, or silences nothing, is an error itself.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from bt_actions.document.findings import Finding, Severity, Span
+from bt_actions.document.comments import Comment, comments_of, scalars_of
+from bt_actions.document.findings import Severity, Span
 from bt_actions.document.rules import RULES
 from bt_actions.document.source import Source
 from bt_actions.suggest import did_you_mean
@@ -24,50 +26,71 @@ def apply_ignores(source: Source, *, complete: bool = True) -> None:
 
     `complete` is False when not all rules were tried: then no ignore is called useless.
     """
-    if "ignore" not in source.text:
+    if "ignore" not in source.text or source.root is None:
         return
-    for number, line in enumerate(source.lines, 1):
-        match = _IGNORE.search(line)
-        if match is None:
-            continue
+    there = {(finding.code, finding.line) for finding in source.findings}
+    silenced: set[tuple[str, int]] = set()
+    useless: list[tuple[str, Span]] = []
+    for comment, target in _targets(source):
+        for code, span in _codes(source, comment):
+            if not _can_be_silenced(source, code, span):
+                continue
+            if (code, target) in there and (code, target) not in silenced:
+                silenced.add((code, target))
+            else:
+                useless.append((code, span))
+    if silenced:
+        source.findings[:] = [
+            finding for finding in source.findings if (finding.code, finding.line) not in silenced
+        ]
+    for code, span in useless if complete else ():
+        source.report("BT120", span, f"there is no {code} here to silence")
+
+
+def _targets(source: Source) -> Iterator[tuple[Comment, int]]:
+    """The comments that hold an ignore, each with the line that it is about."""
+    assert source.root is not None
+    comments = list(comments_of(source, scalars_of(source.root)))
+    ignores = [comment for comment in comments if _IGNORE.search(comment.text)]
+    if not ignores:
+        return
+    below = _lines_below(source, {comment.line for comment in comments if comment.alone})
+    for comment in ignores:
+        yield comment, below[comment.line] if comment.alone else comment.line
+
+
+def _lines_below(source: Source, skipped: set[int]) -> list[int]:
+    """For each line the next one that says something; at the end the line itself."""
+    found = list(range(len(source.lines) + 1))
+    later = 0
+    for number in range(len(source.lines), 0, -1):
+        found[number] = later or number
+        if number not in skipped and source.lines[number - 1].strip():
+            later = number
+    return found
+
+
+def _codes(source: Source, comment: Comment) -> Iterator[tuple[str, Span]]:
+    """The rules that a comment names, each with its place; an ignore without one is reported."""
+    line, before = comment.line, comment.column - 1
+    for match in _IGNORE.finditer(comment.text):
         if not (match[1] or "").strip():
-            span = Span(number, match.start() + 1, number, match.end() + 1)
+            span = Span(line, before + match.start() + 1, line, before + match.end() + 1)
             hint = "# bt: ignore[BT301] why"
             source.report("BT119", span, "an ignore names the rules it silences", hint=hint)
             continue
-        target = number
-        if not line[: match.start()].strip():
-            target = _next_line(source, number)
         for code in _CODE.finditer(match[1]):
-            start = match.start(1) + code.start()
-            span = Span(number, start + 1, number, start + len(code[0]) + 1)
-            _apply(source, code[0], target, span, complete=complete)
+            start = before + match.start(1) + code.start() + 1
+            yield code[0], Span(line, start, line, start + len(code[0]))
 
 
-def _next_line(source: Source, number: int) -> int:
-    for later in range(number, len(source.lines)):
-        text = source.lines[later].strip()
-        if text and not text.startswith("#"):
-            return later + 1
-    return number
-
-
-def _apply(source: Source, code: str, line: int, span: Span, *, complete: bool) -> None:
+def _can_be_silenced(source: Source, code: str, span: Span) -> bool:
     rule = RULES.get(code)
     if rule is None:
         near = did_you_mean(code, RULES)
         source.report("BT119", span, f"there is no rule {code!r}{near}")
-        return
-    if rule.severity is Severity.ERROR:
+    elif rule.severity is Severity.ERROR:
         source.report("BT119", span, f"{code} is an error: it cannot be silenced")
-        return
-    kept: list[Finding] = []
-    silenced = False
-    for finding in source.findings:
-        if finding.code == code and finding.line == line:
-            silenced = True
-        else:
-            kept.append(finding)
-    source.findings[:] = kept
-    if complete and not silenced:
-        source.report("BT120", span, f"there is no {code} here to silence")
+    else:
+        return True
+    return False

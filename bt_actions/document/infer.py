@@ -34,9 +34,14 @@ def infer(
     roots: Mapping[str, FieldType | None],
     variable: Callable[[str], FieldType | None],
     report: Report,
+    *,
+    types: bool = True,
 ) -> FieldType | None:
-    """The type of an expression's value, or None when it is not known."""
-    return _Inference(expression, roots, variable, report).type_of(expression.tree)
+    """The type of an expression's value, or None when it is not known.
+
+    With `types=False` no constant of a message is looked up.
+    """
+    return _Inference(expression, roots, variable, report, types).type_of(expression.tree)
 
 
 def type_of_literal(value: object) -> FieldType | None:
@@ -71,7 +76,9 @@ class _Inference:
         roots: Mapping[str, FieldType | None],
         variable: Callable[[str], FieldType | None],
         report: Report,
+        types: bool,
     ) -> None:
+        self._types = types
         self._expression = expression
         self._roots = roots
         self._variable = variable
@@ -83,6 +90,8 @@ class _Inference:
                 return type_of_literal(value)
             case ast.Name(id=name):
                 return self._name(node, name)
+            case ast.Attribute() if (constant := self._expression.constant_of(node)) is not None:
+                return self._constant(node, constant)
             case ast.Attribute(value=inner, attr=attr):
                 return self._field(node, self.type_of(inner), attr)
             case ast.Subscript(value=inner, slice=index):
@@ -122,6 +131,15 @@ class _Inference:
         if name in ("true", "false"):
             return BOOL
         return self._roots.get(name)
+
+    def _constant(self, node: ast.expr, name: str) -> FieldType | None:
+        if not self._types:
+            return None
+        try:
+            return type_of_literal(self._expression.constant(name))
+        except ValueError as error:
+            self._wrong(node, str(error), "BT203")
+            return None
 
     def _field(self, node: ast.expr, owner: FieldType | None, name: str) -> FieldType | None:
         if owner is None:

@@ -126,7 +126,10 @@ def _plain(node: Node) -> object:
     from bt_actions.document.values import read_value
 
     source = Source("value", "")
-    return resolve(read_value(node, source), lambda name: f"${name}")
+    value = read_value(node, source)
+    for finding in source.findings:
+        raise ValueError(f"{finding.message} ({finding.hint})" if finding.hint else finding.message)
+    return resolve(value, lambda name: f"${name}")
 
 
 def _fit(document: Document, name: str, value: object, text: str, *, types: bool) -> object:

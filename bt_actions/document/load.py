@@ -18,6 +18,7 @@ from bt_actions.document.ignores import apply_ignores
 from bt_actions.document.inputs import TreeInput, check_inputs, inputs_of
 from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.tree import Document
+from bt_actions.document.unread import Doubts
 from bt_actions.document.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -74,18 +75,20 @@ def load_tree(
     from bt_actions.document.build import build
     from bt_actions.document.scope import Scope
 
-    document = _open(path, types=types, python=python)
+    workspace, document = _open(path, types=types, python=python)
     values = check_inputs(document, inputs or {}, types=types)
     scope = Scope.of_load(document.name)
     scope.write_all(values)
     root = build(document, scope, types=types)
+    _refuse(workspace.findings)  # a class of one's own may fail when it is made
     root.loaded = Loaded(document, scope)  # type: ignore[attr-defined]
     return root
 
 
 def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
     """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
-    return inputs_of(_open(path, types=False))
+    _, document = _open(path, types=False)
+    return inputs_of(document)
 
 
 def tree_outputs(root: Behaviour) -> dict[str, object]:
@@ -131,38 +134,42 @@ def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[
         for document in workspace.documents:
             checker = Checker(document, types=types, python=python)
             checker.check()
-            sound = not document.source.has_errors
-            if sound:  # what is wrong already would be told twice
-                find_hazards(checker)
-            apply_ignores(document.source, complete=sound)
+            doubts = Doubts(document)  # anew: the checker found more
+            find_hazards(checker, doubts)
+            apply_ignores(document.source, complete=not doubts.any)
     except TooManyErrors:
         return workspace.findings
     return workspace.findings
 
 
-def _open(path: PathLike, *, types: bool, python: bool = True) -> Document:
+def _open(path: PathLike, *, types: bool, python: bool = True) -> tuple[Workspace, Document]:
     workspace = Workspace()
     try:
         document = workspace.open(_found(path), _shown(path))
         findings = _checked(workspace, types=types, python=python)
     except TooManyErrors:
         document, findings = None, workspace.findings
-    errors = [finding for finding in findings if finding.severity is Severity.ERROR]
-    if errors:
-        raise DocumentError(errors)
+    _refuse(findings)
     assert document is not None
     if document.root is None:
         message = "this file is for trees to import: it holds no tree itself"
         document.source.report("BT106", Span(1, 1, 1, 2), message)
         raise DocumentError(document.source.findings)
-    return document
+    return workspace, document
+
+
+def _refuse(findings: list[Finding]) -> None:
+    """Raise DocumentError with the errors among findings, each once, if there are any."""
+    errors = dict.fromkeys(one for one in findings if one.severity is Severity.ERROR)
+    if errors:
+        raise DocumentError(errors)
 
 
 def _found(path: PathLike) -> Path:
     try:
         return find_tree(path)
     except TreeNotFoundError as error:
-        source = Source(os.fspath(path), "")
+        source = Source(os.fspath(path) or '""', "")
         hint = None if "mean" in str(error) else f"installed are {', '.join(installed_trees())}"
         source.report("BT100", Span(1, 1, 1, 2), str(error), hint=hint)
         raise DocumentError(source.findings) from None

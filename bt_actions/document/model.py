@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 
+from bt_actions.document.ros_names import RosName
 from bt_actions.document.scalars import (
     Choice,
     Condition,
@@ -102,7 +103,7 @@ RETRY = Record(
     short="attempts",
 )
 SERVICE_RETRY = Record("a number of attempts or a mapping", _keys(*_TRIES, _WHEN), short="attempts")
-NAMESPACE = Text("a namespace, as a text")
+NAMESPACE = RosName("a namespace", namespace=True)
 _POLICIES = (
     Key("timeout", TIMEOUT, "How long each phase may take; a bare duration is the result's."),
     Key("retry", RETRY, "How often to try; a bare number is the attempts."),
@@ -121,7 +122,7 @@ _DOING = (
 ACTION_KEYS = _keys(*_DOING)
 """What may stand beside an action's alias."""
 _TYPE = Key("type", TypeName("action"), "The action's type.", required=True)
-_SERVER = Text("the name of an action server, as a text")
+_SERVER = RosName("the name of an action server")
 ALIAS = Record(
     "an action: its type, server and settings",
     _keys(_TYPE, Key("server", _SERVER, "The action's name.", required=True), *_DOING),
@@ -146,10 +147,11 @@ OUTPUT = Record(
     short="type",
 )
 QOS = Choice(("default", "sensor", "latched", "best_effort", "services"))
+_TOPIC = RosName("the name of a topic")
 TOPIC = Record(
     "a topic: its name and type",
     _keys(
-        Key("topic", Text("the name of a topic, as a text"), "The topic's name.", required=True),
+        Key("topic", _TOPIC, "The topic's name.", required=True),
         Key("type", TypeName("msg"), "The message's type.", required=True),
         Key("qos", QOS, "How it is subscribed to.", default="default"),
         Key("max_age", Duration(or_none=True), default="none",
@@ -336,7 +338,7 @@ def _all() -> Iterable[Kind]:
         "service: Switch the light on\ntype: std_srvs/srv/SetBool\nserver: light\n"
         "request: {data: true}\nexpect: result.success",
         Key("type", TypeName("srv"), "The service's type.", required=True),
-        Key("server", Text("the name of a service, as a text"), "The service.", required=True),
+        Key("server", RosName("the name of a service"), "The service.", required=True),
         Key("request", Values(), "The fields of the request."),
         Key("timeout", SERVICE_TIMEOUT, "How long to wait; a bare duration is the answer's."),
         Key("retry", SERVICE_RETRY, "How often to try; a bare number is the attempts."),
@@ -346,7 +348,7 @@ def _all() -> Iterable[Kind]:
     )
     yield _leaf(
         "publish",
-        Text("the name of a topic, as a text"),
+        _TOPIC,
         "Publishes a message.",
         "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
         Key("type", TypeName("msg"), "The message's type.", required=True),
@@ -360,7 +362,7 @@ def _all() -> Iterable[Kind]:
         "Succeeds with the first message, since it started, that fits.",
         "wait_for_message: The door opens\ntopic: door\ntype: std_msgs/msg/Bool\n"
         "until: message.data\ntimeout: 60 s",
-        Key("topic", Text("the name of a topic, as a text"), "The topic.", required=True),
+        Key("topic", _TOPIC, "The topic.", required=True),
         Key("type", TypeName("msg"), "The message's type.", required=True),
         Key("until", Condition(_MESSAGE), "What the message must be.", default="any message"),
         Key("timeout", Duration(or_none=True), "After which it fails.", default="none"),

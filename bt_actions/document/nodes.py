@@ -16,7 +16,18 @@ import yaml
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.source import Source
 
-__all__ = ["MAX_DEPTH", "MAX_NODES", "Listing", "Mapping", "Node", "Scalar", "compose", "span_of"]
+__all__ = [
+    "MAX_DEPTH",
+    "MAX_NODES",
+    "Alias",
+    "Listing",
+    "Mapping",
+    "Node",
+    "Scalar",
+    "compose",
+    "compose_written",
+    "span_of",
+]
 
 MAX_DEPTH = 200
 """Levels of YAML nesting; a level of the tree takes two."""
@@ -90,6 +101,13 @@ class Mapping(Node):
         return None
 
 
+class Alias(Node):
+    """``*name``, where `compose_written` leaves it standing."""
+
+    __slots__ = ("name",)
+    name: str
+
+
 def span_of(node: Node) -> Span:
     """The range of a node."""
     return Span(node.line, node.column, node.end_line, node.end_column)
@@ -114,9 +132,22 @@ def compose(source: Source) -> Node | None:
     What is wrong is reported to the source; after a syntax error nothing can be read on. Raises
     ImportError, with the name libyaml, where that is missing.
     """
+    source.root = _composed(_Composer(source), source)
+    return source.root
+
+
+def compose_written(source: Source) -> tuple[Node | None, dict[int, str]]:
+    """As `compose`, but nothing is unfolded or merged: aliases stand as `Alias`.
+
+    Also gives the anchors, by the `id` of what they name.
+    """
+    composer = _Composer(source, unfold=False)
+    return _composed(composer, source), composer.anchored
+
+
+def _composed(composer: _Composer, source: Source) -> Node | None:
     if not yaml.__with_libyaml__:
         raise ImportError(NO_LIBYAML, name="libyaml")
-    composer = _Composer(source)
     try:
         for event in yaml.parse(source.text, Loader=yaml.CSafeLoader):
             composer.take(event)
@@ -144,10 +175,12 @@ class _Open:
 class _Composer:
     """Puts events together. No recursion: the depth of a text is the text's author's."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, *, unfold: bool = True) -> None:
         self.root: Node | None = None
         self.gave_up = False
         self._source = source
+        self.anchored: dict[int, str] = {}
+        self._unfold = unfold
         self._stack: list[_Open] = []
         self._anchors: dict[str, tuple[Node, int] | None] = {}
         self._documents = 0
@@ -190,9 +223,12 @@ class _Composer:
             node.plain = False
             if tag not in ("!", "tag:yaml.org,2002:str"):
                 self._report("BT109", event, f"the tag {tag!r} has no meaning in a tree")
+                self._source.settled.add(_event_span(event))
+                self._source.unread.nodes.append(node)
         _place(node, event)
         if event.anchor is not None:
             self._source.anchored = True
+            self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = (node, 1)
         self._add(node, 1)
 
@@ -207,6 +243,7 @@ class _Composer:
         node.flow = bool(event.flow_style)
         if event.anchor is not None:
             self._source.anchored = True
+            self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = None
         self._stack.append(_Open(node, event.anchor))
 
@@ -224,7 +261,7 @@ class _Composer:
                 last = node.items[-1]
             if last is not None and (last.end_line, last.end_column) > (node.line, node.column):
                 node.end_line, node.end_column = last.end_line, last.end_column
-        if type(node) is Mapping and "<<" in done.keys:
+        if type(node) is Mapping and "<<" in done.keys and self._unfold:
             self._merge(node)
         if done.anchor is not None:
             self._anchors[done.anchor] = (node, done.size)
@@ -239,6 +276,12 @@ class _Composer:
         if found is None:
             self._report("BT105", event, f"*{event.anchor} holds itself")
             self.gave_up = True
+            return
+        if not self._unfold:
+            alias = Alias()
+            alias.name = event.anchor
+            _place(alias, event)
+            self._add(alias, 1)
             return
         self._size += found[1] - 1
         self._add(*found)
@@ -257,7 +300,9 @@ class _Composer:
         elif frame.key is None:
             frame.key = self._key(frame, node)
         else:
-            if frame.key is not _REFUSED:
+            if frame.key is _REFUSED:
+                self._source.unread.nodes.append(node)
+            else:
                 owner.pairs.append((frame.key, node))
             frame.key = None
 
@@ -288,6 +333,7 @@ class _Composer:
                 if not isinstance(merged, Mapping):
                     message = "'<<' merges a mapping, or a list of mappings"
                     self._source.report("BT109", span_of(merged), message)
+                    self._source.unread.nodes.append(merged)
                     continue
                 for inner_key, inner_value in merged.pairs:
                     if inner_key.text not in own:

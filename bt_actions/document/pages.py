@@ -17,11 +17,16 @@ __all__ = ["PAGES", "Page", "page"]
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """The text of a rule; an example that no text can show is empty."""
+    """The text of a rule with two trees, or for what no tree can show with two commands."""
 
     text: str
-    wrong: str = ""
-    right: str = ""
+    wrong: str
+    right: str
+
+    @property
+    def language(self) -> str:
+        """What the examples are written in."""
+        return "yaml" if self.wrong.startswith(("tree:", "- ")) else "sh"
 
 
 def page(code: str) -> str:
@@ -29,8 +34,7 @@ def page(code: str) -> str:
     rule, said = RULES[code], PAGES[code]
     parts = [f"{code}: {rule.title} ({rule.severity})", "", textwrap.fill(said.text, 88), ""]
     for word, example in (("Wrong", said.wrong), ("Right", said.right)):
-        if example:
-            parts += [f"{word}:", "", textwrap.indent(example.rstrip("\n"), "    "), ""]
+        parts += [f"{word}:", "", textwrap.indent(example.rstrip("\n"), "    "), ""]
     return "\n".join(parts)
 
 
@@ -51,16 +55,23 @@ def _move(body: str) -> str:
     return "tree: example\n" + _MOVE + textwrap.dedent(body).lstrip("\n")
 
 
+_CAFE = r"printf 'tree: t\nroot: {success: Caf\351}\n' "
 _SUCCESS = "root: {success: Done}\n"
 PAGES: Mapping[str, Page] = MappingProxyType(
     {
         "BT100": Page(
             "The file is not there, is a directory, may not be read, or is larger than a tree can "
-            "be. Trees are found by their path, or by the name of an installed tree."
+            "be. Trees are found by their path, or by the name of an installed tree. (The examples "
+            "are commands of a shell.)",
+            "bt-actions check pick_and_plac\n",
+            "bt-actions check pick_and_place\n",
         ),
         "BT101": Page(
             "Trees are written in UTF-8, without control characters. Save the file as UTF-8; most "
-            "editors can."
+            "editors can. (The examples are commands of a shell: the é of Latin-1, as it is and "
+            "converted.)",
+            _CAFE + "| bt-actions check -\n",
+            _CAFE + "| iconv -f latin1 -t utf-8 | bt-actions check -\n",
         ),
         "BT102": Page(
             "The text is not YAML, so that nothing else in it can be checked. Most often the "
@@ -151,7 +162,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
         ),
         "BT116": Page(
             "A '#' behind a space begins a comment, wherever it stands. Put the text in quotes "
-            "where it belongs to it.",
+            "where it belongs to it. Where a space follows the '#', a comment was meant, and "
+            "nothing is said; nor is it behind numbers, times and single words of the language.",
             _tree("root: \n  success: Part #3\n"),
             _tree('root: \n  success: "Part #3"\n'),
         ),
@@ -178,6 +190,14 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             "comes later.",
             _tree("root: {success: Done}  # bt: ignore[BT304] no longer a retry\n"),
             _tree(_SUCCESS),
+        ),
+        "BT121": Page(
+            "The names of topics, services, actions and namespaces are letters, digits and "
+            "underscores between slashes; no part begins with a digit. '/' at the beginning makes "
+            "a name absolute, '~/' one of the node's own. ROS refuses all others when the tree "
+            "starts.",
+            _tree("root: {publish: the lamp, type: std_msgs/msg/Bool}\n"),
+            _tree("root: {publish: the_lamp, type: std_msgs/msg/Bool}\n"),
         ),
         "BT201": Page(
             "No kind of node has this name, and the tree declares no action of this name.",

@@ -11,10 +11,12 @@ from collections.abc import Mapping as MappingType
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS, Kind
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
+from bt_actions.document.scalars import Name
 from bt_actions.document.shape import words_for
 from bt_actions.document.shapes import Key, read_keys, report_unknown_key
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.unread import Doubts
 from bt_actions.document.values import BAD
 from bt_actions.suggest import closest, did_you_mean, listing
 
@@ -116,9 +118,15 @@ class _Reader:
     def __init__(self, document: Document) -> None:
         self._source = document.source
         self._actions = document.actions
-        self._topics = document.topics
+        self._doubts = Doubts(document)
 
     def node(self, written: Node) -> TreeNode | None:
+        node = self._node(written)
+        if node is None:
+            self._source.unread.nodes.append(written)
+        return node
+
+    def _node(self, written: Node) -> TreeNode | None:
         source = self._source
         if not isinstance(written, Mapping):
             hint = None
@@ -172,13 +180,12 @@ class _Reader:
             hint = "one key of a node is its kind, such as 'sequence: name'"
             self._source.report("BT111", _first(written), "this node has no kind", hint=hint)
             return
+        self._source.unread.actions = True
+        if any(self._doubts.declares(word.text) for word in words):
+            return
         known = [*KINDS, *self._actions]
-        key, near = words[0], ""
-        for word in words:
-            near = did_you_mean(word.text, known)
-            if near:
-                key = word
-                break
+        key = next((word for word in words if closest(word.text, known)), words[0])
+        near = did_you_mean(key.text, known)
         own = listing(self._actions)
         hint = f"this tree's actions are {own}" if own else "this tree declares no actions"
         message = f"no kind of node and no action is called {key.text!r}{near}"
@@ -202,6 +209,8 @@ class _Reader:
                 node.values[name] = value
                 if kind.named_by_value and isinstance(value, str):
                     node.name = value
+                if value is BAD:
+                    source.unread.nodes.append(inner)
             elif name in _CHILDREN and name in keys:
                 node.written[name] = inner
                 self._children(node, name, inner)
@@ -210,11 +219,15 @@ class _Reader:
                 if known is None:
                     unknown = True
                     self._report_unknown(node, key, keys)
+                    source.unread.nodes += (key, inner)
                     if name in _CHILDREN:
                         self._children(TreeNode(None, key, node.node, source), name, inner)
                     continue
                 node.written[name] = inner
-                node.values[name] = known.shape.read(inner, source)
+                value = node.values[name] = known.shape.read(inner, source)
+                if value is BAD:
+                    source.unread.nodes.append(inner)
+                    source.unread.names |= isinstance(known.shape, Name)
         own = node.values.get("name")
         if isinstance(own, str):
             node.name = own
@@ -226,6 +239,7 @@ class _Reader:
                     "BT108", span_of(node.key),
                     f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,
                 )  # fmt: skip
+                source.unread.nodes.append(node.key)
 
     def _report_unknown(self, node: TreeNode, key: Scalar, keys: MappingType[str, Key]) -> None:
         if key.text in _CHILDREN:
@@ -241,6 +255,7 @@ class _Reader:
             if isinstance(inner, Listing):
                 message = "'child' is one node, not a list"
                 self._source.report("BT109", span_of(inner), message, hint="use a sequence")
+                self._source.unread.nodes.append(inner)
                 written: list[Node] = inner.items
             else:
                 written = [inner]
@@ -248,11 +263,13 @@ class _Reader:
             message = f"a list of nodes is needed, not {words_for(inner)}"
             hint = "each child begins with '- '" if isinstance(inner, Mapping) else None
             self._source.report("BT109", span_of(inner), message, hint=hint)
+            self._source.unread.nodes.append(inner)
             return
         else:
             written = inner.items
             if not written:
                 self._source.report("BT110", span_of(inner), "there must be a child at least")
+                self._source.unread.nodes.append(inner)
         for item in written:
             child = self.node(item)
             if child is not None:

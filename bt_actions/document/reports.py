@@ -6,9 +6,11 @@ Pure functions from findings to text.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import PurePath
 from types import MappingProxyType
+from urllib.parse import quote
 
 from bt_actions.document.findings import Finding, Severity
 from bt_actions.document.rules import RULES
@@ -139,5 +141,5 @@ def _sarif_result(finding: Finding, used: list[str]) -> dict[str, object]:
 
 
 def _sarif_place(file: str, region: dict[str, int]) -> dict[str, object]:
-    uri = PurePath(file).as_posix()
+    uri = quote(os.fsencode(PurePath(file).as_posix()))
     return {"physicalLocation": {"artifactLocation": {"uri": uri}, "region": region}}

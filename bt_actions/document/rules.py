@@ -52,6 +52,7 @@ RULES = MappingProxyType(
             Rule("BT118", "[ ends a text inside { } and [ ]"),
             Rule("BT119", "an ignore that names no rule"),
             Rule("BT120", "an ignore that silences nothing"),
+            Rule("BT121", "a name that ROS does not take"),
             Rule("BT201", "unknown kind or action"),
             Rule("BT202", "unknown variable"),
             Rule("BT203", "a message has no such field"),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from bt_actions.document.findings import Span
+from bt_actions.document.cut import warn_cut
 from bt_actions.document.nodes import Node, Scalar, span_of
 from bt_actions.document.shape import Schema, is_computed, or_variable, words_for, wrong_form
 from bt_actions.document.source import Source
@@ -37,6 +37,7 @@ class Text:
             return wrong_form(self, node, source)
         if self.values:
             return read_value(node, source)
+        warn_cut(node, source, "text")
         return node.text
 
     def schema(self) -> Schema:
@@ -68,30 +69,12 @@ class NodeName:
         if len(text) > _NAME_LIMIT or not text.isprintable():
             source.report("BT113", span_of(node), "a name is one line of up to 200 characters")
             return BAD
-        _warn_cut(node, source)
+        warn_cut(node, source, "name")
         return text
 
     def schema(self) -> Schema:
         pattern: Schema = {"type": ["string", "number", "boolean"], "pattern": "^[^:]+$"}
         return {"anyOf": [pattern, {"type": "null"}]} if self.optional else pattern
-
-
-def _warn_cut(node: Scalar, source: Source) -> None:
-    """`Pick #3` is the text `Pick` and a comment: say so where the comment has no space."""
-    if not node.plain or node.line != node.end_line:
-        return
-    line = source.line(node.end_line) or ""
-    rest = line[node.end_column - 1 :]
-    if "#" not in rest:
-        return
-    mark = rest.lstrip()
-    if len(mark) > 1 and mark[0] == "#" and mark[1] not in " #!":
-        at = node.end_column + len(rest) - len(mark)
-        source.report(
-            "BT116", Span(node.line, at, node.line, len(line) + 1),
-            f"{mark!r} is read as a comment: the name is {node.text!r}",
-            hint="put the name in quotes, or a space behind the '#'",
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,7 +246,10 @@ class Condition:
         if not isinstance(node, Scalar) or node.value is None:
             return wrong_form(self, node, source)
         expression = read_expression(node, source, node.text, 0, self.roots)
-        return BAD if expression is None else Computed(expression, node)
+        if expression is None:
+            return BAD
+        warn_cut(node, source, "expression")
+        return Computed(expression, node)
 
     def schema(self) -> Schema:
         return {"type": ["string", "boolean"]}

@@ -108,8 +108,12 @@ class Table:
         for key, inner in node.pairs:
             name = Name().read(key, source)
             value = self.item.read(inner, source)
-            if name is not BAD:
-                found[key.text] = value
+            if name is BAD:
+                source.unread.nodes += (key, inner)
+                continue
+            found[key.text] = value
+            if value is BAD:
+                source.unread.nodes.append(inner)
         return found
 
     def schema(self) -> Schema:
@@ -191,13 +195,17 @@ def read_keys(
         if known is None:
             unknown = True
             report_unknown_key(key, all_keys or keys, source)
-        else:
-            values[key.text] = known.shape.read(inner, source)
+            source.unread.nodes += (key, inner)
+            continue
+        value = values[key.text] = known.shape.read(inner, source)
+        if value is BAD:
+            source.unread.nodes.append(inner)
     if not unknown:  # a misspelt key would be reported twice
         for key_model in keys.values():
             if key_model.required and key_model.name not in values:
                 source.report("BT108", span_of(node), f"the key {key_model.name!r} is missing",
                               hint=key_model.doc)  # fmt: skip
+                source.unread.nodes.append(node.pairs[0][0] if node.pairs else node)
     return values
 
 

@@ -5,25 +5,51 @@ Reading never takes more than `MAX_BYTES` of memory, whatever the path leads to.
 
 from __future__ import annotations
 
+import os
 import re
 import stat
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
 
 from bt_actions.document.findings import DocumentError, Finding, Related, Severity, Span
 from bt_actions.document.rules import RULES
 
-__all__ = ["MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "read_source", "source_of"]
+if TYPE_CHECKING:
+    from bt_actions.document.nodes import Node
+
+__all__ = [
+    "MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "Unread", "read_source", "read_stream",
+    "source_of",
+]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
 """The largest file that is read; a tree of 100,000 nodes has about a third of it."""
 MAX_ERRORS = 1000
 """After so many errors the checker stops: each costs time to explain."""
+PIPE_PATIENCE = 5.0
+"""Seconds in which somebody must begin to write to a named pipe that is to be read."""
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 class TooManyErrors(Exception):
     """A document has more errors than anybody wants to read; they are in its source."""
+
+
+@dataclass(slots=True)
+class Unread:
+    """What was reported and is read no further; `unread.py` says what follows from it."""
+
+    nodes: list[Node] = field(default_factory=list)
+    meant: set[str] = field(default_factory=set)
+    """Names that unknown ones probably stand for."""
+    names: bool = False
+    """Whether any name may have been declared: in a file that is not there, as a loop's item."""
+    variables: bool = False
+    """Whether a variable is unknown, and nothing says which is meant."""
+    actions: bool = False
+    """Whether a node's kind is unknown."""
 
 
 @dataclass(slots=True, eq=False)
@@ -36,6 +62,11 @@ class Source:
     findings: list[Finding] = field(default_factory=list)
     anchored: bool = False
     """Whether the text names parts of itself (&name); known after it was composed."""
+    root: Node | None = None
+    """The text as YAML nodes, after it was composed."""
+    unread: Unread = field(default_factory=Unread)
+    settled: set[Span] = field(default_factory=set)
+    """Scalars about which enough was said."""
     _lines: list[str] | None = None
 
     @property
@@ -60,6 +91,8 @@ class Source:
         related: Related | None = None,
     ) -> None:
         """File a finding; its severity is its rule's. Raises TooManyErrors after `MAX_ERRORS`."""
+        if span in self.settled:
+            return
         if len(self.findings) >= MAX_ERRORS and RULES[code].severity is Severity.ERROR:
             raise TooManyErrors
         line = self.line(span.line)
@@ -80,12 +113,14 @@ class Source:
 
 def read_source(path: Path, name: str | None = None) -> Source:
     """The source in a file. Raises DocumentError when it cannot be read as text."""
-    name = str(path) if name is None else name
+    name = name or str(path)
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
             raise _unreadable(name, "this is a directory, not a tree")
-        if not stat.S_ISREG(mode) and not stat.S_ISFIFO(mode):
+        if stat.S_ISFIFO(mode):
+            return source_of(_read_pipe(path, name), name, path)
+        if not stat.S_ISREG(mode):
             raise _unreadable(name, "this is no regular file")
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)
@@ -94,9 +129,49 @@ def read_source(path: Path, name: str | None = None) -> Source:
     except FileNotFoundError:
         raise _unreadable(name, "there is no such file") from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise _unreadable(name, f"this cannot be read: {reason}") from None
+        raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
     return source_of(data, name, path)
+
+
+def read_stream(stream: BinaryIO | None, name: str) -> Source:
+    """The source in a stream; None is one that is closed. Raises DocumentError as `read_source`."""
+    if stream is None:
+        raise _unreadable(name, "this is closed: there is nothing to read")
+    try:
+        data = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
+    return source_of(data, name)
+
+
+def _read_pipe(path: Path, name: str) -> bytes:
+    """What comes through a pipe (`<(command)` of a shell is one), once somebody writes to it.
+
+    Opening it the ordinary way would wait for a writer without end.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    with open(descriptor, "rb") as stream:  # noqa: PTH123 - a descriptor has no path
+        deadline = time.monotonic() + PIPE_PATIENCE
+        first = _first_bytes(descriptor)
+        while first == b"" and time.monotonic() < deadline:
+            time.sleep(0.01)  # nothing tells of a writer who has only opened the pipe
+            first = _first_bytes(descriptor)
+        if first == b"":
+            raise _unreadable(name, f"nobody wrote to this pipe within {PIPE_PATIENCE:g} s")
+        os.set_blocking(descriptor, True)
+        return (first or b"") + stream.read(MAX_BYTES + 1)
+
+
+def _first_bytes(descriptor: int) -> bytes | None:
+    """What is in a pipe; nothing when nobody writes to it, None when a writer is still thinking."""
+    try:
+        return os.read(descriptor, MAX_BYTES)
+    except BlockingIOError:
+        return None
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 def source_of(data: bytes, name: str, path: Path | None = None) -> Source:

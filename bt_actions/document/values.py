@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
 from bt_actions.document.source import Source, read_source
@@ -25,6 +26,7 @@ __all__ = [
     "Interpolated",
     "Lookup",
     "computed_in",
+    "constant_of",
     "inner_span",
     "locate",
     "names_file",
@@ -83,7 +85,12 @@ _DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
 def read_value(node: Node, source: Source) -> object:
     """Plain data with `Computed` and `Interpolated` in it, or BAD after reporting what is wrong."""
     if isinstance(node, Scalar):
-        return _read_scalar(node, source)
+        value = _read_scalar(node, source)
+        if isinstance(value, (str, Interpolated)):
+            warn_cut(node, source, "text")
+        elif isinstance(value, Computed) and value.start:  # $name alone may be a number
+            warn_cut(node, source, "expression")
+        return value
     bad = False
     if isinstance(node, Listing):
         items = [read_value(item, source) for item in node.items]
@@ -108,7 +115,24 @@ def _read_scalar(node: Scalar, source: Source) -> object:
         return _computed(node, source, text[2:], 2)
     if _VARIABLE.fullmatch(text):
         return _computed(node, source, text, 0)
+    if node.plain and _lacks_space(text):
+        span = inner_span(node, source, 0, 1)
+        quotes = "" if "$" in text else ", or put it in quotes to mean the text"
+        hint = f"write '= {text[1:]}'{quotes}"
+        source.report("BT114", span, "'=' computes only with a space behind it", hint=hint)
+        return BAD
     return _interpolated(node, source)
+
+
+def _lacks_space(text: str) -> bool:
+    """Whether a text is an expression but for the space behind its '='."""
+    if not text.startswith("="):
+        return False
+    try:
+        _expression(text[1:], frozenset())
+    except ExpressionError:
+        return False
+    return True
 
 
 def names_file(text: str) -> bool:
@@ -168,6 +192,8 @@ def _interpolated(node: Scalar, source: Source) -> object:
         if match[1] is None:
             span = inner_span(node, source, match.start(), match.end())
             hint = "write $(name) inside a text, and $$ for a dollar sign"
+            if _lacks_space(text):
+                hint = f"write '= {text[1:]}' with a space to compute it"
             source.report("BT115", span, "this dollar sign refers to nothing", hint=hint)
             return BAD
         written = "$" + match[1].strip()
@@ -196,21 +222,20 @@ def read_expression(
         return _expression(text, roots)
     except ExpressionError as error:
         span = inner_span(node, source, start + error.column, start + error.end_column)
-        source.report("BT114", span, error.message, hint=_cut_hint(node, source))
+        source.report("BT114", span, error.message, hint=cut_hint(node, source))
         return None
 
 
 @lru_cache(maxsize=4096)
 def _expression(text: str, roots: frozenset[str]) -> Expression:
     """An expression never changes, and a tree says the same thing in many places."""
-    return Expression(text, roots=roots)
+    return Expression(text, roots=roots, constants=_named_constant)
 
 
-def _cut_hint(node: Scalar, source: Source) -> str | None:
-    line = source.line(node.end_line) or ""
-    if node.plain and line[node.end_column - 1 :].lstrip().startswith("#"):
-        return "the '#' after it begins a comment: put the text in quotes"
-    return None
+def _named_constant(name: str) -> object:
+    from bt_actions.ros.conveniences import constant  # here, so that reading a tree needs no ROS
+
+    return constant(name, None)
 
 
 def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
@@ -261,6 +286,17 @@ def computed_in(value: object) -> Iterator[Computed]:
     elif isinstance(value, list):
         for item in value:
             yield from computed_in(item)
+
+
+def constant_of(computed: Computed) -> object:
+    """The value of an expression over nothing but numbers and texts; None for any other."""
+    expression = computed.expression
+    if expression.names or expression.roots or expression.constants:
+        return None
+    try:
+        return computed.evaluate(lambda _name: None)
+    except ExpressionError:
+        return None
 
 
 def resolve(value: object, variable: Lookup) -> object:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from bt_actions.document.build_names import settings_of
@@ -41,6 +42,9 @@ class Verdicts:
             return _FIXED[kind]
         if kind in ("log", "wait"):
             return Can(True, any(True for _ in computed_in(node.values.get(kind))))
+        if kind in ("set", "publish"):
+            data = node.values.get("set" if kind == "set" else "message")
+            return Can(True, any(True for _ in computed_in(data)))
         if kind == "subtree":
             return self._subtree(node)
         if not node.children:
@@ -80,25 +84,59 @@ def budget(node: TreeNode, document: Document) -> float:
     kind = node.kind.name if node.kind is not None else ""
     if node.alias is not None or kind == "action":
         settings = settings_of(node, document)
-        timeout, retry = settings.get("timeout"), settings.get("retry")
-        result = timeout.get("result") if isinstance(timeout, dict) else None
-        attempts = retry.get("attempts", 1) if isinstance(retry, dict) else 1
-        known = isinstance(result, float) and isinstance(attempts, int)
-        return result * attempts if known else 0.0  # type: ignore[operator]
-    if kind == "wait":
-        wait = node.values.get("wait")
-        return wait if isinstance(wait, float) else 0.0
+        return _tries(_deadline(settings, "result"), settings.get("retry"))
+    if kind == "service":
+        return _tries(_deadline(node.values, "response"), node.values.get("retry"))
+    if kind in ("wait", "wait_until", "wait_for_message"):
+        limit = node.values.get("wait" if kind == "wait" else "timeout")
+        return limit if isinstance(limit, float) else 0.0
     if node.included is not None and node.included.root is not None:
         return budget(node.included.root, node.included)
     inner = [budget(child, document) for child in node.children]
     if not inner:
         return 0.0
-    if kind == "sequence":
+    if kind in ("sequence", "fallback"):
         return sum(inner)
     after = node.values.get("after")
     if kind == "timeout" and isinstance(after, float):
         return min(after, inner[0])
-    times = node.values.get("attempts" if kind == "retry" else "times")
-    if kind in ("retry", "repeat") and isinstance(times, int):
-        return inner[0] * times
-    return max(inner)
+    if kind == "retry":
+        return _tries(inner[0], node.values)
+    return inner[0] * _rounds(kind, node) if len(inner) == 1 else max(inner)
+
+
+def _deadline(settings: Mapping[str, object], name: str) -> float:
+    timeout = settings.get("timeout")
+    limit = timeout.get(name) if isinstance(timeout, dict) else None
+    return limit if isinstance(limit, float) else 0.0
+
+
+def _rounds(kind: str, node: TreeNode) -> float:
+    """How often a node has its child run, where the document says so."""
+    times, items = node.values.get("times"), node.values.get("in")
+    if kind == "repeat" and isinstance(times, int):
+        return _float(times)
+    return float(len(items)) if kind == "for_each" and isinstance(items, list) else 1.0
+
+
+def _tries(each: float, retry: object) -> float:
+    """The seconds of all tries and the pauses between; nothing where a try has no limit."""
+    if not isinstance(retry, dict) or each == 0.0:
+        return each
+    attempts = retry.get("attempts", 1)
+    if not isinstance(attempts, int):
+        return each
+    pause: float = retry.get("backoff", 0.0)
+    factor: float = retry.get("factor", 2.0)
+    longest: float = retry.get("max_backoff", 60.0)
+    total, left = each * _float(attempts), attempts - 1
+    if not pause:
+        return total
+    while left > 0 and pause < longest and factor > 1.001:
+        total, pause, left = total + pause, pause * factor, left - 1
+    return total + _float(left) * min(pause, longest)
+
+
+def _float(count: int) -> float:
+    """A whole number as one that no arithmetic overflows with."""
+    return float(min(count, 10**12))

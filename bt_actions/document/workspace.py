@@ -54,7 +54,7 @@ class Workspace:
         found = list(self._unreadable)
         for source in self._sources:
             found += sorted(source.findings, key=lambda one: (one.line, one.column, one.code))
-        return found
+        return list(dict.fromkeys(found))  # what an alias repeats is wrong once
 
     def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
         key = (_key(source.path or Path(source.name)), False)
@@ -121,9 +121,11 @@ class Workspace:
         try:
             return read_source(path, _shown(path, source))
         except DocumentError as error:
-            self._unreadable += error.findings
-            text = f"{path.name}: {error.findings[0].message}"
-            source.report("BT209", span_of(written), text)
+            first = error.findings[0]
+            if first.code == "BT101":  # told where it stands in that file, as all that is wrong
+                self._unreadable += error.findings
+            else:
+                source.report("BT209", span_of(written), f"{path.name}: {first.message}")
             return None
 
     def _import(self, document: Document, chain: tuple[Path, ...]) -> None:
@@ -137,6 +139,7 @@ class Workspace:
         for name, node in zip(names, nodes, strict=True):
             library = self._library(str(name), node, document.source, chain)
             if library is None:
+                document.source.unread.names = True
                 continue
             document.imported.append(library)
             for theirs, ours in (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,10 @@ from bt_actions.ros.fields import FieldType, Listing, Message, Scalar
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker
 
-__all__ = ["Write", "writes_of"]
+__all__ = ["Write", "infer_variables", "writes_of"]
+
+_ROUNDS = 8
+"""How far a type is followed from variable to variable, before none is taken for known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,8 @@ class Write:
         if not isinstance(self.value, Computed):
             return type_of_literal(self.value)
         roots = {} if self.root is None else {self.root: _root_type(self.node, self.root, checker)}
-        return infer(self.value.expression, roots, checker.variables.get, lambda *_: None)
+        return infer(self.value.expression, roots, checker.variables.get, lambda *_: None,
+                     types=checker.types)  # fmt: skip
 
     def _item_type(self, checker: Checker) -> FieldType | None:
         """The type of what a for_each gives its child."""
@@ -49,7 +53,8 @@ class Write:
             return kinds.pop() if len(kinds) == 1 else None
         if not isinstance(self.value, Computed):
             return None
-        kind = infer(self.value.expression, {}, checker.variables.get, lambda *_: None)
+        kind = infer(self.value.expression, {}, checker.variables.get, lambda *_: None,
+                     types=checker.types)  # fmt: skip
         return kind.item if isinstance(kind, Listing) else None
 
     def _output_type(self, checker: Checker) -> FieldType | None:
@@ -97,6 +102,41 @@ def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
         index = values.get("index")
         if isinstance(index, str):
             yield Write(index, node, node.written["index"], 0)
+
+
+def infer_variables(written: Iterable[Write], checker: Checker) -> None:
+    """Give the variables that nodes write the one type that all of them write, or None.
+
+    What is declared keeps its type. A value may be computed from a variable that is written further
+    down, or from itself (a counter): so unknown types are left out of account at first, and count
+    once every variable has had its chance.
+    """
+    writers: dict[str, list[Write]] = {}
+    for write in written:
+        if write.name not in checker.variables or write.name in writers:
+            writers.setdefault(write.name, []).append(write)
+            checker.variables.setdefault(write.name, None)
+    changed = True
+    for _ in range(_ROUNDS):
+        if not changed:
+            break
+        changed = False
+        for name, writes in writers.items():
+            if checker.variables[name] is None:
+                kinds = {write.type_in(checker) for write in writes} - {None}
+                checker.variables[name] = kinds.pop() if len(kinds) == 1 else None
+                changed |= checker.variables[name] is not None
+    for _ in range(_ROUNDS):
+        changed = False
+        for name, writes in writers.items():
+            known = checker.variables[name]
+            if known is not None and any(write.type_in(checker) != known for write in writes):
+                checker.variables[name] = None
+                changed = True
+        if not changed:
+            return
+    for name in writers:
+        checker.variables[name] = None
 
 
 def _root_type(node: TreeNode, root: str, checker: Checker) -> FieldType | None:

@@ -10,18 +10,21 @@ import importlib
 import math
 import re
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 from bt_actions.ros.fields import constants
-from bt_actions.ros.interfaces import UnknownInterface, interface, short_name
+from bt_actions.ros.interfaces import Kind, UnknownInterface, installed, interface, short_name
 from bt_actions.suggest import did_you_mean
 from bt_actions.units import parse_angle, parse_duration
 
-__all__ = ["constant", "duration_of", "quaternion_of", "time_of"]
+__all__ = ["ANGLES", "constant", "duration_of", "quaternion_of", "time_of"]
 
 _BILLION = 1_000_000_000
 _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
 _PARTS = ("Goal", "Result", "Feedback", "Request", "Response")
-_ANGLES = ("roll", "pitch", "yaw")
+_KINDS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
+                           "Request": "srv", "Response": "srv"}  # fmt: skip
+ANGLES = ("roll", "pitch", "yaw")
 
 
 def time_of(value: object, now: Callable[[], int]) -> object:
@@ -52,12 +55,12 @@ def _seconds(value: object) -> object:
 
 def quaternion_of(value: object) -> object:
     """``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields."""
-    if not isinstance(value, Mapping) or not any(name in value for name in _ANGLES):
+    if not isinstance(value, Mapping) or not any(name in value for name in ANGLES):
         return value
     for name in value:
-        if name not in _ANGLES:
+        if name not in ANGLES:
             raise ValueError(f"roll, pitch and yaw stand alone: {name!r} cannot be beside them")
-    roll, pitch, yaw = (parse_angle(value.get(name, 0.0)) / 2 for name in _ANGLES)
+    roll, pitch, yaw = (parse_angle(value.get(name, 0.0)) / 2 for name in ANGLES)
     sin_r, cos_r, sin_p, cos_p = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     sin_y, cos_y = math.sin(yaw), math.cos(yaw)
     return {
@@ -68,17 +71,19 @@ def quaternion_of(value: object) -> object:
     }
 
 
-def constant(text: str, owner: type) -> object:
+def constant(text: str, owner: type | None) -> object:
     """The constant a name stands for, seen from a field of `owner`; other texts are returned.
 
     ``STATUS_MOVING`` is looked up in `owner`; ``MoveRobot.Feedback.STATUS_MOVING``,
     ``Feedback.STATUS_MOVING`` and ``sensor_msgs/msg/BatteryState.POWER_SUPPLY_STATUS_FULL`` in the
-    class they name, beside `owner` unless a package is given.
+    class they name: beside `owner` unless a package is given, else in the one installed package
+    that has it.
     """
     match = _CONSTANT.fullmatch(text)
-    if match is None:
+    if match is None or (match[1] is None and owner is None):
         return text
     place = owner if match[1] is None else _class(match[1], owner)
+    assert place is not None
     known = constants(place)
     if match[2] not in known:
         near = did_you_mean(match[2], known)
@@ -87,26 +92,42 @@ def constant(text: str, owner: type) -> object:
     return known[match[2]]
 
 
-def _class(path: str, owner: type) -> type:
+def _class(path: str, owner: type | None) -> type:
     """The class a path such as ``MoveRobot.Feedback`` names, from the module of `owner`."""
     package, _, rest = path.rpartition("/")
     names = rest.split(".")
-    if names[-1] in _PARTS and len(names) == 1 and not package:
+    if owner is not None and names[-1] in _PARTS and len(names) == 1 and not package:
         names = [owner.__name__.rpartition("_")[0], *names]
+    found: object = None
     if package:
         name, _, kind = package.partition("/")
-        found: object = _interface(f"{name}/{kind or 'msg'}/{names[0]}")
-    else:
-        module = importlib.import_module(".".join(owner.__module__.split(".")[:2]))
-        messages = importlib.import_module(f"{owner.__module__.split('.')[0]}.msg") if (
-            not hasattr(module, names[0]) and ".msg" not in owner.__module__
-        ) else module  # fmt: skip
-        found = getattr(messages, names[0], None)
+        found = _interface(f"{name}/{kind or 'msg'}/{names[0]}")
+    elif owner is not None:
+        found = _beside(names[0], owner)
+    if found is None and not package:
+        found = _anywhere(names[0], _KINDS.get(names[-1], "msg"))
     for name in names[1:]:
         found = getattr(found, name, None) if name in _PARTS else None
     if not isinstance(found, type):
         raise ValueError(f"no message class {path!r} is known here")
     return found
+
+
+def _beside(name: str, owner: type) -> object:
+    """An interface of the module of `owner`, or a message of its package."""
+    module = importlib.import_module(".".join(owner.__module__.split(".")[:2]))
+    if not hasattr(module, name) and ".msg" not in owner.__module__:
+        module = importlib.import_module(f"{owner.__module__.split('.')[0]}.msg")
+    return getattr(module, name, None)
+
+
+@lru_cache(maxsize=256)
+def _anywhere(name: str, kind: Kind) -> type | None:
+    """The interface of a name, where one installed package has it."""
+    found = [full for full in installed(kind) if full.rpartition("/")[2] == name]
+    if len(found) > 1:
+        raise ValueError(f"{name!r} may be {' or '.join(found)}: put the package before it")
+    return interface(found[0], kind) if found else None
 
 
 def _interface(name: str) -> type:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bt_actions.ros.conveniences import constant, duration_of, quaternion_of, time_of
+from bt_actions.ros.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
 from bt_actions.ros.fields import (
     FLOATS,
     INTEGERS,
@@ -103,7 +103,7 @@ def examine(kind: FieldType, data: object, hole: Hole | None = None) -> list[Pro
     `hole` is asked first about each value, with the type it must have: True means that it is
     settled there (a variable, whose type the caller checks).
     """
-    filler = _Filler(time.time_ns, hole)
+    filler = _Filler(time.time_ns, hole, makes=False)
     filler.convert(kind, data, ())
     return filler.problems
 
@@ -133,10 +133,12 @@ def dotted(path: Iterable[str | int]) -> str:
 class _Filler:
     """Walks type and data together; collects problems instead of raising at the first."""
 
-    def __init__(self, now: Callable[[], int], hole: Hole | None) -> None:
+    def __init__(self, now: Callable[[], int], hole: Hole | None, *, makes: bool = True) -> None:
+        """With `makes=False` only the problems count: what a hole stands for is not there yet."""
         self.problems: list[Problem] = []
         self._now = now
         self._hole = hole
+        self._makes = makes
         self._owner: type | None = None
 
     def convert(self, kind: FieldType, value: object, path: Path) -> Any:
@@ -155,7 +157,7 @@ class _Filler:
         if isinstance(value, cls):
             return value
         try:
-            value = self._convenience(cls, value)
+            value = self._convenience(cls, value, path)
         except ValueError as error:
             self._bad(path, str(error))
             return None
@@ -165,7 +167,7 @@ class _Filler:
             self._bad(path, f"the fields of a {short_name(cls)} are needed, not {show(value)}")
             return None
         known = describe(cls)
-        message: Any = cls()
+        message: Any = cls() if self._makes else None
         outer, self._owner = self._owner, cls
         for name, item in value.items():
             kind = known.get(name) if isinstance(name, str) else None
@@ -174,12 +176,12 @@ class _Filler:
                 continue
             before = len(self.problems)
             converted = self.convert(kind, item, (*path, name))
-            if len(self.problems) == before and converted is not None:
+            if self._makes and len(self.problems) == before and converted is not None:
                 setattr(message, name, converted)
         self._owner = outer
         return message
 
-    def _convenience(self, cls: type, value: object) -> object:
+    def _convenience(self, cls: type, value: object, path: Path) -> object:
         """What may be written instead of the fields of a time, a duration or a quaternion."""
         name = interface_name(cls)
         if name == "builtin_interfaces/msg/Time":
@@ -187,8 +189,20 @@ class _Filler:
         if name == "builtin_interfaces/msg/Duration":
             return duration_of(value)
         if name == "geometry_msgs/msg/Quaternion":
-            return quaternion_of(value)
+            return quaternion_of(self._without_holes(value, path))
         return value
+
+    def _without_holes(self, value: object, path: Path) -> object:
+        """Angles of which some are settled elsewhere: numbers, in radians."""
+        if self._hole is None or not isinstance(value, Mapping):
+            return value
+        if not any(name in value for name in ANGLES):
+            return value
+        radians = Scalar("float64")
+        return {
+            name: 0.0 if self._hole(angle, radians, (*path, str(name))) else angle
+            for name, angle in value.items()
+        }
 
     def _listing(self, kind: Listing, value: object, path: Path) -> Any:
         to_list = getattr(value, "tolist", None)
@@ -207,7 +221,7 @@ class _Filler:
     def _scalar(self, kind: Scalar, value: object, path: Path) -> Any:
         if type(value).__module__ == "numpy" and hasattr(value, "item"):
             value = value.item()
-        if isinstance(value, str) and kind.name not in ("string", "wstring") and self._owner:
+        if isinstance(value, str) and kind.name not in ("string", "wstring"):
             try:
                 value = constant(value, self._owner)
             except ValueError as error:

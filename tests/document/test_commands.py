@@ -77,6 +77,13 @@ def test_sarif_names_rule_level_and_region() -> None:
     }
 
 
+def test_sarif_names_a_file_by_its_uri() -> None:
+    found = check_source(source_of(WRONG.encode(), "my trees/\u00e4 #1%.yaml"))
+    [place, *_] = json.loads(as_sarif(found))["runs"][0]["results"][0]["locations"]
+    uri = place["physicalLocation"]["artifactLocation"]["uri"]
+    assert uri == "my%20trees/%C3%A4%20%231%25.yaml"
+
+
 @pytest.fixture
 def wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -135,6 +142,35 @@ def test_check_reads_standard_input(
     assert capsys.readouterr().out.startswith("<stdin>:9:17: error[BT114]")
 
 
+@pytest.mark.parametrize("command", ["check", "format"])
+def test_standard_input_that_is_closed_is_told(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", None)
+    assert main([command, "-"]) == 2
+    said = capsys.readouterr()
+    assert "<stdin>:1:1: error[BT100]: this is closed" in said.out + said.err
+
+
+@pytest.mark.parametrize("command", ["check", "format"])
+def test_standard_input_is_read_within_bounds(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Path("/dev/zero").open() as endless:
+        monkeypatch.setattr("sys.stdin", endless)
+        assert main([command, "-"]) == 2
+    said = capsys.readouterr()
+    assert "<stdin>:1:1: error[BT100]: this is larger than 32 MiB" in said.out + said.err
+
+
+@pytest.mark.parametrize("command", ["check", "run", "render", "format"])
+def test_an_empty_name_is_told(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, ""]) == 2
+    said = capsys.readouterr()
+    assert "Traceback" not in said.out + said.err
+    assert said.out + said.err != ""
+
+
 def test_explain_prints_a_page_or_the_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "bt203"]) == 0
     assert capsys.readouterr().out.startswith("BT203: a message has no such field (error)")
@@ -165,6 +201,18 @@ def test_format_leaves_alone_what_it_cannot_format(
     assert main(["format", str(path)]) == 2
     assert "error[BT102]" in capsys.readouterr().err
     assert path.read_text() == "root: [\n"
+
+
+def test_a_file_that_cannot_be_formatted_keeps_no_other_from_being(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad, good, worse = (tmp_path / name for name in ("a.yaml", "b.yaml", "c.yaml"))
+    bad.write_text("root: [\n")
+    good.write_text("root: {success: A}\ntree: t\n")
+    assert main(["format", str(bad), str(good), str(worse)]) == 2
+    assert good.read_text() == "tree: t\nroot: {success: A}\n"
+    said = capsys.readouterr().err
+    assert said.index("error[BT102]") < said.index("b.yaml: formatted") < said.index("[BT100]")
 
 
 def test_the_schema_is_made_of_the_model(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from pathlib import Path
 
@@ -19,6 +20,11 @@ TREES = Path(__file__).parents[2] / "trees"
 
 def formatted(text: str) -> str:
     return format_source(source_of(text.encode(), "tree.yaml"))
+
+
+def squeezed(text: str) -> str:
+    """Canonical form with two spaces before each comment, whatever its column was."""
+    return re.sub(r"(?<=\S) +# ", "  # ", formatted(text))
 
 
 def test_the_kind_comes_first_and_comments_stay_with_what_they_are_about() -> None:
@@ -73,7 +79,7 @@ def test_the_kind_comes_first_and_comments_stay_with_what_they_are_about() -> No
             - log: |
                 hello # no comment
                   world
-            # end of log
+              # end of log
             - timeout: T
               after: 5 s
               child:
@@ -125,15 +131,195 @@ def test_the_sample_trees_are_in_canonical_form(path: Path) -> None:
     assert formatted(path.read_text(encoding="utf-8")) == path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("code", sorted(code for code in PAGES if PAGES[code].right))
+@pytest.mark.parametrize("code", sorted(code for code in PAGES if PAGES[code].language == "yaml"))
 def test_formatting_twice_changes_nothing_more(code: str) -> None:
     once = formatted(PAGES[code].right)
     assert formatted(once) == once
 
 
-def test_anchors_are_refused_rather_than_lost() -> None:
-    with pytest.raises(FormatError, match="anchors"):
-        formatted("tree: t\nroot: &here\n  success: A\n")
+def test_anchors_and_aliases_stay_where_they_are() -> None:
+    text = """\
+    root: &all # c1
+      children:
+        - &a {log: hi, level: info}   # one
+        - *a  # two
+        - &b
+          log: x  # c
+        - set: {a: &x 1, b: *x , c: [*x]}
+      sequence: S
+    tree: t
+    """
+    assert squeezed(textwrap.dedent(text)) == textwrap.dedent(
+        """\
+        tree: t
+        root: &all  # c1
+          sequence: S
+          children:
+            - &a {log: hi, level: info}  # one
+            - *a  # two
+            - &b
+              log: x  # c
+            - set: {a: &x 1, b: *x , c: [*x]}
+        """
+    )
+
+
+def test_comments_behind_dashes_and_between_a_key_and_its_value_stay_with_them() -> None:
+    text = """\
+    tree: t
+    root:
+      sequence: S
+      children:
+      - # c
+        log: a
+      # above
+      -
+        # below
+        log:  # c1
+          b  # c2
+        level:   # c3
+          # c4
+          info
+      - set:
+          a:
+          - - 1  # one
+            # two
+            - 2
+          -
+            # three
+            - {x: 1}
+    """
+    assert squeezed(textwrap.dedent(text)) == textwrap.dedent(
+        """\
+        tree: t
+        root:
+          sequence: S
+          children:
+            # c
+            - log: a
+            # above
+            # below
+            # c1
+            - log: b  # c2
+              # c3
+              # c4
+              level: info
+            - set:
+                a:
+                  - - 1  # one
+                    # two
+                    - 2
+                  # three
+                  - - {x: 1}
+        """
+    )
+
+
+def test_texts_over_several_lines_and_braces_with_comments_keep_their_lines() -> None:
+    text = """\
+    tree: t
+    root:
+        set: {
+          a: 1,  # one
+          # alone
+          b: [2,
+              3]  # two
+          }  # end
+        name: 'one
+          # two
+      three'   # c
+        x: "one\\
+     two\\\x20
+
+          three"
+        y: |+  # keep
+            a\x20\x20
+             # text
+
+
+        z: plain
+         text  # c
+    """
+    text = textwrap.dedent(text.replace("\\x20", " "))
+    assert squeezed(text) == textwrap.dedent(
+        """\
+        tree: t
+        root:
+          set: {
+            a: 1,  # one
+            # alone
+            b: [2,
+                3]  # two
+            }  # end
+          name: 'one
+            # two
+            three'  # c
+          x: "one\\
+            two\\\x20
+
+            three"
+          y: |+  # keep
+            a\x20\x20
+             # text
+
+
+          z: plain
+            text  # c
+        """.replace("\\x20", " ")
+    )
+
+
+def test_a_comment_at_the_end_of_a_block_stays_in_it_when_keys_move() -> None:
+    text = """\
+    root:
+      children:
+        - log: a
+          # in a
+        # - log: b
+
+        # and
+      # before
+      sequence: S
+      # in the root
+    # top
+    tree: t
+    """
+    assert formatted(textwrap.dedent(text)) == textwrap.dedent(
+        """\
+        # top
+        tree: t
+        root:
+          # before
+          sequence: S
+          children:
+            - log: a
+              # in a
+            # - log: b
+
+            # and
+          # in the root
+        """
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("tree: &n N\nroot:\n  name: &n N\n  log: a\n", "the anchor &n names 2 things"),
+        ("tree: t\nroot:\n  name: &n N\n  log: *n\n", "an alias would come before what it repeats"),
+        ("tree: t\nroot:\n  set: {a: &x b, *x : 1}\n", "line 3: an alias stands for a key"),
+        ("&x\ntree: t\nroot: {success: }\n", "line 1: an anchor names the whole document"),
+        ("tree: t\nroot:\n  log: |2\n    a\n", "line 3: a block text that gives its own indentat"),
+        (
+            "--- # c\ntree: t\nroot: {success: A}\n",
+            "line 1: a comment that has no place of its own",
+        ),
+        ("[a]\n", "this is not a tree"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused_for_its_true_reason(text: str, reason: str) -> None:
+    with pytest.raises(FormatError, match=re.escape(reason)):
+        formatted(text)
 
 
 def test_what_is_no_yaml_is_answered_as_the_checker_does() -> None:
@@ -144,6 +330,8 @@ def test_what_is_no_yaml_is_answered_as_the_checker_does() -> None:
 _LINES = st.sampled_from(
     [line for case in CASES for line in case.text.splitlines()]
     + ["# a comment", "", "    # deeper", "  x: |", "    text # no comment", "  - a: 1 # why"]
+    + ["  - # c", "  -", "    - - b", "  y: &a {b: 1, # c", "    c: 2} # d", "  z: *a", "  - *a"]
+    + ["    # - in", "  w: 'a", "    b' # c", "  v: # e", "    plain", "  u: >+", "  -   # d"]
 )
 
 

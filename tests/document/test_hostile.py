@@ -6,16 +6,25 @@ import os
 import random
 import time
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_actions.document import DocumentError, Finding, check_file, check_source, source_of
+from bt_actions.document import (
+    DocumentError,
+    Finding,
+    check_file,
+    check_source,
+    load_tree,
+    source_of,
+)
 from bt_actions.document.source import MAX_BYTES, MAX_ERRORS
 from tests.document.test_wrong_documents import CASES
 
+EMPTY = '""'
 TREES = Path(__file__).parents[2] / "trees"
 
 
@@ -46,6 +55,38 @@ def test_a_file_that_is_not_there_is_told_with_what_is_installed() -> None:
 
 def test_a_device_is_no_tree() -> None:
     assert "this is no regular file" in only(check_file("/dev/zero"))
+
+
+@pytest.mark.parametrize("path", ["", ".", "/", ".."])
+def test_a_path_without_a_name_of_its_own_is_answered_as_any_other(path: str) -> None:
+    said = only(check_file(path))
+    assert said.startswith(f"{path or EMPTY}:1:1: error[BT100]: ")
+    with pytest.raises(DocumentError):
+        load_tree(path)
+
+
+def test_a_tree_in_a_pipe_is_read_however_long_its_writer_thinks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("bt_actions.document.source.PIPE_PATIENCE", 0.0)
+    reader, writer = os.pipe()
+    with ThreadPoolExecutor() as pool:
+        found = pool.submit(check_file, f"/dev/fd/{reader}")
+        with pytest.raises(TimeoutError):
+            found.result(timeout=0.2)
+        os.write(writer, (TREES / "recover.yaml").read_bytes())
+        os.close(writer)
+        assert found.result(timeout=60) == []
+    os.close(reader)
+
+
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bt_actions.document.source.PIPE_PATIENCE", 0.05)
+    path = tmp_path / "pipe.yaml"
+    os.mkfifo(path)
+    assert "nobody wrote to this pipe within 0.05 s" in only(check_file(path))
 
 
 def test_a_huge_file_is_refused_without_being_read(tmp_path: Path) -> None:
@@ -210,3 +251,17 @@ def test_mutated_trees_are_answered_with_findings() -> None:
             _words(check_bytes(text.encode()))
         except Exception as error:
             raise AssertionError(f"seed {seed}: {error!r} for\n{text}") from error
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_the_time_for_ignores_grows_with_their_number_and_no_faster(alone: bool) -> None:
+    def seconds(count: int) -> float:
+        ignore = "# bt: ignore[BT304] an operator stops it"
+        node = f"    {ignore}\n    - retry: R\n" if alone else f"    - retry: R  {ignore}\n"
+        node += "      child: {check: $ready}\n"
+        text = "tree: t\ninputs: {ready: bool}\nroot:\n  sequence: S\n  children:\n" + node * count
+        started = time.process_time()
+        assert check_bytes(text.encode()) == []
+        return time.process_time() - started
+
+    assert seconds(8000) < 8 * seconds(2000) + 0.5

@@ -237,6 +237,12 @@ def test_a_value_that_does_not_fit_is_a_value_error(text: str, kind: str) -> Non
         parse_input(text, kind)
 
 
+def test_a_computed_value_on_the_command_line_needs_its_space_too() -> None:
+    assert parse_input("[= 1 + 1]", "int32[]") == [2]
+    with pytest.raises(ValueError, match=r"'=' computes only with a space behind it"):
+        parse_input("[=1 + 1]", "int32[]")
+
+
 def test_two_loads_of_a_tree_share_nothing(load: Load) -> None:
     text = """
     tree: t
@@ -288,6 +294,23 @@ def test_a_subtree_whose_input_has_no_value_fails_and_says_why(load: Load) -> No
     )
     assert tick(root) is Status.FAILURE
     assert root.feedback_message == "$a has no value"
+
+
+def test_a_subtree_that_is_given_no_mapping_fails_and_says_why(load: Load) -> None:
+    root = load(
+        """
+        tree: t
+        root:
+          for_each: E
+          in: [{home: 1.0}, 5]
+          child: {subtree: inner.yaml, with: $item}
+        """,
+        inner="tree: inner\ninputs: {home: float64}\nroot: {check: $home > 0.5}\n",
+    )
+    assert tick(root) is Status.FAILURE
+    assert root.children[0].feedback_message == (
+        "'with' needs a mapping of inputs to values, not 5"
+    )
 
 
 def test_a_subtree_that_starts_again_has_forgotten_its_values(load: Load) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,7 +14,7 @@ from bt_actions.document import RULES, Severity, check_file
 from bt_actions.document.pages import PAGES, page
 
 NOT_SHOWN = {"BT100", "BT101"}
-"""What is wrong with a file, and not with its text."""
+"""What is wrong with a file, and not with its text: their examples are commands."""
 
 
 def codes(folder: Path, name: str, text: str) -> dict[str, Severity]:
@@ -32,6 +35,21 @@ def test_the_wrong_example_breaks_the_rule_and_no_other(code: str, tmp_path: Pat
 @pytest.mark.parametrize("code", sorted(set(PAGES) - NOT_SHOWN))
 def test_the_right_example_is_clean(code: str, tmp_path: Path) -> None:
     assert codes(tmp_path, "right.yaml", PAGES[code].right) == {}
+
+
+@pytest.mark.parametrize("code", sorted(NOT_SHOWN))
+def test_the_commands_of_a_page_show_the_rule(code: str) -> None:
+    def run(command: str) -> tuple[int, str]:
+        folder = Path(sys.executable).parent
+        environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}"}
+        done = subprocess.run(
+            ["sh", "-c", command], env=environment, capture_output=True, text=True
+        )
+        return done.returncode, done.stdout
+
+    status, said = run(PAGES[code].wrong)
+    assert (status, f"error[{code}]" in said) == (2, True)
+    assert run(PAGES[code].right) == (0, "")
 
 
 def test_a_page_shows_title_text_and_examples() -> None:

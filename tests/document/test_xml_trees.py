@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,6 @@ from py_trees.common import Status
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 
 from bt_actions import Outcome, TreeRunner
-from bt_actions.behaviours.ports import GripperWithPorts, MoveRobotWithPorts
 
 XML = """\
 <root main_tree_to_execute="Fetch">
@@ -35,11 +36,26 @@ def parse(folder: Path, text: str = XML) -> Behaviour:
 
 def test_the_tags_stand_for_our_leaves_with_their_settings(tmp_path: Path) -> None:
     root = parse(tmp_path)
+    from bt_actions.behaviours.ports import GripperWithPorts, MoveRobotWithPorts
+
     opened, there, _, _ = root.children
     assert isinstance(opened, GripperWithPorts)
     assert isinstance(there, MoveRobotWithPorts)
     assert (opened.action_name, opened.timeouts.result) == ("gripper_control", 10.0)
     assert (there.retry.attempts, there.timeouts.result) == (2, 30.0)
+
+
+def test_importing_the_package_is_enough(tmp_path: Path) -> None:
+    path = tmp_path / "tree.xml"
+    path.write_text(XML)
+    code = (
+        "import bt_actions, sys\n"
+        "from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml as parse\n"
+        "print([type(child).__name__ for child in parse(sys.argv[1]).children])\n"
+    )
+    command = [sys.executable, "-c", code, str(path)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert said == f"{['GripperWithPorts', 'MoveRobotWithPorts'] * 2}\n"
 
 
 def test_an_xml_tree_runs_and_passes_results_from_port_to_port(

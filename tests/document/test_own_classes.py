@@ -1,0 +1,151 @@
+"""A user's own class in a tree: whatever its module and its constructor do, the tree says where."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bt_actions.cli import main
+from bt_actions.document import DocumentError, check_file, load_tree
+
+Own = Callable[..., Path]
+BASE = """
+from __future__ import annotations
+import py_trees
+class Base(py_trees.behaviour.Behaviour):
+    def update(self):
+        return py_trees.common.Status.SUCCESS
+"""
+_numbers = itertools.count()
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Own:
+    """Write a module with a class `A`, and a tree that names it."""
+    monkeypatch.syspath_prepend(tmp_path)  # type: ignore[no-untyped-call]
+
+    def write(code: str, arguments: str = "{}", *, base: bool = True) -> Path:
+        module = f"own_{next(_numbers)}"
+        text = (BASE if base else "") + textwrap.dedent(code)
+        (tmp_path / f"{module}.py").write_text(text, encoding="utf-8")
+        tree = tmp_path / "t.yaml"
+        text = f"tree: t\nroot:\n  python: {module}.A\n  arguments: {arguments}\n"
+        tree.write_text(text, encoding="utf-8")
+        return tree
+
+    return write
+
+
+def checked(tree: Path) -> list[str]:
+    return [f"{one.line}:{one.column} {one.code} {one.message}" for one in check_file(tree)]
+
+
+def refused(tree: Path) -> list[str]:
+    with pytest.raises(DocumentError) as raised:
+        load_tree(tree)
+    findings = raised.value.findings
+    return [f"{one.line}:{one.column} {one.code} {one.message}" for one in findings]
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("import sys; sys.exit(0)", "raised SystemExit: 0"),
+        ("raise ModuleNotFoundError('boo')", "raised ModuleNotFoundError: boo"),
+        ("class E(BaseException): pass\nraise E", "raised E"),
+        ("x = (", "raised SyntaxError: '(' was never closed (own_"),
+    ],
+)
+def test_what_a_module_raises_is_told_where_it_is_named(own: Own, code: str, said: str) -> None:
+    (found,) = checked(own(code, base=False))
+    assert found.startswith("3:11 BT214 importing 'own_")
+    assert said in found
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [
+        ("n: int", "abc"), ("n: int", "1.5"), ("n: int", "true"), ("n: float", "abc"),
+        ("n: str", "5"), ("n: bool", "1"), ("n: int | None", "abc"), ("n: list[int]", "{a: 1}"),
+    ],
+)  # fmt: skip
+def test_an_argument_of_another_type_than_it_is_annotated_with_is_wrong(
+    own: Own, parameter: str, value: str
+) -> None:
+    code = f"class A(Base):\n    def __init__(self, name, {parameter}): super().__init__(name)"
+    (found,) = checked(own(code, f"{{n: {value}}}"))
+    assert found.startswith(f"4:18 BT215 A takes a 'n' of type {parameter[3:]}, not ")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [
+        ("n: int", "5"), ("n: float", "5"), ("n: str", "abc"), ("n: int | None", "null"),
+        ("n: Path", "abc"), ("n", "abc"), ("n: tuple[int, ...]", "[1]"), ("n: list[int]", "[1]"),
+    ],
+)  # fmt: skip
+def test_an_argument_that_fits_or_of_which_that_cannot_be_told_is_taken(
+    own: Own, parameter: str, value: str
+) -> None:
+    code = f"class A(Base):\n    def __init__(self, name, {parameter}): super().__init__(name)"
+    tree = own(code, f"{{n: {value}}}")
+    assert checked(tree) == []
+    assert load_tree(tree).name == "A"
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("def __init__(self, name, n): raise ValueError('no')", "making a A raised ValueError: no"),
+        ("def __init__(self, name, n): raise SystemExit(7)", "making a A raised SystemExit: 7"),
+        (
+            "def __init__(self, name, n): pass",
+            "the constructor of A does not call super().__init__(name)",
+        ),
+    ],
+)
+def test_a_class_of_which_nothing_can_be_made_is_an_error_with_its_place(
+    own: Own, code: str, said: str
+) -> None:
+    assert refused(own(f"class A(Base):\n    {code}", "{n: 1}")) == [f"4:14 BT215 {said}"]
+
+
+def test_a_class_that_makes_something_else_is_an_error_with_its_place(own: Own) -> None:
+    tree = own("class A(Base):\n    def __new__(cls, **given): return 5")
+    tree.write_text(tree.read_text(encoding="utf-8").replace("  arguments: {}\n", ""))
+    (found,) = refused(tree)
+    assert found.startswith("3:11 BT214 ")
+    assert found.endswith("makes no behaviour, but a int")
+
+
+def test_every_class_that_fails_is_told_at_once(own: Own) -> None:
+    tree = own("class A(Base):\n    def __init__(self, name): raise ValueError(name)")
+    python = tree.read_text(encoding="utf-8").splitlines()[2].strip()
+    tree.write_text(
+        f"tree: t\nroot:\n  sequence: S\n  children:\n    - {python}\n    - {python}\n",
+        encoding="utf-8",
+    )
+    assert [found.split()[0] for found in refused(tree)] == ["5:15", "6:15"]
+
+
+def test_what_a_module_prints_does_not_disturb_a_report(
+    own: Own, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tree = own("print('hello')\nimport py_trees\nA = py_trees.behaviours.Success", base=False)
+    assert main(["check", "--format", "json", str(tree)]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out) == []
+    assert err == "hello\n"
+
+
+def test_a_run_of_a_class_that_cannot_be_made_ends_with_2_and_the_place(
+    own: Own, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tree = own("class A(Base):\n    def __init__(self, name): raise ValueError('no')")
+    assert main(["render", str(tree)]) == 2
+    assert "t.yaml:4:14: error[BT215]: making a A raised ValueError: no" in capsys.readouterr().err

@@ -1,0 +1,58 @@
+"""The names that a tree may use are those that ROS takes: rclpy itself is asked."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from rclpy.exceptions import NameValidationException
+from rclpy.expand_topic_name import expand_topic_name
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
+from bt_actions.document.build_names import join_names
+from bt_actions.document.nodes import compose
+from bt_actions.document.ros_names import RosName
+from bt_actions.document.source import Source
+from bt_actions.document.values import BAD
+
+PIECES = ["a", "Z", "_", "0", "/", "~", "{node}", "{ns}", "{x}", "{", "}", "-", " ", ".", "é"]
+
+
+def taken_by_rcl(name: str) -> bool:
+    try:
+        validate_full_topic_name(expand_topic_name(name, "node", "/space"))
+    except (NameValidationException, ValueError):
+        return False
+    return True
+
+
+def taken(name: str) -> bool:
+    source = Source("t", f'"{name}"')
+    node = compose(source)
+    assert node is not None
+    return RosName("the name of a topic").read(node, source) is not BAD
+
+
+@given(st.lists(st.sampled_from(PIECES), max_size=6).map("".join))
+@example("~")
+@example("~/a")
+@example("/")
+@example("a/{node}0")
+@settings(max_examples=400, deadline=None, derandomize=True)
+def test_a_name_is_taken_exactly_when_ros_takes_it(name: str) -> None:
+    # rcl makes '/space/nodea' of '~a', which its own rules forbid; {ns} holds slashes of its own.
+    if "{ns}" not in name and not re.match("~[^/]", name):
+        assert taken(name) == taken_by_rcl(name), name
+
+
+@pytest.mark.parametrize(
+    ("parts", "whole"),
+    [
+        (("cell", "arm", "grip"), "cell/arm/grip"), (("cell/", "grip"), "cell/grip"),
+        (("cell", "/grip"), "/grip"), (("cell", "~/grip"), "~/grip"), (("/", "grip"), "/grip"),
+    ],
+)  # fmt: skip
+def test_a_namespace_goes_before_relative_names(parts: tuple[str, ...], whole: str) -> None:
+    assert join_names(*parts) == whole
