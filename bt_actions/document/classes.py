@@ -5,6 +5,7 @@ The module and the constructor are foreign code: whatever they raise becomes a `
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import re
@@ -123,10 +124,10 @@ def wrong_arguments(cls: type[Behaviour], arguments: Mapping[str, object]) -> Mi
 
 def _parameters(cls: type[Behaviour]) -> Mapping[str, inspect.Parameter] | None:
     """The parameters of a constructor, their types resolved where that is possible."""
-    try:
+    with contextlib.suppress(
+        Exception
+    ):  # an annotation may be any code, and name what is not there
         return inspect.signature(cls, eval_str=True).parameters
-    except Exception:  # noqa: BLE001 - an annotation may be any code, and name what is not there
-        pass
     try:
         return inspect.signature(cls).parameters
     except (TypeError, ValueError):
