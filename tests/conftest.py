@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tests.support.processes import Host, HostFactory, Journal, Process
 
 DOMAINS = range(70, 90)
-OUR_OWN = ("bt_actions-alarm", "bt_actions-log")
+OUR_OWN = ("bt_actions-alarm", "bt_actions-log", "bt_actions-lookout")
 """Threads that outlive what they were started for, and end by themselves."""
 _names = itertools.count(1)
 
@@ -177,7 +177,10 @@ def no_leaks(domain: int) -> Iterator[None]:
     yield
     until(lambda: not open_goals(), 8.0, what="no goal is open any more")
     until(lambda: not len(domain_of(domain).resources), what="no resource is held any more")
-    until(lambda: threads() <= before, what="no thread is left")
+    try:
+        until(lambda: threads() <= before)
+    except AssertionError:
+        raise AssertionError(f"these threads are left: {threads() - before}") from None
 
 
 @pytest.fixture(params=["multi", "single"])

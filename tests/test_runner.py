@@ -769,5 +769,5 @@ def test_fifty_cycles_leave_no_thread_and_no_file(
         cycle()
     gc.collect()
     until(lambda: threading.active_count() <= threads)
-    assert open_files() <= files + 1
+    until(lambda: open_files() <= files + 1)
     assert capfd.readouterr().err == ""

@@ -38,6 +38,8 @@ PUMP_EVERY = 0.01
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
+TOO_NEW = 3.0
+"""Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
 PROBES_KEPT = 20
 FEEDBACK = "/_action/feedback"
 
@@ -237,11 +239,14 @@ class Line:
         Not while answers may be under way: in a second, what runs on an absent server is lost. And
         not where remapping rules give our node another server than a new participant would find.
         """
+        now = time.monotonic()
         if self.orphaned or not self.goals or self._remapped:
+            return False
+        if now - self.traffic.seen_since < TOO_NEW:
             return False
         domain = self.traffic.domain
         known = domain.lost_sight or (self.name, self.action_type) in domain.known
-        absent = self.watch.state(time.monotonic()) is Server.ABSENT
+        absent = self.watch.state(now) is Server.ABSENT
         running = (State.SENDING, State.EXECUTING)
         still = all(ticket.goal.state not in running for ticket in self.goals.values())
         return known and absent and still

@@ -35,7 +35,7 @@ PAUSE = 1.0
 """Seconds between two looks at first, and for a while after somebody begins to wait;"""
 URGENT_FOR = 30.0
 """so long;"""
-LONGEST_PAUSE = 30.0
+LONGEST_PAUSE = 60.0
 """later, each pause is twice the last, up to this."""
 LASTS = 3.0
 """Seconds that a look lasts; what is there comes in sight in 0.1 to 1.0 (measured)."""

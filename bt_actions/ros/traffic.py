@@ -17,6 +17,7 @@ import contextlib
 import os
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -40,6 +41,7 @@ IN_FLIGHT = 8
 """Goal requests under way at a server; its queue holds 10, and drops what is over silently."""
 _ON_NODE = "_bt_actions_traffic"
 _begins = threading.local()
+_contexts: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
 _closing = False  # the process ends: a tree that ticks on begins nothing any more
 
 
@@ -50,6 +52,8 @@ class Traffic:
         self.node = node
         self.clocks = Clocks(node)
         self.domain = domain_of(node.context.get_domain_id())
+        self.seen_since = _contexts.setdefault(node.context, time.monotonic())
+        """Since when the node's context is known here; a new one is blind to nothing."""
         self._lines: dict[str, Line] = {}
         self._observers: list[Observer] = []
         self.unaccounted: list[Ticket] = []

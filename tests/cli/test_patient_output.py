@@ -118,7 +118,7 @@ def test_what_ends_a_run_cancels_its_goal_though_nobody_reads(
     assert run.wait(PATIENCE) == code
     cause = "--timeout 4 s expired" if how == "--timeout" else "interrupted by"
     if how == "--json":
-        assert in_order(lines, '"started"', '"EXECUTING"', cause, '"CANCELED"', '"finished"')
+        assert in_order(lines, '"started"', '"SENDING"', cause, '"CANCELED"', '"finished"')
     else:
         assert in_order(lines, "RUNNING  Work", f"{cause}", "CANCELED", "STOPPED after")
     assert "finished" in lines[-1] or "STOPPED after" in lines[-1]
