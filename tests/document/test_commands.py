@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from bt_actions.cli import build_parser, main
+from bt_actions.cli import main
 from bt_actions.document import check_source, source_of
 from bt_actions.document.model import KINDS, TOP_KEYS
 from bt_actions.document.reports import as_github, as_json, as_sarif, as_text
@@ -249,12 +249,16 @@ def test_the_problem_matcher_in_the_repository_reads_what_check_writes() -> None
     }  # fmt: skip
 
 
-def test_the_hooks_for_pre_commit_are_commands_that_exist() -> None:
-    path = Path(__file__).resolve().parents[2] / ".pre-commit-hooks.yaml"
-    for hook in yaml.safe_load(path.read_text()):
+def test_the_hooks_for_pre_commit_pass_a_sound_tree_and_no_other(tmp_path: Path) -> None:
+    root = Path(__file__).resolve().parents[2]
+    sound, wrong = tmp_path / "sound.yaml", tmp_path / "wrong.yaml"
+    sound.write_bytes((root / "trees" / "four_steps.yaml").read_bytes())
+    wrong.write_text("tree: t\nroot: {succes: a\n")
+    for hook in yaml.safe_load((root / ".pre-commit-hooks.yaml").read_text()):
         command, *arguments = hook["entry"].split()
-        assert command == "bt-actions"
-        build_parser().parse_args([*arguments, "tree.yaml"])
+        assert (command, hook["language"]) == ("bt-actions", "system")
+        assert main([*arguments, str(sound)]) == 0
+        assert main([*arguments, str(wrong)]) != 0
 
 
 @pytest.mark.parametrize(
