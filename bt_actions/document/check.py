@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import BOOL, TEXT, infer, named
+from bt_actions.document.inner import inner_span
 from bt_actions.document.inputs import refuse_infinite
 from bt_actions.document.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.shape import report_braces
@@ -24,7 +25,6 @@ from bt_actions.document.values import (
     Interpolated,
     computed_in,
     constant_of,
-    inner_span,
     locate,
     names_file,
 )

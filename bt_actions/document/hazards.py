@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from bt_actions.document.build_names import resources_below, settings_of
 from bt_actions.document.check import Checker
 from bt_actions.document.findings import Related, Span
+from bt_actions.document.inner import inner_span
 from bt_actions.document.nodes import Mapping, span_of
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
-from bt_actions.document.values import inner_span
 from bt_actions.document.verdicts import Verdicts, budget
 
 __all__ = ["find_hazards"]

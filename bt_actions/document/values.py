@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Final
 
 from bt_actions.document.cut import cut_hint, warn_cut
-from bt_actions.document.findings import DocumentError, Span
+from bt_actions.document.findings import DocumentError
+from bt_actions.document.inner import inner_span
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
 from bt_actions.document.source import Source, read_source
 from bt_actions.expression import Expression, ExpressionError
@@ -27,7 +28,6 @@ __all__ = [
     "Lookup",
     "computed_in",
     "constant_of",
-    "inner_span",
     "locate",
     "names_file",
     "read_data",
@@ -236,20 +236,6 @@ def _named_constant(name: str) -> object:
     from bt_actions.ros.conveniences import constant  # here, so that reading a tree needs no ROS
 
     return constant(name, None)
-
-
-def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
-    """The range of a part of a scalar's text; the whole scalar where that cannot be told."""
-    whole = span_of(node)
-    if node.line != node.end_line:
-        return whole
-    line = source.line(node.line) or ""
-    written = line[node.column - 1 : node.end_column - 1]
-    offset = 0 if node.plain else 1
-    if (written if node.plain else written[1:-1]) != node.text:
-        return whole
-    first = node.column + offset + start
-    return Span(node.line, first, node.line, max(first + 1, node.column + offset + end))
 
 
 def locate(node: Node, path: tuple[str | int, ...], *, at_key: bool = False) -> Node:
