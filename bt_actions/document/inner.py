@@ -65,7 +65,7 @@ def _folded(written: list[tuple[int, str]], column: int, end_column: int) -> Ite
         stop = end_column - 1 if at == len(written) - 1 else len(line.rstrip())
         if at:
             yield " ", number, begin + 1
-        for place in range(begin, stop):
+        for place in range(begin, min(stop, len(line))):  # a value of --set has no line
             yield line[place], number, place + 1
 
 
