@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bt_actions.ros.environment import PROFILE, SHORT_LEASE
+from tests.support.middleware import on_loopback
 
 if TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour
@@ -42,8 +42,7 @@ def domain() -> Iterator[int]:
                 continue
             environment = {
                 "ROS_DOMAIN_ID": str(number),
-                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-                PROFILE: str(SHORT_LEASE),  # as what they play, the orchestrator, has it
+                **on_loopback(short_lease=True),  # as what they play, the orchestrator, has it
             }
             before = {name: os.environ.get(name) for name in environment}
             os.environ.update(environment)

@@ -1,5 +1,7 @@
 """Settings of the middleware: ours where the user has none."""
 
+import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -7,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions.ros.environment import SHORT_LEASE, Reach, prepare
+from tests.support.middleware import on_loopback
 
 
 @pytest.fixture(autouse=True)
@@ -25,8 +28,6 @@ def _clean(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def _get(name: str) -> str:
-    import os
-
     return os.environ.get(name, "")
 
 
@@ -60,6 +61,30 @@ def test_a_process_that_is_prepared_keeps_out_of_the_shared_memory(
         [sys.executable, "-c", program], check=True, capture_output=True, text=True
     )
     assert done.stdout.split()[-1] == str(not prepared)
+
+
+@pytest.mark.parametrize("short_lease", [True, False])
+def test_the_processes_of_these_tests_have_loopback_alone(short_lease: bool) -> None:
+    program = (
+        "import os, pathlib, rclpy\n"
+        "rclpy.init()\n"
+        "node = rclpy.create_node('looks')\n"
+        "print('/dev/shm/fastrtps' in pathlib.Path('/proc/self/maps').read_text())\n"
+        "ours = {os.readlink(file) for file in pathlib.Path('/proc/self/fd').iterdir()\n"
+        "        if file.is_symlink()}\n"
+        "lines = pathlib.Path('/proc/net/udp').read_text().splitlines()[1:]\n"
+        "print({line.split()[1][:8] for line in lines if f'socket:[{line.split()[9]}]' in ours})\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | on_loopback(short_lease=short_lease) | {"ROS_DOMAIN_ID": "69"},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    in_shared_memory, addresses = done.stdout.splitlines()
+    assert in_shared_memory == "False"
+    assert ast.literal_eval(addresses) <= {"0100007F", "0100FFEF"}  # 127.0.0.1, 239.255.0.1
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,12 @@ def launch(domain: int, no_leaks: None) -> Iterator[Launch]:
         program: Sequence[str] = ("-m", "bt_actions.cli"),
     ) -> Process:
         processes.append(
-            Process([*program, *arguments], prefix=prefix, environment=environment or {})
+            Process(
+                [*program, *arguments],
+                short_lease=True,  # as `bt-actions` gives itself where there is no profile
+                prefix=prefix,
+                environment=environment or {},
+            )
         )
         return processes[-1]
 

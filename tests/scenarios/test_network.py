@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from bt_actions.ros.environment import PROFILE, SHORT_LEASE
 from bt_actions.simulation.journal import ends as journal_ends
 from tests.scenarios.conftest import Launch
 from tests.support.network import Machines
@@ -25,7 +26,9 @@ Tree = Callable[..., Path]
 ON_THE_NETWORK = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",  # /dev/shm would be a link that nobody can cut
+    PROFILE: "",
 }
+WITH_THE_SHORT_LEASE = {**ON_THE_NETWORK, PROFILE: str(SHORT_LEASE)}
 LEASE = 3.0
 
 
@@ -42,9 +45,8 @@ class Site:
         """Open a server on b."""
         host = Host(
             self._directory,
-            short_lease=short_lease,
             prefix=self.machines.on(self.machines.b),
-            environment=ON_THE_NETWORK,
+            environment=WITH_THE_SHORT_LEASE if short_lease else ON_THE_NETWORK,
         )
         self.hosts.append(host)
         return host.open(name, *faults)

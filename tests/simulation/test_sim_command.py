@@ -35,7 +35,8 @@ def start_sim(bench: Bench, space: str, tmp_path: Path) -> Iterator[Callable[...
     def start(*arguments: str) -> Process:
         names = () if "--robots" in arguments else ("--namespace", space)
         journal = ("--journal", str(bench.path))
-        started.append(Process(["-c", MAIN, "sim", *names, *journal, *arguments]))
+        command = ["-c", MAIN, "sim", *names, *journal, *arguments]
+        started.append(Process(command, short_lease=True))
         started[-1].line("ready: ")
         return started[-1]
 

@@ -19,9 +19,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import IO, Any
 
-from bt_actions.ros.environment import PROFILE, SHORT_LEASE
 from bt_actions.simulation import journal
 from bt_actions.simulation.journal import Entry
+from tests.support.middleware import on_loopback
 from tests.support.waiting import until
 
 ROOT = Path(__file__).parents[2]
@@ -45,13 +45,10 @@ class Process:
     ) -> None:
         """`prefix` is a command that runs another, as ``ip netns exec NAME`` does.
 
-        Fast DDS is left as it comes, whatever profile the tests have, unless `short_lease` says so.
+        Its lease is Fast DDS's own, whatever profile the tests have, unless `short_lease` says so.
         """
-        inherited = {name: value for name, value in os.environ.items() if name != PROFILE}
         ours = {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
-        if short_lease:
-            ours[PROFILE] = str(SHORT_LEASE)
-        environment = {**inherited, **ours, **environment}
+        environment = {**os.environ, **ours, **on_loopback(short_lease=short_lease), **environment}
         self.popen = subprocess.Popen(
             [*prefix, sys.executable, *arguments],
             stdin=subprocess.PIPE,
