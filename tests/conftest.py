@@ -108,8 +108,8 @@ def new_host(domain: int, tmp_path: Path, no_leaks: None) -> Iterator[HostFactor
 
     hosts: list[Host] = []
 
-    def start(*, short_lease: bool = True) -> Host:
-        hosts.append(Host(tmp_path, short_lease=short_lease))
+    def start(*, short_lease: bool = True, **more: Any) -> Host:
+        hosts.append(Host(tmp_path, short_lease=short_lease, **more))
         return hosts[-1]
 
     yield start

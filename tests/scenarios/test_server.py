@@ -1,7 +1,7 @@
 """The server: killed, stopped, closed, restarted, late, or there twice.
 
-The servers are processes of their own. The tree runs in this one, on stock settings; how soon a
-dead server is noticed is decided by the lease that the *server's* process announces.
+The servers are processes of their own, the tree runs in this one. How soon a dead server is noticed
+is decided by the lease that the *server's* process announces.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from py_trees.common import Status
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
 from bt_actions.goal import State
+from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import HostFactory, Journal
 from tests.support.reliability import Record
 from tests.support.trees import in_sequence, in_turn, state
@@ -84,7 +85,7 @@ class TestKilled:
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
         """SIGKILL to a server with Fast DDS as it comes; the tree has no deadline at all"""
-        victim = new_host(short_lease=False)
+        victim = new_host(short_lease=False, environment=AS_IT_COMES)
         victim.open(name)
         leaf = MoveRobot("m", 9.0, action_name=name)
         with TreeRunner(leaf, node=node) as runner:
@@ -101,7 +102,7 @@ class TestKilled:
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
         """SIGKILL to a server with Fast DDS as it comes; feedback deadline 1 s, cancel 1 s"""
-        victim = new_host(short_lease=False)
+        victim = new_host(short_lease=False, environment=AS_IT_COMES)
         victim.open(name)
         leaf = MoveRobot(
             "m", 9.0, action_name=name, timeout=Timeouts(feedback=1.0, cancel=1.0), retry=3

@@ -17,6 +17,8 @@ from bt_actions.ros.environment import PROFILE, SHORT_LEASE
 
 LEFT_TO_THE_PROFILE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}
 """With LOCALHOST, rmw_fastrtps adds shared memory whatever the profile says."""
+AS_IT_COMES = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", PROFILE: ""}
+"""For the scenarios that are about Fast DDS without any settings: shared memory and all."""
 _NAMESPACE = "http://www.eprosima.com"
 _TRANSPORT = """\
 <transport_descriptors xmlns="http://www.eprosima.com">

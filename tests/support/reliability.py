@@ -21,8 +21,9 @@ HEAD = """\
 Written by `make chaos` from its last run; do not edit. Each row is one scenario with real
 processes, real signals and real network cuts. What a server did is read from its journal, a file it
 writes as each goal is received, accepted, canceled and finished: the client's own view is not
-believed. Times are rounded. How to get the short lease for servers of your own:
-[reliability-settings.md](reliability-settings.md).
+believed. Times are rounded. All talk over UDP (on loopback, or on the link between two network
+namespaces) but the servers "with Fast DDS as it comes". How to get the short lease for servers of
+your own: [reliability-settings.md](reliability-settings.md).
 """
 ON_A_BUSY_MACHINE = 3.0
 """Times longer than a scenario's limit is good enough where no report is written: `make test` runs
