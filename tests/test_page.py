@@ -357,6 +357,12 @@ def test_a_large_tree_starts_folded_where_it_can_be_taken_in(
     assert open_depth(list(rows(root)), 40) == depth
 
 
+def test_a_page_has_all_levels_and_starts_folded_to_those_that_are_wanted(tree: Path) -> None:
+    whole, folded = (_Reader(page(load_tree(tree), depth=depth)).data for depth in (None, 1))
+    assert folded["nodes"] == whole["nodes"]
+    assert folded["open"] == 1 != whole["open"]
+
+
 @pytest.mark.parametrize(("direction", "down"), [(None, True), ("down", True), ("right", False)])
 def test_direction_is_respected(direction: str | None, down: bool, tree: Path) -> None:
     assert _Reader(page(load_tree(tree), direction=direction)).data["down"] is down

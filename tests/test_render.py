@@ -54,6 +54,20 @@ def root() -> Behaviour:
     )
 
 
+def test_levels_that_are_left_out_are_counted(root: Behaviour) -> None:
+    assert render.text(root, depth=1).splitlines() == [
+        "{o} Deliver",
+        "├─ {-} Pick  + 2 more",
+        "├─ [-] React  + 2 more",
+        "└─ /_/ Both  (parallel, all)  + 2 more",
+    ]
+    assert render.text(root, depth=0) == "{o} Deliver  + 9 more\n"
+    assert render.text(root, depth=3) == render.text(root)
+    drawn = render.dot(root, depth=1)
+    assert (drawn.count("[shape="), drawn.count("+ 2 more"), drawn.count("->")) == (4, 3, 3)
+    assert render.dot(root, depth=3) == render.dot(root)
+
+
 def wide_tree(nodes: int, children: int = 6) -> Behaviour:
     """A tree of `nodes` nodes, each inner one with up to `children` children."""
     made: list[Behaviour] = [Sequence("node 0", memory=True)]
@@ -178,8 +192,10 @@ def test_a_chain_deeper_than_the_recursion_limit_is_drawn() -> None:
 
 
 def test_a_png_too_small_to_read_is_refused_with_a_way_out() -> None:
-    with pytest.raises(render.RenderError, match=r"write \.svg"):
-        render.content(wide_tree(10_000), "png")
+    large = wide_tree(10_000)
+    with pytest.raises(render.RenderError, match=r"fewer levels of it \(--depth\)"):
+        render.content(large, "png")
+    assert render.content(large, "png", depth=2).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("name", ["tree.pdf", "tree", ".svg", "tree.svg.gz"])

@@ -20,6 +20,7 @@ examples:
   bt-actions render trees/pick_and_place.yaml
   bt-actions render pick_and_place -o tree.svg
   bt-actions render pick_and_place -o tree.html    # to open in a browser
+  bt-actions render large -o top.svg --depth 2     # the upper three levels of a large tree
 """
 
 
@@ -47,12 +48,25 @@ def add_parser(subparsers: Subparsers) -> None:
         help="where a picture grows to (default: down, or right where the tree is wide)",
     )
     parser.add_argument(
+        "--depth",
+        metavar="LEVELS",
+        type=_levels,
+        help="show so many levels below the root and say how many nodes are left out; "
+        "an .html file has all and starts folded to it",
+    )
+    parser.add_argument(
         "--set",
         metavar="NAME=VALUE",
         action="append",
         default=[],
         help="give an input of the tree a value; repeatable",
     )
+
+
+def _levels(text: str) -> int:
+    if not text.isdecimal() or not text.isascii() or len(text) > 6:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of levels: 0, 1, 2 ...")
+    return int(text)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -64,9 +78,10 @@ def run(args: argparse.Namespace) -> int:
             render.form_of(args.output)  # before the tree: the cheaper mistake first
         root = load(args.tree, args.set)
         if args.output is not None:
-            render.write(root, args.output, direction=args.direction)
+            render.write(root, args.output, direction=args.direction, depth=args.depth)
         else:
-            write(render.text(root, encoding=sys.stdout.encoding or "ascii"))
+            encoding = sys.stdout.encoding or "ascii"
+            write(render.text(root, encoding=encoding, depth=args.depth))
     except render.RenderError as error:
         raise BadInput(str(error)) from error
     return Exit.SUCCESS

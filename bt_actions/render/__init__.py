@@ -23,6 +23,7 @@ from bt_actions.render.look import (
     direction_of,
     kind,
     label,
+    left_out,
     look,
     rows,
 )
@@ -53,12 +54,13 @@ _STYLE = (
 )
 
 
-def dot(root: Behaviour, *, direction: str | None = None) -> str:
+def dot(root: Behaviour, *, direction: str | None = None, depth: int | None = None) -> str:
     """Return `root` in Graphviz' dot language.
 
-    `direction` is "down" or "right"; None chooses by the number of leaves.
+    `direction` is "down" or "right"; None chooses by the number of leaves. With `depth`, only so
+    many levels below the root.
     """
-    nodes = list(rows(root))
+    nodes = list(rows(root, depth=depth))
     lines = [
         f"digraph {_quoted(root.name)} {{",
         f"  rankdir={'TB' if direction_of(nodes, direction) == 'down' else 'LR'};",
@@ -70,7 +72,7 @@ def dot(root: Behaviour, *, direction: str | None = None) -> str:
         colour = f', fontcolor="{font}"' if font else ""
         lines.append(
             f'  n{number} [shape={shape}, fillcolor="{fill}"{colour}, '
-            f"label=<{_label(row.node)}>, tooltip={_quoted(_tooltip(row.node))}];"
+            f"label=<{_label(row)}>, tooltip={_quoted(_tooltip(row.node))}];"
         )
         parent = row.node.parent
         if row.depth and parent is not None:
@@ -78,21 +80,24 @@ def dot(root: Behaviour, *, direction: str | None = None) -> str:
     return "\n".join([*lines, "}", ""])
 
 
-def content(root: Behaviour, form: str, *, direction: str | None = None) -> bytes:
+def content(
+    root: Behaviour, form: str, *, direction: str | None = None, depth: int | None = None
+) -> bytes:
     """Return the bytes of a file of `root` in one of FORMATS.
 
+    With `depth`, only so many levels below the root; a page has all of them, and starts folded.
     Raises RenderError for any other format, and when it cannot be drawn.
     """
     if form == "txt":
-        return text(root).encode()
+        return text(root, depth=depth).encode()
     if form == "dot":
-        return dot(root, direction=direction).encode()
+        return dot(root, direction=direction, depth=depth).encode()
     if form == "html":
         from bt_actions.render.page import page  # here: few calls want one, all load this file
 
-        return page(root, direction=direction).encode()
+        return page(root, direction=direction, depth=depth).encode()
     if form in FORMATS:
-        return draw(dot(root, direction=direction), form)
+        return draw(dot(root, direction=direction, depth=depth), form)
     raise RenderError(f"unknown format {form!r}; there are {', '.join(FORMATS)}")
 
 
@@ -108,12 +113,14 @@ def form_of(path: Path) -> str:
     return form
 
 
-def write(root: Behaviour, path: Path, *, direction: str | None = None) -> None:
+def write(
+    root: Behaviour, path: Path, *, direction: str | None = None, depth: int | None = None
+) -> None:
     """Write `root` to `path` in the format of its suffix: the whole file, or no change.
 
     Raises RenderError when the suffix is unknown, or the file cannot be drawn or written.
     """
-    data = content(root, form_of(path), direction=direction)
+    data = content(root, form_of(path), direction=direction, depth=depth)
     target = Path(os.path.realpath(path))
     new = target.with_name(f".{target.name}.{os.getpid()}")
     try:
@@ -129,9 +136,9 @@ def write(root: Behaviour, path: Path, *, direction: str | None = None) -> None:
         raise RenderError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def _label(node: Behaviour) -> str:
-    name, under = label(node)
-    small = "<br/>".join(html.escape(line) for line in under)
+def _label(row: Row) -> str:
+    name, under = label(row.node)
+    small = "<br/>".join(html.escape(line) for line in (*under, left_out(row)) if line)
     large = "<br/>".join(html.escape(line) for line in name)
     return f'{large}<br/><font point-size="8.5">{small}</font>'
 

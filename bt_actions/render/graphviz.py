@@ -61,7 +61,10 @@ def _dots_per_inch(bounding_box: str) -> float:
     area = _POINTS_PER_INCH * math.sqrt(_MOST_PIXELS / (width * height))
     dots = min(_DOTS_PER_INCH, longest, area)
     if dots < _FEWEST_DOTS_PER_INCH:
-        raise RenderError("a .png of this tree would be too small to read; write .svg or .txt")
+        raise RenderError(
+            "a .png of this tree would be too small to read; show fewer levels of it (--depth), "
+            "or write .html, .svg or .txt"
+        )
     return dots
 
 

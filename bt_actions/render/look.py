@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import BlackBoxLevel
@@ -24,6 +24,7 @@ __all__ = [
     "direction_of",
     "kind",
     "label",
+    "left_out",
     "look",
     "rows",
 ]
@@ -62,13 +63,21 @@ class Row:
     depth: int
     branches: tuple[bool, ...]
     """For each level below the root: does the line go on below this node?"""
+    folded: int = 0
+    """Nodes below this one that are left out."""
 
 
-def rows(root: Behaviour) -> Iterator[Row]:
-    """Yield every node below and including `root`, parents first; not bounded by recursion."""
+def rows(root: Behaviour, *, depth: int | None = None) -> Iterator[Row]:
+    """Yield every node below and including `root`, parents first; not bounded by recursion.
+
+    With `depth`, only nodes of so many levels below the root; who has more below tells how many.
+    """
     waiting = [Row(root, 0, ())]
     while waiting:
         row = waiting.pop()
+        if row.depth == depth:
+            yield replace(row, folded=sum(1 for _ in rows(row.node)) - 1)
+            continue
         yield row
         last = len(row.node.children) - 1
         waiting.extend(
@@ -110,6 +119,11 @@ def action_of(node: Behaviour) -> tuple[str, str] | None:
         return None
     name = action_type if isinstance(action_type, str) else getattr(action_type, "__name__", "")
     return server, str(name).rsplit("/", 1)[-1]
+
+
+def left_out(row: Row) -> str:
+    """Return what a picture says of the nodes below `row` that it does not show, or nothing."""
+    return f"+ {row.folded:,} more" if row.folded else ""
 
 
 def label(node: Behaviour) -> tuple[list[str], list[str]]:

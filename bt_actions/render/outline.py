@@ -6,24 +6,28 @@ from py_trees.behaviour import Behaviour
 from py_trees.composites import Composite, Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
-from bt_actions.render.look import action_of, clean, kind, rows
+from bt_actions.render.look import action_of, clean, kind, left_out, rows
 
 __all__ = ["text"]
 
 
-def text(root: Behaviour, *, encoding: str = "utf-8") -> str:
-    """Return `root` as lines of text, in plain ASCII where `encoding` has no box characters."""
+def text(root: Behaviour, *, encoding: str = "utf-8", depth: int | None = None) -> str:
+    """Return `root` as lines of text, in plain ASCII where `encoding` has no box characters.
+
+    With `depth`, only so many levels below the root.
+    """
     fork, corner, bar = ("├─ ", "└─ ", "│  ")
     try:
         (fork + corner + bar).encode(encoding)
     except (UnicodeEncodeError, LookupError):
         fork, corner, bar = ("|- ", "`- ", "|  ")
     lines = []
-    for row in rows(root):
+    for row in rows(root, depth=depth):
         stem = "".join(bar if more else "   " for more in row.branches[:-1])
         if row.branches:
             stem += fork if row.branches[-1] else corner
-        lines.append(f"{stem}{_symbol(row.node)} {clean(row.node.name + _remark(row.node))}")
+        said = f"{stem}{_symbol(row.node)} {clean(row.node.name + _remark(row.node))}"
+        lines.append(f"{said}  {left_out(row)}".rstrip())
     return "\n".join(lines) + "\n"
 
 

@@ -42,22 +42,25 @@ _FOLDER = Path(__file__).parent
 _PLACEHOLDER = re.compile(r"\{\{([a-z]+)\}\}")
 
 
-def page(root: Behaviour, *, direction: str | None = None) -> str:
+def page(root: Behaviour, *, direction: str | None = None, depth: int | None = None) -> str:
     """Return `root` as a page; the same tree gives the same text.
 
-    `direction` is "down" or "right"; None chooses by the number of leaves. Raises RenderError for a
-    tree of more than MOST_NODES nodes.
+    `direction` is "down" or "right"; None chooses by the number of leaves. `depth` is how many
+    levels below the root it shows at first; None chooses by the number of nodes. Raises RenderError
+    for a tree of more than MOST_NODES nodes.
     """
     nodes = list(rows(root))
     if len(nodes) > MOST_NODES:
-        raise RenderError(f"a page of {len(nodes):,} nodes would be too slow; write .svg or .txt")
+        raise RenderError(
+            f"a page of {len(nodes):,} nodes would be too slow; write .svg or .txt, with --depth"
+        )
     style, script = _file("page.css"), _script()
     parts = {
         "policy": _policy(style, script),
         "title": html.escape(clean(root.name)),
         "style": style,
         "script": script,
-        "data": _json(_data(root, nodes, direction)),
+        "data": _json(_data(root, nodes, direction, depth)),
         "outline": html.escape(text(root)),
     }
     return _PLACEHOLDER.sub(lambda found: parts[found[1]], _file("page.html"))
@@ -73,7 +76,9 @@ def open_depth(nodes: Sequence[Row], most: int) -> int:
     return max(depth, 1)
 
 
-def _data(root: Behaviour, nodes: Sequence[Row], direction: str | None) -> dict[str, object]:
+def _data(
+    root: Behaviour, nodes: Sequence[Row], direction: str | None, depth: int | None
+) -> dict[str, object]:
     """What the script draws. Tables are shared by number: nodes of one action say the same."""
     above = []
     behaviour: Behaviour | None = root.parent
@@ -116,7 +121,7 @@ def _data(root: Behaviour, nodes: Sequence[Row], direction: str | None) -> dict[
         shown.append(one | {key: value for key, value in more.items() if value})
     return {
         "down": direction_of(nodes, direction) == "down",
-        "open": open_depth(nodes, OPEN_UP_TO),
+        "open": open_depth(nodes, OPEN_UP_TO) if depth is None else depth,
         "unfold": open_depth(nodes, UNFOLDED_UP_TO),
         "tables": list(shared),
         "nodes": shown,

@@ -51,6 +51,22 @@ def test_direction_is_respected(tmp_path: Path) -> None:
     assert "rankdir=LR" in path.read_text()
 
 
+def test_so_many_levels_are_shown(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["render", TREE, "--depth", "0"]) == 0
+    assert capsys.readouterr().out.count("\n") == 1
+    path = tmp_path / "tree.dot"
+    assert main(["render", TREE, "-o", str(path), "--depth", "1"]) == 0
+    assert " more" in path.read_text()
+
+
+@pytest.mark.parametrize("levels", ["-1", "1.5", "x", "", "\u0663", "9" * 5000])
+def test_a_depth_that_is_none_is_one_error(levels: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["render", TREE, f"--depth={levels}"])
+    assert ended.value.code == 2
+    assert "is no number of levels" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

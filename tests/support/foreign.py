@@ -21,6 +21,9 @@ from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, Si
 from bt_actions import MoveRobot, Timeouts, TreeRunner
 from bt_actions.events import Event, GoalChanged
 
+PATIENT = Timeouts(cancel=10.0, server=30.0, accept=30.0)
+"""Many of these programs start at once."""
+
 
 class User:
     """A node, a tree of one leaf, and the ways to tick it."""
@@ -28,8 +31,7 @@ class User:
     def __init__(self, action: str) -> None:
         rclpy.init()
         self.node = rclpy.create_node("user")
-        timeouts = Timeouts(cancel=10.0, server=30.0, accept=30.0)
-        self.leaf = MoveRobot("m", 60.0, action_name=action, timeout=timeouts)
+        self.leaf = MoveRobot("m", 60.0, action_name=action, timeout=PATIENT)
         self.tree = py_trees.trees.BehaviourTree(self.leaf)
         self.tree.setup(node=self.node)
         self._said = False
@@ -253,7 +255,7 @@ def tick_tock_until_a_signal(user: User) -> None:
 
 def _started(action: str) -> TreeRunner:
     """A runner with a node of its own, whose goal runs."""
-    leaf = MoveRobot("m", 60.0, action_name=action, timeout=Timeouts(cancel=10.0, server=30.0))
+    leaf = MoveRobot("m", 60.0, action_name=action, timeout=PATIENT)
     runner = TreeRunner(leaf)
 
     def say(event: Event) -> None:
@@ -282,7 +284,7 @@ def wait_for_a_runner(action: str) -> None:
 
 
 def run_and_clean_up(action: str) -> None:
-    leaf = MoveRobot("m", 60.0, action_name=action, timeout=Timeouts(cancel=10.0, server=30.0))
+    leaf = MoveRobot("m", 60.0, action_name=action, timeout=PATIENT)
     with TreeRunner(leaf) as runner:
         runner.observe(
             lambda event: (
