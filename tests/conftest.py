@@ -9,6 +9,7 @@ import contextlib
 import fcntl
 import itertools
 import os
+import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -27,6 +28,17 @@ DOMAINS = range(70, 90)
 OUR_OWN = ("bt_actions-alarm", "bt_actions-log", "bt_actions-lookout")
 """Threads that outlive what they were started for, and end by themselves."""
 _names = itertools.count(1)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _not_deaf_to_signals() -> None:
+    """Undo what `nohup` and a shell's `&` hand down to all processes that the tests start."""
+    for number, handler in (
+        (signal.SIGINT, signal.default_int_handler),
+        (signal.SIGHUP, signal.SIG_DFL),
+    ):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session")
