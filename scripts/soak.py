@@ -2,7 +2,9 @@
 
 The servers run in another process and write a journal; it is compared with what the orchestrator
 said, goal by goal. Memory, threads and open files of the orchestrator are measured after a warm-up
-and at the end. Exit code 0 when all of it holds. Takes an hour or two; `--goals` shortens it.
+and at the end; in the warm-up the servers are stopped for longer than their lease, so that what the
+search for a lost server loads once is loaded. Exit code 0 when all of it holds. Takes an hour or
+two; `--goals` shortens it.
 """
 
 from __future__ import annotations
@@ -59,6 +61,9 @@ GROWTH = 1.0
 """MB that 10,000 goals may leave behind."""
 WARM = 0.2
 """Share of the goals before memory is first measured."""
+STOPPED = (0.05, 0.1)
+"""After these shares of the goals the servers are stopped, for `STOPPED_FOR` seconds."""
+STOPPED_FOR = 8.0
 SAID = {
     "succeeded": {End.SUCCEEDED},
     "aborted": {End.ABORTED},
@@ -73,8 +78,9 @@ SAID = {
 class Soak:
     """Counts goals, keeps what was said of each in a file, and measures."""
 
-    def __init__(self, goals: int, said: Path) -> None:
+    def __init__(self, goals: int, said: Path, servers: subprocess.Popen[bytes]) -> None:
         self.goals = goals
+        self._servers = servers
         self.outcomes: Counter[str] = Counter()
         self.measured: list[tuple[int, dict[str, float]]] = []
         self._said = said.open("w", encoding="utf-8")
@@ -91,11 +97,17 @@ class Soak:
         if self._visits % step == 0:
             self.measured.append((self._visits, held()))
             print(self._visits, self.measured[-1][1], flush=True)
+        if self._visits in [int(share * self.goals) for share in STOPPED]:
+            self._servers.send_signal(signal.SIGSTOP)
+            threading.Timer(STOPPED_FOR, self._servers.send_signal, [signal.SIGCONT]).start()
         self._visits += 1
         return random.uniform(-1.0, 1.0)
 
     def close(self) -> None:
-        """Measure for the last time."""
+        """Measure for the last time, when whoever still looks for a lost server has ended."""
+        for thread in threading.enumerate():
+            if thread.name == "bt_actions-lookout":
+                thread.join(60.0)
         self.measured.append((self._visits, held()))
         self._said.close()
 
@@ -118,6 +130,7 @@ def held() -> dict[str, float]:
     status = Path("/proc/self/status").read_text(encoding="utf-8")
     return {
         "memory": int(status.partition("VmRSS:")[2].split()[0]) / 1024.0,
+        "of it not of files": int(status.partition("RssAnon:")[2].split()[0]) / 1024.0,
         "threads": len(threading.enumerate()),
         "files": sum(1 for _ in Path("/proc/self/fd").iterdir()),
     }
@@ -134,7 +147,7 @@ def run(goals: int, directory: Path) -> list[str]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    soak = Soak(goals, said)
+    soak = Soak(goals, said, servers)
     retry = Retry(2, outcomes=frozenset({*Retry().outcomes, *LOST}))
     move = MoveRobot("move", 0.0, timeout=TIMEOUTS, retry=retry, on_feedback=lambda feedback: None)
     grip = Gripper("grip", 0.0, timeout=TIMEOUTS, retry=retry)
@@ -157,6 +170,7 @@ def run(goals: int, directory: Path) -> list[str]:
             wrong += [f"{report} is unaccounted for" for report in runner.unaccounted]
             soak.close()
     finally:
+        servers.send_signal(signal.SIGCONT)
         servers.send_signal(signal.SIGINT)
         servers.wait(20.0)
     print(f"{goals} goals in {time.monotonic() - began:.0f} s")
