@@ -125,7 +125,7 @@ class Workspace:
             if first.code == "BT101":  # told where it stands in that file, as all that is wrong
                 self._unreadable += error.findings
             else:
-                source.report("BT209", span_of(written), f"{path.name}: {first.message}")
+                source.report("BT209", span_of(written), f"{path.name or path}: {first.message}")
             return None
 
     def _import(self, document: Document, chain: tuple[Path, ...]) -> None:

@@ -53,6 +53,37 @@ def test_a_file_that_is_not_there_is_told_with_what_is_installed() -> None:
     assert "pick_and_place" in finding.hint
 
 
+def test_a_name_that_no_file_can_have_is_told_as_any_other() -> None:
+    assert only(check_file("x" * 300)).endswith(
+        "error[BT100]: this cannot be read: File name too long"
+    )
+
+
+@pytest.mark.parametrize("line", [
+    "root: {subtree: NAME}",
+    "import: NAME\nroot: {success: }",
+])  # fmt: skip
+@pytest.mark.parametrize(("name", "told"), [
+    ("x" * 300, "x: this cannot be read: File name too long"),
+    ("x/" * 3000, "x: this cannot be read: File name too long"),
+    ('"a\\0b"', "there is no tree 'a\\x00b' here, and none of that name is installed"),
+    ("loop.yaml", "there is no tree 'loop.yaml' here, and none of that name is installed"),
+    ("file.yaml/inner", "there is no tree 'file.yaml/inner'"),
+    (".", ".: this is a directory, not a tree"),
+    ("/", "/: this is a directory, not a tree"),
+])  # fmt: skip
+def test_a_file_that_cannot_be_there_is_told_where_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, name: str, told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("file.yaml").touch()
+    Path("loop.yaml").symlink_to("loop.yaml")
+    Path("tree.yaml").write_text(f"tree: t\n{line.replace('NAME', name)}\n", encoding="utf-8")
+    (finding,) = check_file("tree.yaml")
+    assert finding.code == "BT209"
+    assert finding.message.endswith(told)
+
+
 def test_a_device_is_no_tree() -> None:
     assert "this is no regular file" in only(check_file("/dev/zero"))
 
