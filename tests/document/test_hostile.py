@@ -185,6 +185,22 @@ def test_a_text_of_very_many_nodes_is_one_finding() -> None:
     assert "error[BT105]: this is, or unfolds to, more than" in only(check_bytes(text.encode()))
 
 
+@pytest.mark.parametrize(("line", "message"), [
+    ("import: NEXT", "more than 100 files inside each other"),
+    ("root: {subtree: NEXT}", "more than 50 trees inside each other"),
+])  # fmt: skip
+def test_a_chain_of_files_without_end_is_one_finding(
+    tmp_path: Path, line: str, message: str
+) -> None:
+    for at in range(600):
+        head = "tree: t\n" if "root" in line or at == 0 else "actions: {}\n"
+        text = f"{head}{line.replace('NEXT', f'f{at + 1}.yaml')}\n"
+        text += "root: {success: }\n" if at == 0 and "root" not in line else ""
+        (tmp_path / f"f{at}.yaml").write_text(text, encoding="utf-8")
+    (finding,) = check_file(tmp_path / "f0.yaml")
+    assert (finding.code, finding.message) == ("BT105", message)
+
+
 def test_trees_that_unfold_without_bound_are_one_finding(tmp_path: Path) -> None:
     (tmp_path / "t0.yaml").write_text("tree: t0\nroot: {success: A}\n")
     for n in range(1, 9):
