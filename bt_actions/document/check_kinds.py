@@ -215,11 +215,11 @@ def _python(checker: Checker, node: TreeNode) -> None:
         text = "python: is not allowed here, because it runs code that the tree names"
         checker.source.report("BT214", span_of(node.key), text)
         return
-    for computed in computed_in(arguments):
+    computed = list(computed_in(arguments))
+    for one in computed:
         text = "an argument is a plain value: the class is made before the tree runs"
-        checker.source.report("BT204", span_of(computed.node), text)
-        return
-    if not isinstance(path, str) or not checker.types:
+        checker.source.report("BT204", span_of(one.node), text)
+    if computed or not isinstance(path, str) or not checker.types:
         return
     from bt_actions.document.classes import ClassError, find_behaviour, wrong_arguments
 
@@ -230,8 +230,7 @@ def _python(checker: Checker, node: TreeNode) -> None:
         return
     if not isinstance(arguments, dict):
         return
-    wrong = wrong_arguments(cls, arguments)
-    if wrong is not None:
+    for wrong in wrong_arguments(cls, arguments):
         at: Node = node.key
         if wrong.name:
             at = locate(node.written["arguments"], (wrong.name,), at_key=wrong.at_key)

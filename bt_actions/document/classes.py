@@ -11,7 +11,7 @@ import inspect
 import re
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
@@ -90,36 +90,59 @@ def make_behaviour(path: str, name: str, arguments: Mapping[str, object]) -> Beh
     return made
 
 
-def wrong_arguments(cls: type[Behaviour], arguments: Mapping[str, object]) -> Misfit | None:
-    """The first thing that keeps the constructor from taking the arguments, or None."""
+def wrong_arguments(cls: type[Behaviour], arguments: Mapping[str, object]) -> Iterator[Misfit]:
+    """What keeps the constructor from taking the arguments.
+
+    What is missing is told when nothing else is wrong: it may be there under another name.
+    """
     parameters = _parameters(cls)
     if parameters is None:
-        return None
+        return
     named = {
         name: parameter
         for name, parameter in parameters.items()
         if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
     }
     takes_any = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values())
+    wrong = False
     for name, value in arguments.items():
-        if name == "name":
-            return Misfit(name, "the name is given as the node's 'name'")
-        if name not in named and not takes_any:
-            near = did_you_mean(name, named) or f"; it takes {', '.join(named)}"
-            return Misfit(name, f"{cls.__name__} takes no argument {name!r}{near}")
-        if name in named and not _takes(named[name].annotation, value):
-            wanted = _annotation(named[name].annotation)
-            text = f"{cls.__name__} takes a {name!r} of type {wanted}, not {value!r:.60}"
-            return Misfit(name, text, at_key=False)
+        misfit = _misfit(cls, name, value, named, takes_any=takes_any)
+        if misfit is not None:
+            wrong = True
+            yield misfit
+    if wrong:
+        return
     for name, parameter in named.items():
         if parameter.default is parameter.empty and name != "name" and name not in arguments:
-            return Misfit("", f"{cls.__name__} needs the argument {name!r}")
+            yield Misfit("", f"{cls.__name__} needs the argument {name!r}")
     for name, parameter in parameters.items():
         if parameter.kind is parameter.POSITIONAL_ONLY and parameter.default is parameter.empty:
-            return Misfit("", f"{cls.__name__} takes {name!r} by its position only")
+            yield Misfit("", f"{cls.__name__} takes {name!r} by its position only")
+            return
     if "name" not in named and not takes_any:
-        return Misfit("", f"{cls.__name__} takes no name")
-    return None
+        yield Misfit("", f"{cls.__name__} takes no name")
+
+
+def _misfit(
+    cls: type[Behaviour],
+    name: str,
+    value: object,
+    named: Mapping[str, inspect.Parameter],
+    *,
+    takes_any: bool,
+) -> Misfit | None:
+    """What is wrong with one argument."""
+    if name == "name":
+        return Misfit(name, "the name is given as the node's 'name'")
+    if name not in named:
+        near = did_you_mean(name, named) or f"; it takes {', '.join(named)}"
+        text = f"{cls.__name__} takes no argument {name!r}{near}"
+        return None if takes_any else Misfit(name, text)
+    if _takes(named[name].annotation, value):
+        return None
+    wanted = _annotation(named[name].annotation)
+    text = f"{cls.__name__} takes a {name!r} of type {wanted}, not {value!r:.60}"
+    return Misfit(name, text, at_key=False)
 
 
 def _parameters(cls: type[Behaviour]) -> Mapping[str, inspect.Parameter] | None:
@@ -145,7 +168,13 @@ def _takes(annotation: object, value: object) -> bool:
         return isinstance(value, (int, float)) and not isinstance(value, bool)
     if plain is int:
         return isinstance(value, int) and not isinstance(value, bool)
-    for kind in (bool, str, list, dict):
+    parts = typing.get_args(annotation)
+    if plain is list:
+        return isinstance(value, list) and all(_takes(part, one) for part in parts for one in value)
+    if plain is dict:
+        values = value.values() if isinstance(value, dict) else ()
+        return isinstance(value, dict) and all(_takes(parts[-1], one) for one in values if parts)
+    for kind in (bool, str):
         if plain is kind:
             return isinstance(value, kind)
     return True

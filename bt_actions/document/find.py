@@ -47,7 +47,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
     for candidate in candidates:
         if _is_file(candidate):
             return candidate
-    if exact.exists():
+    if _is_there(exact):
         return exact  # whoever reads it will say what it is
     raise TreeNotFoundError(_nowhere(wanted, exact, is_name))
 
@@ -113,6 +113,14 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+def _is_there(path: Path) -> bool:
+    """Whether something has this path, or nobody can tell: its name is too long, say."""
+    try:
+        return path.exists()
+    except OSError:
+        return True
 
 
 def _nowhere(wanted: str, exact: Path, is_name: bool) -> str:

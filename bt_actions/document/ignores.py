@@ -15,7 +15,7 @@ from bt_actions.document.rules import RULES
 from bt_actions.document.source import Source
 from bt_actions.suggest import did_you_mean
 
-__all__ = ["apply_ignores"]
+__all__ = ["apply_ignores", "is_ignore"]
 
 _IGNORE = re.compile(r"(?:^|(?<=\s))#\s*bt:\s*ignore\b(?:\[([^\]]*)\])?")
 _CODE = re.compile(r"[^\s,]+")
@@ -47,11 +47,16 @@ def apply_ignores(source: Source, *, complete: bool = True) -> None:
         source.report("BT120", span, f"there is no {code} here to silence")
 
 
+def is_ignore(comment: Comment) -> bool:
+    """Whether a comment silences something."""
+    return _IGNORE.search(comment.text) is not None
+
+
 def _targets(source: Source) -> Iterator[tuple[Comment, int]]:
     """The comments that hold an ignore, each with the line that it is about."""
     assert source.root is not None
     comments = list(comments_of(source, scalars_of(source.root)))
-    ignores = [comment for comment in comments if _IGNORE.search(comment.text)]
+    ignores = [comment for comment in comments if is_ignore(comment)]
     if not ignores:
         return
     below = _lines_below(source, {comment.line for comment in comments if comment.alone})

@@ -1,6 +1,7 @@
 """Writes the lines of canonical form. Says nothing of whether they mean the same (formatting.py).
 
-Comments go with what follows them, or stand behind what they stood behind.
+Comments go with what follows them, or stand behind what they stood behind. One that silences a
+warning goes with the line that follows it, whatever becomes of the item that begins there.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 from collections.abc import Mapping as MappingType
 
 from bt_actions.document.comments import Comment, block_header, comments_of, scalars_of
+from bt_actions.document.ignores import is_ignore
 from bt_actions.document.key_order import in_order, item_shape, shapes_of
 from bt_actions.document.nodes import Alias, Listing, Mapping, Node, Scalar
 from bt_actions.document.shape import Shape
@@ -36,6 +38,7 @@ class Layout:
         comments = list(comments_of(source, scalars_of(root)))
         self._behind = {one.line: one for one in comments if not one.alone}
         self._alone = {one.line: one for one in comments if one.alone}
+        self._ignores = {line for line, one in self._alone.items() if is_ignore(one)}
         self._ends = trailing_comments(root, source, self._alone, anchors)
         self._used = {line for block in self._ends.values() for line, _ in block}
         self._bare = set(_bare_dashes(source, root))
@@ -44,6 +47,8 @@ class Layout:
         """Comments at the top of the file, with a blank line behind them, stay at the top."""
         lines = self._source.lines
         end = next((at for at, line in enumerate(lines) if not line.startswith("#")), len(lines))
+        if not self._ignores.isdisjoint(range(end + 1)):
+            return
         if 0 < end < len(lines) and not lines[end].strip():
             self._lines += [*(line.rstrip() for line in lines[:end]), ""]
             self._used.update(range(1, end + 2))
@@ -83,9 +88,21 @@ class Layout:
         for at, item in enumerate(node.items):
             before = lead if at == 0 else ""
             if not before:
-                self._leading(item.line, indent)
+                self._leading(self._first_ignore(item, shape), indent)
             self._item(item, indent, shape, f"{before}- ")
         self._trailing(node, indent)
+
+    def _first_ignore(self, item: Node, shape: Shape | None) -> int:
+        """The line of an item, or of the first ignore above it that is about a key which moves."""
+        line = at = item.line
+        if not self._ignores or not isinstance(item, Mapping) or item.flow:
+            return line
+        if in_order(item, shapes_of(item, shape))[0][0].line == line:
+            return line
+        while at > 1 and (at - 1 in self._alone or not self._source.lines[at - 2].strip()):
+            at -= 1
+            line = at if at in self._ignores else line
+        return line
 
     def _item(self, item: Node, indent: int, shape: Shape | None, lead: str) -> None:
         """An item of a block list; `lead` is its dash, behind those of lists around it."""
@@ -205,8 +222,10 @@ class Layout:
                 pass  # the dash of what is on `line`
             elif (self._source.line(at) or "").strip():
                 break
-            elif not block or block[-1]:
-                block.append("")
+            else:
+                self._used.add(at)
+                if not block or block[-1]:
+                    block.append("")
             at -= 1
         block.reverse()
         if block and not block[0] and not (self._lines and self._lines[-1]):

@@ -110,7 +110,8 @@ def check_file(path: PathLike, *, types: bool = True) -> list[Finding]:
     """Everything that is wrong with a tree, and with all that it includes and imports."""
     workspace = Workspace()
     try:
-        workspace.open(_found(path), _shown(path))
+        found = _found(path)
+        workspace.open(found, _shown(path, found))
     except DocumentError as error:
         return list(error.findings)
     except TooManyErrors:
@@ -145,7 +146,8 @@ def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[
 def _open(path: PathLike, *, types: bool, python: bool = True) -> tuple[Workspace, Document]:
     workspace = Workspace()
     try:
-        document = workspace.open(_found(path), _shown(path))
+        found = _found(path)
+        document = workspace.open(found, _shown(path, found))
         findings = _checked(workspace, types=types, python=python)
     except TooManyErrors:
         document, findings = None, workspace.findings
@@ -175,6 +177,6 @@ def _found(path: PathLike) -> Path:
         raise DocumentError(source.findings) from None
 
 
-def _shown(path: PathLike) -> str | None:
-    """The name to show: as it was given where that is a file, else where it was found."""
-    return os.fspath(path) if Path(path).exists() else None
+def _shown(path: PathLike, found: Path) -> str | None:
+    """The name to show: as it was given where that is the file, else where it was found."""
+    return os.fspath(path) if Path(path) == found else None

@@ -15,6 +15,7 @@ import yaml
 
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.source import Source
+from bt_actions.document.syntax import report_syntax
 
 __all__ = [
     "MAX_DEPTH",
@@ -46,8 +47,6 @@ _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _SPECIAL = re.compile(r"([-+]?)\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 _MAX_DIGITS = 400
-_OPENS = re.compile("flow mapping|flow sequence|quoted scalar")
-_INDEXED = re.compile(r"(\$[A-Za-z_]\w*(?:\.\w+)*)\[(\d+)\]")
 
 
 class Node:
@@ -154,7 +153,7 @@ def _composed(composer: _Composer, source: Source) -> Node | None:
             if composer.gave_up:
                 return None
     except yaml.YAMLError as error:
-        _report_syntax(source, error)
+        report_syntax(source, error)
         return None
     return composer.root
 
@@ -355,49 +354,3 @@ def _place(node: Node, event: Any) -> None:
 def _event_span(event: Any) -> Span:
     start, end = event.start_mark, event.end_mark
     return Span(start.line + 1, start.column + 1, end.line + 1, end.column + 1)
-
-
-def _report_syntax(source: Source, error: yaml.YAMLError) -> None:
-    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
-    problem = getattr(error, "problem", None) or str(error) or "this is not YAML"
-    line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
-    if line > len(source.lines) > 0:
-        line, column = len(source.lines), len(source.lines[-1]) + 1
-    text = source.line(line) or ""
-    code, message, hint = _explain(problem, text, column)
-    if code == "BT103":
-        column = text.find("\t") + 1
-    span = Span(line, column, line, column + 1)
-    source.report(code, span, message, hint=hint, related=_opened(source, error, code))
-
-
-def _opened(source: Source, error: yaml.YAMLError, code: str) -> Related | None:
-    """Where the brace, bracket or quote stands that is not closed, if it is that."""
-    what, mark = getattr(error, "context", None) or "", getattr(error, "context_mark", None)
-    if code != "BT102" or mark is None or not _OPENS.search(what):
-        return None
-    return Related(Place(source.name, mark.line + 1, mark.column + 1), "opened here")
-
-
-def _explain(problem: str, text: str, column: int) -> tuple[str, str, str | None]:
-    indent = text[: len(text) - len(text.lstrip())]
-    if "\t" in indent or text[column - 1 : column] == "\t":
-        return "BT103", "a tab cannot indent YAML", "use spaces"
-    cut = _INDEXED.search(text)
-    if cut is not None and "," in problem:
-        message = f"'[' ends a text inside {{ }} and [ ], so {cut[0]!r} is cut"
-        return "BT118", message, f"write {cut[1]}.{cut[2]}, or put it in quotes"
-    if "mapping values are not allowed" in problem:
-        return "BT102", "a second ':' on this line", "put a text that holds ': ' in quotes"
-    if "could not find expected ':'" in problem:
-        return "BT102", "a key without its ':'", None
-    if "did not find expected key" in problem:
-        return "BT102", "this does not line up with the keys above", "check the indentation"
-    if "did not find expected '-' indicator" in problem:
-        return "BT102", "this does not line up with the list above", "check the indentation"
-    if "unexpected end of stream" in problem:
-        return "BT102", "the quote that was opened is never closed", None
-    if "cannot start any token" in problem:
-        bad = text[column - 1 : column]
-        return "BT102", f"no text begins with {bad!r}", "put it in quotes"
-    return "BT102", problem, None

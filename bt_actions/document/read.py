@@ -130,8 +130,10 @@ class _Reader:
         source = self._source
         if not isinstance(written, Mapping):
             hint = None
-            if isinstance(written, Scalar) and written.text in KINDS:
-                hint = f"write '{written.text}: name'"
+            if isinstance(written, Scalar):
+                word, _, name = written.text.partition(":")
+                if word in KINDS or word in self._actions:
+                    hint = f"write '{word}: {name or 'name'}'"
             message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
             source.report("BT111", span_of(written), message, hint=hint)
             return None
@@ -170,12 +172,15 @@ class _Reader:
                 hint="begin a new item with '-'", related=Related(place, "the first is here"),
             )  # fmt: skip
             return None
-        self._report_no_kind(written)
-        return None
-
-    def _report_no_kind(self, written: Mapping) -> None:
         settings = {*ACTION_KEYS, *_CHILDREN, *(key for k in KINDS.values() for key in k.keys)}
         words = [key for key, _ in written.pairs if key.text not in settings]
+        beside = [key for key, _ in written.pairs if key.text in _BESIDE_CHILD]
+        if len(beside) == 1 and not words and written.get("children") is not None:
+            return beside[0]  # with 'children' in the place of 'child'
+        self._report_no_kind(written, words)
+        return None
+
+    def _report_no_kind(self, written: Mapping, words: list[Scalar]) -> None:
         if not words:
             hint = "one key of a node is its kind, such as 'sequence: name'"
             self._source.report("BT111", _first(written), "this node has no kind", hint=hint)

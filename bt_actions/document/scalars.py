@@ -92,6 +92,8 @@ class Name:
                 hint="letters, digits and underscores, beginning with a letter",
             )  # fmt: skip
             return BAD
+        if not isinstance(node.value, str):
+            return wrong_form(self, node, source)
         return node.text
 
     def schema(self) -> Schema:

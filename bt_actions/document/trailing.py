@@ -1,4 +1,7 @@
-"""Comments at the end of a block: they belong to it where they are indented as what is in it."""
+"""Comments at the end of a block: they belong to it where they are indented as what is in it.
+
+One that silences a warning belongs to what follows it, however it is indented.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from collections.abc import Container, Iterator
 from collections.abc import Mapping as MappingType
 
 from bt_actions.document.comments import Comment
+from bt_actions.document.ignores import is_ignore
 from bt_actions.document.nodes import Listing, Mapping, Node
 from bt_actions.document.source import Source
 
@@ -55,7 +59,7 @@ def _lines(
     found: list[tuple[int, str]] = []
     own = 0
     for line in range(first, at):
-        if line in alone and alone[line].column < least:
+        if line in alone and (alone[line].column < least or is_ignore(alone[line])):
             break
         found.append((line, alone[line].text if line in alone else ""))
         own = len(found) if line in alone else own

@@ -20,6 +20,8 @@ __all__ = ["MAX_TREE_NODES", "Workspace"]
 MAX_TREE_NODES = 1_000_000
 """Nodes of a tree after all that it includes was unfolded."""
 _MAX_CHAIN = 50
+_MAX_FILES = 2 * _MAX_CHAIN
+"""Trees inside each other, and then files that import each other."""
 
 
 class Workspace:
@@ -125,7 +127,7 @@ class Workspace:
             if first.code == "BT101":  # told where it stands in that file, as all that is wrong
                 self._unreadable += error.findings
             else:
-                source.report("BT209", span_of(written), f"{path.name}: {first.message}")
+                source.report("BT209", span_of(written), f"{path.name or path}: {first.message}")
             return None
 
     def _import(self, document: Document, chain: tuple[Path, ...]) -> None:
@@ -172,6 +174,10 @@ class Workspace:
         if key in chain:
             names = [step.name for step in chain[chain.index(key) :]] + [key.name]
             source.report("BT210", span_of(node), f"a cycle of imports: {' -> '.join(names)}")
+            return None
+        if len(chain) >= _MAX_FILES:
+            text = f"more than {_MAX_FILES} files inside each other"
+            source.report("BT105", span_of(node), text)
             return None
         if (key, True) in self._documents:
             return self._documents[key, True]

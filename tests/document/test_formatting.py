@@ -302,6 +302,61 @@ def test_a_comment_at_the_end_of_a_block_stays_in_it_when_keys_move() -> None:
     )
 
 
+def test_an_ignore_stays_above_the_line_that_it_silences() -> None:
+    text = """\
+    # bt: ignore[BT301] not yet
+
+    inputs: {a: int32}
+    tree: t
+    root:
+      children:
+        - log: a
+          # bt: ignore[BT310] however it is indented
+        - save: {x: result.final_pose}
+          move: A
+
+        # of the item
+        # bt: ignore[BT310] the operator reads it,
+        # on the screen
+        - save: {y: result.final_pose}
+          # of the goal
+          goal: {distance: 1}
+          move: B
+        # bt: ignore[BT302] not moved
+        - move: C
+          # bt: ignore[BT310] inside
+          save: {z: result.final_pose}
+      sequence: S
+    """
+    assert formatted(textwrap.dedent(text)) == textwrap.dedent(
+        """\
+        tree: t
+        # bt: ignore[BT301] not yet
+
+        inputs: {a: int32}
+        root:
+          sequence: S
+          children:
+            - log: a
+            - move: A
+              # bt: ignore[BT310] however it is indented
+              save: {x: result.final_pose}
+
+            # of the item
+            - move: B
+              # of the goal
+              goal: {distance: 1}
+              # bt: ignore[BT310] the operator reads it,
+              # on the screen
+              save: {y: result.final_pose}
+            # bt: ignore[BT302] not moved
+            - move: C
+              # bt: ignore[BT310] inside
+              save: {z: result.final_pose}
+        """
+    )
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

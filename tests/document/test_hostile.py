@@ -53,6 +53,37 @@ def test_a_file_that_is_not_there_is_told_with_what_is_installed() -> None:
     assert "pick_and_place" in finding.hint
 
 
+def test_a_name_that_no_file_can_have_is_told_as_any_other() -> None:
+    assert only(check_file("x" * 300)).endswith(
+        "error[BT100]: this cannot be read: File name too long"
+    )
+
+
+@pytest.mark.parametrize("line", [
+    "root: {subtree: NAME}",
+    "import: NAME\nroot: {success: }",
+])  # fmt: skip
+@pytest.mark.parametrize(("name", "told"), [
+    ("x" * 300, "x: this cannot be read: File name too long"),
+    ("x/" * 3000, "x: this cannot be read: File name too long"),
+    ('"a\\0b"', "there is no tree 'a\\x00b' here, and none of that name is installed"),
+    ("loop.yaml", "there is no tree 'loop.yaml' here, and none of that name is installed"),
+    ("file.yaml/inner", "there is no tree 'file.yaml/inner'"),
+    (".", ".: this is a directory, not a tree"),
+    ("/", "/: this is a directory, not a tree"),
+])  # fmt: skip
+def test_a_file_that_cannot_be_there_is_told_where_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, name: str, told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("file.yaml").touch()
+    Path("loop.yaml").symlink_to("loop.yaml")
+    Path("tree.yaml").write_text(f"tree: t\n{line.replace('NAME', name)}\n", encoding="utf-8")
+    (finding,) = check_file("tree.yaml")
+    assert finding.code == "BT209"
+    assert finding.message.endswith(told)
+
+
 def test_a_device_is_no_tree() -> None:
     assert "this is no regular file" in only(check_file("/dev/zero"))
 
@@ -152,6 +183,22 @@ def test_a_billion_laughs_are_one_finding() -> None:
 def test_a_text_of_very_many_nodes_is_one_finding() -> None:
     text = "tree: t\nroot: [" + "1," * 2_100_000 + "]\n"
     assert "error[BT105]: this is, or unfolds to, more than" in only(check_bytes(text.encode()))
+
+
+@pytest.mark.parametrize(("line", "message"), [
+    ("import: NEXT", "more than 100 files inside each other"),
+    ("root: {subtree: NEXT}", "more than 50 trees inside each other"),
+])  # fmt: skip
+def test_a_chain_of_files_without_end_is_one_finding(
+    tmp_path: Path, line: str, message: str
+) -> None:
+    for at in range(600):
+        head = "tree: t\n" if "root" in line or at == 0 else "actions: {}\n"
+        text = f"{head}{line.replace('NEXT', f'f{at + 1}.yaml')}\n"
+        text += "root: {success: }\n" if at == 0 and "root" not in line else ""
+        (tmp_path / f"f{at}.yaml").write_text(text, encoding="utf-8")
+    (finding,) = check_file(tmp_path / "f0.yaml")
+    assert (finding.code, finding.message) == ("BT105", message)
 
 
 def test_trees_that_unfold_without_bound_are_one_finding(tmp_path: Path) -> None:

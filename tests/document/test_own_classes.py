@@ -72,6 +72,7 @@ def test_what_a_module_raises_is_told_where_it_is_named(own: Own, code: str, sai
     [
         ("n: int", "abc"), ("n: int", "1.5"), ("n: int", "true"), ("n: float", "abc"),
         ("n: str", "5"), ("n: bool", "1"), ("n: int | None", "abc"), ("n: list[int]", "{a: 1}"),
+        ("n: list[float] | None", "[1, a]"), ("n: dict[str, int]", "{a: 1, b: c}"),
     ],
 )  # fmt: skip
 def test_an_argument_of_another_type_than_it_is_annotated_with_is_wrong(
@@ -87,6 +88,8 @@ def test_an_argument_of_another_type_than_it_is_annotated_with_is_wrong(
     [
         ("n: int", "5"), ("n: float", "5"), ("n: str", "abc"), ("n: int | None", "null"),
         ("n: Path", "abc"), ("n", "abc"), ("n: tuple[int, ...]", "[1]"), ("n: list[int]", "[1]"),
+        ("n: list", "[1, a]"), ("n: list[list[int]]", "[[1], []]"), ("n: dict", "{a: 1}"),
+        ("n: dict[str, float]", "{a: 1}"), ("n: list[float] | None", "[1, 0.5]"),
     ],
 )  # fmt: skip
 def test_an_argument_that_fits_or_of_which_that_cannot_be_told_is_taken(
@@ -96,6 +99,23 @@ def test_an_argument_that_fits_or_of_which_that_cannot_be_told_is_taken(
     tree = own(code, f"{{n: {value}}}")
     assert checked(tree) == []
     assert load_tree(tree).name == "A"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("{n: a, x: 3}", ["4:18 BT215 A takes a 'n' of ", "4:24 BT215 A takes a 'x' of "]),
+        ("{nn: 3, y: 3}", ["4:15 BT215 A takes no arg", "4:22 BT215 A takes no arg"]),
+        ("{}", ["3:3 BT215 A needs the argument 'n'", "3:3 BT215 A needs the argument 'x'"]),
+        ("{n: $a, x: $b}", ["4:18 BT204 an argument is ", "4:25 BT204 an argument is "]),
+    ],
+)
+def test_all_that_is_wrong_with_the_arguments_is_told_at_once(
+    own: Own, arguments: str, said: list[str]
+) -> None:
+    code = "class A(Base):\n    def __init__(self, name, n: int, x: str): super().__init__(name)"
+    found = checked(own(code, arguments))
+    assert [one[: len(start)] for one, start in zip(found, said, strict=True)] == said
 
 
 @pytest.mark.parametrize(
