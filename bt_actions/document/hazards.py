@@ -5,21 +5,19 @@ Looks at one checked document (and at what it includes, where a hazard spans bot
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from bt_actions.document.build_names import resources_below, settings_of
 from bt_actions.document.check import Checker
 from bt_actions.document.findings import Related, Span
-from bt_actions.document.inner import inner_span
 from bt_actions.document.nodes import Mapping, span_of
+from bt_actions.document.order import find_early_reads
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
 from bt_actions.document.verdicts import Verdicts, budget
 
 __all__ = ["find_hazards"]
 
-_LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
 _BUSY = frozenset(
     {"action", "service", "wait", "wait_until", "wait_for_message", "running", "python"}
 )
@@ -46,7 +44,7 @@ class _Hazards:
     def look(self, root: TreeNode) -> None:
         self._walk(root, bounded=False)
         self._result_timeouts()
-        self._order(root)
+        find_early_reads(self._checker, self._doubts, root)
         self._unused()
 
     def _report(self, code: str, span: Span, message: str, **more: object) -> None:
@@ -166,54 +164,6 @@ class _Hazards:
                 f"{after:g} s are less than the {needed:g} s that what it holds may take",
                 hint="the deadlines and retries inside would never be reached",
             )  # fmt: skip
-
-    # BT302: in the order of ticks
-
-    def _order(self, root: TreeNode) -> None:
-        document = self._document
-        seen = {*document.inputs, *document.topics}
-        writers = Counter(write.name for n in root.walk() for write in self._checker.writes_of(n))
-
-        def below(node: TreeNode) -> set[str]:
-            return {write.name for n in node.walk() for write in self._checker.writes_of(n)}
-
-        def visit(node: TreeNode, around: frozenset[str], later: frozenset[str]) -> None:
-            kind = node.kind.name if node.kind is not None else ""
-            own = {write.name for write in self._checker.writes_of(node)}
-            each = kind == "for_each"
-
-            def known(name: str) -> bool:
-                if name in seen or self._doubts.unknown_action or self._doubts.mentions(name):
-                    return True
-                return name in around and (name not in own or writers[name] > 1)
-
-            self._early(node, known)
-            if each:
-                seen.update(own)
-            if kind == "repeat":  # a read in its first round has nothing yet
-                later |= below(node)
-            elif kind in _LOOPS or node.values.get("memory") is False:
-                around |= below(node)
-            if kind not in ("repeat", "sequence"):  # who may go on after a read that failed
-                around |= later
-            for child in node.children:
-                visit(child, around, later)
-            seen.update(own)
-
-        visit(root, frozenset(), frozenset())
-
-    def _early(self, node: TreeNode, known: Callable[[str], bool]) -> None:
-        checker = self._checker
-        for read in checker.reads.get(id(node), ()):
-            if read.name in checker.variables and not known(read.name):
-                written, start = read.computed.node, read.computed.start
-                span = inner_span(written, self._source, start + read.start, start + read.end)
-                self._report("BT302", span, f"nothing has written ${read.name} when this is read")
-        declared = self._document.actions.get(node.alias) if node.alias is not None else None
-        for read in checker.reads.get(id(declared), ()) if declared is not None else ():
-            if read.name in checker.variables and not known(read.name):
-                text = f"nothing has written ${read.name} when {node.alias!r} reads it here"
-                self._report("BT302", span_of(node.key), text)
 
     # BT308 to BT311
 
