@@ -8,6 +8,8 @@ written a name, nothing is claimed.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Set
+from functools import cached_property
 from typing import NamedTuple
 
 from bt_actions.document.check import Checker
@@ -19,6 +21,7 @@ from bt_actions.document.unread import Doubts
 
 __all__ = ["find_early_reads"]
 
+_NOTHING: frozenset[str] = frozenset()
 _LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
 _STRAIGHT = frozenset({"sequence", "timeout", "while", "run_once"})
 """Go on when a child succeeds, and fail with it."""
@@ -33,13 +36,13 @@ class _Written(NamedTuple):
     it had failed.
     """
 
-    succeeded: set[str]
-    failed: set[str]
+    succeeded: Set[str]
+    failed: Set[str]
 
 
 def find_early_reads(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
     """Report the reads that no write can come before."""
-    _Order(checker, doubts, root).visit(root, frozenset(), frozenset())
+    _Order(checker, doubts, root).visit(root, _NOTHING, _NOTHING)
 
 
 class _Order:
@@ -50,7 +53,12 @@ class _Order:
         """What may have been written when the node is reached that is visited now."""
         self._passed: set[str] = set()
         """What the nodes write that were visited already."""
-        self._writers = Counter(name for node in root.walk() for name in self._own(node))
+        self._root = root
+
+    @cached_property
+    def _writers(self) -> Counter[str]:
+        """How many nodes write a name."""
+        return Counter(name for node in self._root.walk() for name in self._own(node))
 
     def visit(self, node: TreeNode, around: frozenset[str], later: frozenset[str]) -> _Written:
         """Look at a node and what is below it.
@@ -63,13 +71,15 @@ class _Order:
         self._reads(node, own, around)
         self._passed |= own
         if not node.children:
-            return _Written(own, own if kind == "subtree" else set())
+            return _Written(own, own if kind == "subtree" else _NOTHING)
         if kind == "repeat":  # a read in its first round has nothing yet
             later |= self._below(node)
         elif kind in _LOOPS or node.values.get("memory") is False:
             around |= self._below(node)
         if kind not in ("repeat", "sequence"):  # who may go on after a read that failed
             around |= later
+        if not own:
+            return self._children(node, kind, around, later)
         added = own - self._known  # a loop's item
         self._known |= added
         succeeded, failed = self._children(node, kind, around, later)
@@ -89,20 +99,22 @@ class _Order:
                 succeeded, failed = failed, succeeded
             elif kind not in _STRAIGHT:
                 succeeded = failed = succeeded | failed
-            onward |= succeeded
             ended |= failed
-            added |= succeeded - self._known
-            self._known |= succeeded
+            if succeeded:
+                onward |= succeeded
+                added |= succeeded - self._known
+                self._known |= succeeded
         self._known -= added
         return _Written(ended, onward) if kind == "fallback" else _Written(onward, ended)
 
-    def _own(self, node: TreeNode) -> set[str]:
-        return {write.name for write in self._checker.writes_of(node)}
+    def _own(self, node: TreeNode) -> frozenset[str]:
+        writes = self._checker.writes_of(node)
+        return frozenset(write.name for write in writes) if writes else _NOTHING
 
-    def _below(self, node: TreeNode) -> set[str]:
-        return {name for inner in node.walk() for name in self._own(inner)}
+    def _below(self, node: TreeNode) -> frozenset[str]:
+        return frozenset(name for inner in node.walk() for name in self._own(inner))
 
-    def _reads(self, node: TreeNode, own: set[str], around: frozenset[str]) -> None:
+    def _reads(self, node: TreeNode, own: frozenset[str], around: frozenset[str]) -> None:
         checker = self._checker
         for read in checker.reads.get(id(node), ()):
             if not self._may_be_written(read.name, own, around):
@@ -115,7 +127,7 @@ class _Order:
                 text = f"nothing has written ${read.name} when {node.alias!r} reads it here"
                 self._report(read.name, span_of(node.key), text)
 
-    def _may_be_written(self, name: str, own: set[str], around: frozenset[str]) -> bool:
+    def _may_be_written(self, name: str, own: frozenset[str], around: frozenset[str]) -> bool:
         doubts = self._doubts
         if name in self._known or name not in self._checker.variables:
             return True

@@ -301,8 +301,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _move("root: {move: Go}\n"),
         ),
         "BT302": Page(
-            "When this is reached, no path through the tree has written the variable. What an action "
-            "saves is there when it has succeeded: not for the next child of a 'fallback' around it.",
+            "When this is reached, no path through the tree has written the variable. What an "
+            "action saves is there when it has succeeded: not for the next child of a 'fallback'.",
             _move("root:\n  sequence: Work\n  children:\n    - check: $at > 1.0\n"
                   "    - move: Go\n      save: {at: result.final_pose}\n"),
             _move("root:\n  sequence: Work\n  children:\n    - move: Go\n"
