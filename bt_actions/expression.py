@@ -34,6 +34,7 @@ __all__ = ["MAX_LENGTH", "Expression", "ExpressionError"]
 MAX_LENGTH = 2000
 """Characters in one expression."""
 _MAX_DEPTH = 60
+_INFINITE = float("inf")
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
 _ANSWERS = frozenset({"result", "feedback", "message"})
 _FOREIGN = {
@@ -179,7 +180,8 @@ class Expression:
 
         match node:
             case ast.Constant(value=bool() | int() | float() | str() as value):
-                if isinstance(value, int) and value.bit_length() > MAX_BITS:
+                large = isinstance(value, int) and value.bit_length() > MAX_BITS
+                if large or value == _INFINITE:
                     raise ExpressionError("this number is too large", *self.span(node))
                 return lambda _roots, _variable: value
             case ast.Name():

@@ -113,6 +113,7 @@ def test_an_expression_has_the_value_python_gives_it(text: str, expected: object
         ("(1", "'(' was never closed", 0),
         ("1 +", "this is not an expression", 3),
         ("9" * 100, "this number is too large", 0),
+        ("1 < 1e400", "this number is too large", 4),
         ("(" * 300 + "1" + ")" * 300, "this is not an expression", None),
         ("+" * 1000 + "1", "nested too deep", None),
         ("1" * (MAX_LENGTH + 1), f"longer than {MAX_LENGTH} characters", 0),

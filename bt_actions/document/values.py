@@ -6,6 +6,7 @@ A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` sta
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from collections.abc import Mapping as MappingType
@@ -108,7 +109,11 @@ def read_value(node: Node, source: Source) -> object:
 def _read_scalar(node: Scalar, source: Source) -> object:
     text = node.text
     if "$" not in text and not text.startswith(("=", "@")):
-        return node.value
+        value = node.value
+        if isinstance(value, float) and math.isinf(value) and "inf" not in text.lower():
+            source.report("BT204", span_of(node), f"{text} does not fit a float64")
+            return BAD
+        return value
     if names_file(text):
         return _read_file(node, source)
     if text.startswith("= "):
