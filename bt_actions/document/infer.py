@@ -9,6 +9,7 @@ import ast
 from collections.abc import Callable, Mapping
 
 from bt_actions.expression import Expression
+from bt_actions.expression_values import BINARY, bounded, number, reason
 from bt_actions.ros.fields import (
     FLOATS,
     INTEGERS,
@@ -102,6 +103,7 @@ class _Inference:
             case ast.UnaryOp(operand=inner):
                 return self._number(inner)
             case ast.BinOp(left=left, op=op, right=right):
+                self._computable(node)
                 return self._arithmetic(left, op, right)
             case ast.BoolOp(values=values):
                 for part in values:
@@ -209,6 +211,18 @@ class _Inference:
         both = {kind.name for kind in (first, second) if isinstance(kind, Scalar)}
         return FLOAT if both & set(FLOATS) else INTEGER
 
+    def _computable(self, node: ast.BinOp) -> None:
+        """Say what goes wrong whatever the variables are: `1 / 0 > $n`, `$n % 0`."""
+        left, right = _number_of(node.left), _number_of(node.right)
+        if left is None and isinstance(node.op, (ast.Div, ast.FloorDiv, ast.Mod)):
+            left = 1  # any number will do
+        if left is None or right is None:
+            return
+        try:
+            bounded(BINARY[type(node.op)](left, right))
+        except (ValueError, ArithmeticError) as error:
+            self._wrong(node, reason(error))
+
     def _compare(self, operands: list[ast.expr], ops: list[ast.cmpop]) -> None:
         kinds = [self.type_of(operand) for operand in operands]
         for at, op in enumerate(ops):
@@ -249,6 +263,24 @@ class _Inference:
             floats = any(isinstance(kind, Scalar) and kind.name in FLOATS for kind in kinds)
             return FLOAT if floats else INTEGER
         return kinds[0] if all(kind == kinds[0] for kind in kinds) else None
+
+
+def _number_of(node: ast.expr) -> int | float | None:
+    """The number that a part of an expression gives, where it reads nothing."""
+    try:
+        match node:
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                return value
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                positive = _number_of(inner)
+                return None if positive is None else -positive
+            case ast.BinOp(left=first, op=op, right=second):
+                left, right = _number_of(first), _number_of(second)
+                if left is not None and right is not None:
+                    return number(bounded(BINARY[type(op)](left, right)))
+    except (ValueError, ArithmeticError):
+        pass  # told of that part itself
+    return None
 
 
 def _comparable(first: FieldType, second: FieldType) -> bool:
