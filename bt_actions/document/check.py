@@ -363,6 +363,10 @@ class Checker:
         if self.document.node.get("root") is None or self.doubts.declares(name):
             return  # a library's words are read with the names of whoever imports it
         span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
+        if name in computed.expression.roots:
+            bare = f"write '{name}' without a dollar sign"
+            self.source.report("BT202", span, f"there is no variable ${name}", hint=bare)
+            return
         maybe = self.doubts.declared
         meant = closest(name, self.variables) or closest(name, maybe)
         near = f"; did you mean '${meant}'?" if meant else ""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 
 from bt_actions.expression import Expression
 from bt_actions.expression_values import BINARY, bounded, number, reason
+from bt_actions.ros.conveniences import UnknownClass
 from bt_actions.ros.fields import (
     FLOATS,
     INTEGERS,
@@ -134,14 +135,16 @@ class _Inference:
             return BOOL
         return self._roots.get(name)
 
-    def _constant(self, node: ast.expr, name: str) -> FieldType | None:
+    def _constant(self, node: ast.Attribute, name: str) -> FieldType | None:
         if not self._types:
             return None
         try:
             return type_of_literal(self._expression.constant(name))
+        except UnknownClass as error:
+            self._report("BT203", str(error), *self._expression.span(node.value))
         except ValueError as error:
             self._wrong(node, str(error), "BT203")
-            return None
+        return None
 
     def _field(self, node: ast.expr, owner: FieldType | None, name: str) -> FieldType | None:
         if owner is None:

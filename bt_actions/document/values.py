@@ -131,10 +131,13 @@ def _read_scalar(node: Scalar, source: Source) -> object:
 
 def _lacks_space(text: str) -> bool:
     """Whether a text is an expression but for the space behind its '='."""
-    if not text.startswith("="):
-        return False
+    return text.startswith("=") and _computes(text[1:])
+
+
+def _computes(text: str) -> bool:
+    """Whether a text is an expression."""
     try:
-        _expression(text[1:], frozenset())
+        _expression(text, frozenset())
     except ExpressionError:
         return False
     return True
@@ -199,6 +202,8 @@ def _interpolated(node: Scalar, source: Source) -> object:
             hint = "write $(name) inside a text, and $$ for a dollar sign"
             if _lacks_space(text):
                 hint = f"write '= {text[1:]}' with a space to compute it"
+            elif _computes(text):
+                hint = f"write '= {text}' to compute it, and $(name) inside a text"
             source.report("BT115", span, "this dollar sign refers to nothing", hint=hint)
             return BAD
         written = "$" + match[1].strip()
