@@ -155,10 +155,10 @@ class _Hazards:
 
     def _short(self, node: TreeNode) -> None:
         after = node.values.get("after")
-        if not isinstance(after, float) or not node.children:
+        if not isinstance(after, float) or not node.children or self._doubts.below(node):
             return
         needed = budget(node.children[0], self._document)
-        if after < needed and not self._doubts.below(node):
+        if after < needed:
             self._report(
                 "BT307", span_of(node.written["after"]),
                 f"{after:g} s are less than the {needed:g} s that what it holds may take",
