@@ -54,6 +54,10 @@ def type_of_literal(value: object) -> FieldType | None:
         return INTEGER
     if isinstance(value, float):
         return FLOAT
+    if isinstance(value, list):
+        kinds = {type_of_literal(item) for item in value}
+        same = kinds.pop() if len(kinds) == 1 else None
+        return None if same is None else Listing(same, size=len(value))
     return TEXT if isinstance(value, str) else None
 
 
