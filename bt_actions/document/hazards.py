@@ -5,12 +5,13 @@ Looks at one checked document (and at what it includes, where a hazard spans bot
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from bt_actions.document.build_names import resources_below, settings_of
 from bt_actions.document.check import Checker
 from bt_actions.document.findings import Related, Span
-from bt_actions.document.nodes import Mapping, span_of
+from bt_actions.document.nodes import Mapping as YamlMapping
+from bt_actions.document.nodes import span_of
 from bt_actions.document.order import find_early_reads
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
@@ -51,9 +52,10 @@ class _Hazards:
         self._source.report(code, span, message, **more)  # type: ignore[arg-type]
 
     def _walk(self, root: TreeNode, *, bounded: bool) -> None:
-        stack = [(root, bounded)]
+        loops: dict[str, TreeNode] = {}
+        stack = [(root, bounded, loops)]
         while stack:
-            node, inside = stack.pop()
+            node, inside, around = stack.pop()
             kind = node.kind.name if node.kind is not None else ""
             if node.alias is not None:
                 self._used.add(node.alias)
@@ -71,7 +73,10 @@ class _Hazards:
             elif kind == "timeout":
                 self._short(node)
                 inside = True
-            stack.extend((child, inside) for child in reversed(node.children))
+            elif kind == "for_each":
+                self._taken(node, around)
+                around = around | {write.name: node for write in self._checker.writes_of(node)}
+            stack.extend((child, inside, around) for child in reversed(node.children))
 
     # BT304
 
@@ -165,6 +170,21 @@ class _Hazards:
                 hint="the deadlines and retries inside would never be reached",
             )  # fmt: skip
 
+    # BT312
+
+    def _taken(self, node: TreeNode, around: Mapping[str, TreeNode]) -> None:
+        document = self._document
+        given: dict[str, TreeNode | Declared] = {**document.inputs, **document.topics, **around}
+        for write in self._checker.writes_of(node):
+            other = given.get(write.name)
+            if other is not None:
+                self._report(
+                    "BT312", span_of(write.written),
+                    f"${write.name} already stands for something else here",
+                    related=Related(other.place, "for this"),
+                    hint="as: another name",
+                )  # fmt: skip
+
     # BT308 to BT311
 
     def _unused(self) -> None:
@@ -210,7 +230,7 @@ class _Hazards:
 def _key_of(written: object, node: TreeNode, name: str) -> object:
     for table in ("save", "set"):
         mapping = node.written.get(table)
-        if isinstance(mapping, Mapping):
+        if isinstance(mapping, YamlMapping):
             for key, value in mapping.pairs:
                 if key.text == name and value is written:
                     return key

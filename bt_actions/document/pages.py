@@ -360,6 +360,14 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("outputs: {count: int32}\n" + _SUCCESS),
             _tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
         ),
+        "BT312": Page(
+            "A 'for_each' gives its item, or its index, the name of an input, of a topic, or of "
+            "the item of a loop around it: who reads it afterwards may read the wrong one.",
+            _tree("inputs: {limit: float64}\nroot:\n  for_each: Limit\n  in: [1.0, 2.0]\n"
+                  "  as: limit\n  child: {check: $limit > 0.0}\n"),
+            _tree("inputs: {limit: float64}\nroot:\n  for_each: Item\n  in: [1.0, 2.0]\n"
+                  "  as: value\n  child: {check: $limit > $value}\n"),
+        ),
     }
 )  # fmt: skip
 """The page of each rule by its code."""
