@@ -34,8 +34,11 @@ __all__ = ["MAX_LENGTH", "Expression", "ExpressionError"]
 MAX_LENGTH = 2000
 """Characters in one expression."""
 _MAX_DEPTH = 60
+_INFINITE = float("inf")
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
 _ANSWERS = frozenset({"result", "feedback", "message"})
+_SAVE = "save what it holds, and read that as $name"
+_EXAMPLE = "MoveRobot.Result.STATUS_FAULT"
 _FOREIGN = {
     "null": "there is no 'null' here",
     "TRUE": "write 'true'",
@@ -179,7 +182,8 @@ class Expression:
 
         match node:
             case ast.Constant(value=bool() | int() | float() | str() as value):
-                if isinstance(value, int) and value.bit_length() > MAX_BITS:
+                large = isinstance(value, int) and value.bit_length() > MAX_BITS
+                if large or value == _INFINITE:
                     raise ExpressionError("this number is too large", *self.span(node))
                 return lambda _roots, _variable: value
             case ast.Name():
@@ -307,6 +311,8 @@ def _root(name: str, start: int, end: int) -> _Closure:
 
 
 def _syntax(text: str, column: int, error: SyntaxError) -> str:
+    if text.lstrip().startswith("= "):
+        return "an expression stands here without '=' before it"
     for at in (column, column - 1):
         around = text[max(at - 1, 0) : at + 2]
         if text[at : at + 1] == "=" and "==" not in around and around[0] not in "<>!":
@@ -320,13 +326,15 @@ def _syntax(text: str, column: int, error: SyntaxError) -> str:
 
 
 def _unknown_name(name: str, roots: Iterable[str]) -> str:
-    known = ", ".join(sorted(roots))
+    known = sorted(roots)
     if name in _FOREIGN:
         return _FOREIGN[name]
     if name in _ANSWERS:
-        instead = f"{known} can be used" if known else "save what it holds, and read that as $name"
+        instead = f"{', '.join(known)} can be used" if known else _SAVE
         return f"there is no {name} here: {instead}"
-    given = f"; {known} can be used bare" if known else ""
+    given = "".join(f", a field {root}.{name}" for root in known)
+    if name.isupper():
+        given = f", and a constant with its type, such as {_EXAMPLE}"
     return f"unknown name {name!r}: a variable is written ${name}{given}"
 
 

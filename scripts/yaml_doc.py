@@ -72,7 +72,8 @@ value yet makes a goal INVALID_GOAL and a check FAILURE, and says so.
 
 Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, `int8` to `int64`,
 `uint8` to `uint64`, any `package/msg/Name`, and lists of them: `float64[]`, `float64[3]`,
-`float64[<=3]`. A whole number is a fine float; a fraction is no whole number.
+`float64[<=3]`. A whole number is a fine float; a fraction is no whole number. Goals and messages
+may hold `.inf` and `.nan`; inputs are finite.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
 `abs`, `min` and `max`, `true` and `false`, and constants (`MoveRobot.Result.STATUS_FAULT`). In

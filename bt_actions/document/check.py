@@ -6,6 +6,7 @@ imported, and what would need it is taken for granted.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Mapping as MappingType
 from typing import NamedTuple
 
@@ -28,7 +29,7 @@ from bt_actions.document.values import (
     locate,
     names_file,
 )
-from bt_actions.document.writes import Write, infer_variables, writes_of
+from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
 from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import FieldType, Message
 from bt_actions.suggest import closest, listing
@@ -65,6 +66,7 @@ class Checker:
         """What each node reads, by the node's id; an alias's own reads under the alias's."""
         self._reader: object = document
         self._writes: dict[int, tuple[Write, ...]] = {}
+        self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
 
     def check(self) -> None:
@@ -165,12 +167,20 @@ class Checker:
         """The variables that a node writes."""
         return self._writes.get(id(node), ())
 
+    def types_at(self, reader: object) -> Callable[[str], FieldType | None]:
+        """Gives the type of a variable as a node reads it."""
+        items = self._items.get(id(reader))
+        if items is None:
+            return self.variables.get
+        return lambda name: items[name].type_in(self) if name in items else self.variables.get(name)
+
     def _collect(self) -> None:
         """The variables that nodes write, with their types as far as they are known."""
         for node in self.document.nodes():
             writes = tuple(writes_of(node, self.document))
             if writes:
                 self._writes[id(node)] = writes
+        self._items = items_inside(self._writes.values(), self.declared_at)
         written = (write for writes in self._writes.values() for write in writes)
         infer_variables(written, self)
 
@@ -346,12 +356,17 @@ class Checker:
                 return None
         if not self.types and not roots and not expression.names:
             return None
-        return infer(expression, roots, self.variables.get, report, types=self.types)
+        variable = self.types_at(self._reader)
+        return infer(expression, roots, variable, report, types=self.types)
 
     def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
         if self.document.node.get("root") is None or self.doubts.declares(name):
             return  # a library's words are read with the names of whoever imports it
         span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
+        if name in computed.expression.roots:
+            bare = f"write '{name}' without a dollar sign"
+            self.source.report("BT202", span, f"there is no variable ${name}", hint=bare)
+            return
         maybe = self.doubts.declared
         meant = closest(name, self.variables) or closest(name, maybe)
         near = f"; did you mean '${meant}'?" if meant else ""

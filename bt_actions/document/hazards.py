@@ -5,21 +5,20 @@ Looks at one checked document (and at what it includes, where a hazard spans bot
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 
 from bt_actions.document.build_names import resources_below, settings_of
 from bt_actions.document.check import Checker
 from bt_actions.document.findings import Related, Span
-from bt_actions.document.inner import inner_span
-from bt_actions.document.nodes import Mapping, span_of
+from bt_actions.document.nodes import Mapping as YamlMapping
+from bt_actions.document.nodes import span_of
+from bt_actions.document.order import find_early_reads
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
 from bt_actions.document.verdicts import Verdicts, budget
 
 __all__ = ["find_hazards"]
 
-_LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
 _BUSY = frozenset(
     {"action", "service", "wait", "wait_until", "wait_for_message", "running", "python"}
 )
@@ -46,16 +45,17 @@ class _Hazards:
     def look(self, root: TreeNode) -> None:
         self._walk(root, bounded=False)
         self._result_timeouts()
-        self._order(root)
+        find_early_reads(self._checker, self._doubts, root)
         self._unused()
 
     def _report(self, code: str, span: Span, message: str, **more: object) -> None:
         self._source.report(code, span, message, **more)  # type: ignore[arg-type]
 
     def _walk(self, root: TreeNode, *, bounded: bool) -> None:
-        stack = [(root, bounded)]
+        loops: dict[str, TreeNode] = {}
+        stack = [(root, bounded, loops)]
         while stack:
-            node, inside = stack.pop()
+            node, inside, around = stack.pop()
             kind = node.kind.name if node.kind is not None else ""
             if node.alias is not None:
                 self._used.add(node.alias)
@@ -73,7 +73,10 @@ class _Hazards:
             elif kind == "timeout":
                 self._short(node)
                 inside = True
-            stack.extend((child, inside) for child in reversed(node.children))
+            elif kind == "for_each":
+                self._taken(node, around)
+                around = around | {write.name: node for write in self._checker.writes_of(node)}
+            stack.extend((child, inside, around) for child in reversed(node.children))
 
     # BT304
 
@@ -157,63 +160,30 @@ class _Hazards:
 
     def _short(self, node: TreeNode) -> None:
         after = node.values.get("after")
-        if not isinstance(after, float) or not node.children:
+        if not isinstance(after, float) or not node.children or self._doubts.below(node):
             return
         needed = budget(node.children[0], self._document)
-        if after < needed and not self._doubts.below(node):
+        if after < needed:
             self._report(
                 "BT307", span_of(node.written["after"]),
                 f"{after:g} s are less than the {needed:g} s that what it holds may take",
                 hint="the deadlines and retries inside would never be reached",
             )  # fmt: skip
 
-    # BT302: in the order of ticks
+    # BT312
 
-    def _order(self, root: TreeNode) -> None:
+    def _taken(self, node: TreeNode, around: Mapping[str, TreeNode]) -> None:
         document = self._document
-        seen = {*document.inputs, *document.topics}
-        writers = Counter(write.name for n in root.walk() for write in self._checker.writes_of(n))
-
-        def below(node: TreeNode) -> set[str]:
-            return {write.name for n in node.walk() for write in self._checker.writes_of(n)}
-
-        def visit(node: TreeNode, around: frozenset[str], later: frozenset[str]) -> None:
-            kind = node.kind.name if node.kind is not None else ""
-            own = {write.name for write in self._checker.writes_of(node)}
-            each = kind == "for_each"
-
-            def known(name: str) -> bool:
-                if name in seen or self._doubts.unknown_action or self._doubts.mentions(name):
-                    return True
-                return name in around and (name not in own or writers[name] > 1)
-
-            self._early(node, known)
-            if each:
-                seen.update(own)
-            if kind == "repeat":  # a read in its first round has nothing yet
-                later |= below(node)
-            elif kind in _LOOPS or node.values.get("memory") is False:
-                around |= below(node)
-            if kind not in ("repeat", "sequence"):  # who may go on after a read that failed
-                around |= later
-            for child in node.children:
-                visit(child, around, later)
-            seen.update(own)
-
-        visit(root, frozenset(), frozenset())
-
-    def _early(self, node: TreeNode, known: Callable[[str], bool]) -> None:
-        checker = self._checker
-        for read in checker.reads.get(id(node), ()):
-            if read.name in checker.variables and not known(read.name):
-                written, start = read.computed.node, read.computed.start
-                span = inner_span(written, self._source, start + read.start, start + read.end)
-                self._report("BT302", span, f"nothing has written ${read.name} when this is read")
-        declared = self._document.actions.get(node.alias) if node.alias is not None else None
-        for read in checker.reads.get(id(declared), ()) if declared is not None else ():
-            if read.name in checker.variables and not known(read.name):
-                text = f"nothing has written ${read.name} when {node.alias!r} reads it here"
-                self._report("BT302", span_of(node.key), text)
+        given: dict[str, TreeNode | Declared] = {**document.inputs, **document.topics, **around}
+        for write in self._checker.writes_of(node):
+            other = given.get(write.name)
+            if other is not None:
+                self._report(
+                    "BT312", span_of(write.written),
+                    f"${write.name} already stands for something else here",
+                    related=Related(other.place, "for this"),
+                    hint="as: another name",
+                )  # fmt: skip
 
     # BT308 to BT311
 
@@ -260,7 +230,7 @@ class _Hazards:
 def _key_of(written: object, node: TreeNode, name: str) -> object:
     for table in ("save", "set"):
         mapping = node.written.get(table)
-        if isinstance(mapping, Mapping):
+        if isinstance(mapping, YamlMapping):
             for key, value in mapping.pairs:
                 if key.text == name and value is written:
                     return key

@@ -9,6 +9,8 @@ import ast
 from collections.abc import Callable, Mapping
 
 from bt_actions.expression import Expression
+from bt_actions.expression_values import BINARY, bounded, number, reason
+from bt_actions.ros.conveniences import UnknownClass
 from bt_actions.ros.fields import (
     FLOATS,
     INTEGERS,
@@ -52,6 +54,10 @@ def type_of_literal(value: object) -> FieldType | None:
         return INTEGER
     if isinstance(value, float):
         return FLOAT
+    if isinstance(value, list):
+        kinds = {type_of_literal(item) for item in value}
+        same = kinds.pop() if len(kinds) == 1 else None
+        return None if same is None else Listing(same, size=len(value))
     return TEXT if isinstance(value, str) else None
 
 
@@ -102,6 +108,7 @@ class _Inference:
             case ast.UnaryOp(operand=inner):
                 return self._number(inner)
             case ast.BinOp(left=left, op=op, right=right):
+                self._computable(node)
                 return self._arithmetic(left, op, right)
             case ast.BoolOp(values=values):
                 for part in values:
@@ -132,14 +139,16 @@ class _Inference:
             return BOOL
         return self._roots.get(name)
 
-    def _constant(self, node: ast.expr, name: str) -> FieldType | None:
+    def _constant(self, node: ast.Attribute, name: str) -> FieldType | None:
         if not self._types:
             return None
         try:
             return type_of_literal(self._expression.constant(name))
+        except UnknownClass as error:
+            self._report("BT203", str(error), *self._expression.span(node.value))
         except ValueError as error:
             self._wrong(node, str(error), "BT203")
-            return None
+        return None
 
     def _field(self, node: ast.expr, owner: FieldType | None, name: str) -> FieldType | None:
         if owner is None:
@@ -209,6 +218,18 @@ class _Inference:
         both = {kind.name for kind in (first, second) if isinstance(kind, Scalar)}
         return FLOAT if both & set(FLOATS) else INTEGER
 
+    def _computable(self, node: ast.BinOp) -> None:
+        """Say what goes wrong whatever the variables are: `1 / 0 > $n`, `$n % 0`."""
+        left, right = _number_of(node.left), _number_of(node.right)
+        if left is None and isinstance(node.op, (ast.Div, ast.FloorDiv, ast.Mod)):
+            left = 1  # any number will do
+        if left is None or right is None:
+            return
+        try:
+            bounded(BINARY[type(node.op)](left, right))
+        except (ValueError, ArithmeticError) as error:
+            self._wrong(node, reason(error))
+
     def _compare(self, operands: list[ast.expr], ops: list[ast.cmpop]) -> None:
         kinds = [self.type_of(operand) for operand in operands]
         for at, op in enumerate(ops):
@@ -249,6 +270,24 @@ class _Inference:
             floats = any(isinstance(kind, Scalar) and kind.name in FLOATS for kind in kinds)
             return FLOAT if floats else INTEGER
         return kinds[0] if all(kind == kinds[0] for kind in kinds) else None
+
+
+def _number_of(node: ast.expr) -> int | float | None:
+    """The number that a part of an expression gives, where it reads nothing."""
+    try:
+        match node:
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                return value
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                positive = _number_of(inner)
+                return None if positive is None else -positive
+            case ast.BinOp(left=first, op=op, right=second):
+                left, right = _number_of(first), _number_of(second)
+                if left is not None and right is not None:
+                    return number(bounded(BINARY[type(op)](left, right)))
+    except (ValueError, ArithmeticError):
+        pass  # told of that part itself
+    return None
 
 
 def _comparable(first: FieldType, second: FieldType) -> bool:

@@ -302,7 +302,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _move("root: {move: Go}\n"),
         ),
         "BT302": Page(
-            "When this is reached, no path through the tree has written the variable.",
+            "When this is reached, no path through the tree has written the variable. What an "
+            "action saves is there when it has succeeded: not for the next child of a 'fallback'.",
             _move("root:\n  sequence: Work\n  children:\n    - check: $at > 1.0\n"
                   "    - move: Go\n      save: {at: result.final_pose}\n"),
             _move("root:\n  sequence: Work\n  children:\n    - move: Go\n"
@@ -359,6 +360,14 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             "The tree promises an output that none of its nodes writes.",
             _tree("outputs: {count: int32}\n" + _SUCCESS),
             _tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
+        ),
+        "BT312": Page(
+            "A 'for_each' gives its item, or its index, the name of an input, of a topic, or of "
+            "the item of a loop around it: who reads it afterwards may read the wrong one.",
+            _tree("inputs: {limit: float64}\nroot:\n  for_each: Limit\n  in: [1.0, 2.0]\n"
+                  "  as: limit\n  child: {check: $limit > 0.0}\n"),
+            _tree("inputs: {limit: float64}\nroot:\n  for_each: Item\n  in: [1.0, 2.0]\n"
+                  "  as: value\n  child: {check: $limit > $value}\n"),
         ),
     }
 )  # fmt: skip

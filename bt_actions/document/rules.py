@@ -80,6 +80,7 @@ RULES = MappingProxyType(
             _warning("BT309", "an action or a topic that nothing uses"),
             _warning("BT310", "a variable that nothing reads"),
             _warning("BT311", "an output that nothing writes"),
+            _warning("BT312", "a loop's item under a name that is taken"),
         )
     }
 )

@@ -161,6 +161,5 @@ def _collect(nodes: list[Node], words: _Words) -> None:
         elif isinstance(node, Scalar):
             found = _WORD.findall(node.text)
             words.mentioned.update(found)
-            words.declared.add(node.text)
             if _NAME.fullmatch(node.text):
-                words.declared.update(found)
+                words.declared.update((node.text, *found))

@@ -6,6 +6,7 @@ A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` sta
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from collections.abc import Mapping as MappingType
@@ -108,7 +109,11 @@ def read_value(node: Node, source: Source) -> object:
 def _read_scalar(node: Scalar, source: Source) -> object:
     text = node.text
     if "$" not in text and not text.startswith(("=", "@")):
-        return node.value
+        value = node.value
+        if isinstance(value, float) and math.isinf(value) and "inf" not in text.lower():
+            source.report("BT204", span_of(node), f"{text} does not fit a float64")
+            return BAD
+        return value
     if names_file(text):
         return _read_file(node, source)
     if text.startswith("= "):
@@ -126,10 +131,13 @@ def _read_scalar(node: Scalar, source: Source) -> object:
 
 def _lacks_space(text: str) -> bool:
     """Whether a text is an expression but for the space behind its '='."""
-    if not text.startswith("="):
-        return False
+    return text.startswith("=") and _computes(text[1:])
+
+
+def _computes(text: str) -> bool:
+    """Whether a text is an expression."""
     try:
-        _expression(text[1:], frozenset())
+        _expression(text, frozenset())
     except ExpressionError:
         return False
     return True
@@ -194,6 +202,8 @@ def _interpolated(node: Scalar, source: Source) -> object:
             hint = "write $(name) inside a text, and $$ for a dollar sign"
             if _lacks_space(text):
                 hint = f"write '= {text[1:]}' with a space to compute it"
+            elif _computes(text):
+                hint = f"write '= {text}' to compute it, and $(name) inside a text"
             source.report("BT115", span, "this dollar sign refers to nothing", hint=hint)
             return BAD
         written = "$" + match[1].strip()

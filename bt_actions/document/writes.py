@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from bt_actions.ros.fields import FieldType, Listing, Message, Scalar
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker
 
-__all__ = ["Write", "infer_variables", "writes_of"]
+__all__ = ["Write", "infer_variables", "items_inside", "writes_of"]
 
 _ROUNDS = 8
 """How far a type is followed from variable to variable, before none is taken for known."""
@@ -43,7 +43,7 @@ class Write:
         if not isinstance(self.value, Computed):
             return type_of_literal(self.value)
         roots = {} if self.root is None else {self.root: _root_type(self.node, self.root, checker)}
-        return infer(self.value.expression, roots, checker.variables.get, lambda *_: None,
+        return infer(self.value.expression, roots, checker.types_at(self.node), lambda *_: None,
                      types=checker.types)  # fmt: skip
 
     def _item_type(self, checker: Checker) -> FieldType | None:
@@ -53,7 +53,7 @@ class Write:
             return kinds.pop() if len(kinds) == 1 else None
         if not isinstance(self.value, Computed):
             return None
-        kind = infer(self.value.expression, {}, checker.variables.get, lambda *_: None,
+        kind = infer(self.value.expression, {}, checker.types_at(self.node), lambda *_: None,
                      types=checker.types)  # fmt: skip
         return kind.item if isinstance(kind, Listing) else None
 
@@ -102,6 +102,31 @@ def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
         index = values.get("index")
         if isinstance(index, str):
             yield Write(index, node, node.written["index"], 0)
+
+
+def items_inside(
+    written: Iterable[tuple[Write, ...]], declared: Container[str]
+) -> dict[int, dict[str, Write]]:
+    """What gives the nodes inside of loops their items, by the node's id.
+
+    Only where several loops use one name, and nothing else writes it: inside of each it has the
+    type of that loop's items.
+    """
+    writers: dict[str, list[Write]] = {}
+    for writes in written:
+        for write in writes:
+            writers.setdefault(write.name, []).append(write)
+    inside: dict[int, dict[str, Write]] = {}
+    for name, loops in writers.items():
+        if len(loops) < 2 or name in declared or any(one.root != "item of" for one in loops):
+            continue
+        heads = {id(loop.node) for loop in loops}
+        for loop in loops:
+            body = [node for child in loop.node.children for node in child.walk()]
+            if heads.isdisjoint(id(node) for node in body):
+                for node in body:
+                    inside.setdefault(id(node), {})[name] = loop
+    return inside
 
 
 def infer_variables(written: Iterable[Write], checker: Checker) -> None:

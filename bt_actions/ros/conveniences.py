@@ -17,7 +17,7 @@ from bt_actions.ros.interfaces import Kind, UnknownInterface, installed, interfa
 from bt_actions.suggest import did_you_mean
 from bt_actions.units import parse_angle, parse_duration
 
-__all__ = ["ANGLES", "constant", "duration_of", "quaternion_of", "time_of"]
+__all__ = ["ANGLES", "UnknownClass", "constant", "duration_of", "quaternion_of", "time_of"]
 
 _BILLION = 1_000_000_000
 _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
@@ -25,6 +25,10 @@ _PARTS = ("Goal", "Result", "Feedback", "Request", "Response")
 _KINDS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
                            "Request": "srv", "Response": "srv"}  # fmt: skip
 ANGLES = ("roll", "pitch", "yaw")
+
+
+class UnknownClass(ValueError):
+    """What stands before a constant's name is no message class."""
 
 
 def time_of(value: object, now: Callable[[], int]) -> object:
@@ -104,12 +108,18 @@ def _class(path: str, owner: type | None) -> type:
         found = _interface(f"{name}/{kind or 'msg'}/{names[0]}")
     elif owner is not None:
         found = _beside(names[0], owner)
+    kind = _KINDS.get(names[-1], "msg" if len(names) == 1 else "action")
     if found is None and not package:
-        found = _anywhere(names[0], _KINDS.get(names[-1], "msg"))
+        found = _anywhere(names[0], kind)
+    near = ""
+    if found is None:
+        near = did_you_mean(names[0], {full.rpartition("/")[2] for full in installed(kind)})
     for name in names[1:]:
+        if isinstance(found, type) and not (name in _PARTS and hasattr(found, name)):
+            near = did_you_mean(name, [part for part in _PARTS if hasattr(found, part)])
         found = getattr(found, name, None) if name in _PARTS else None
     if not isinstance(found, type):
-        raise ValueError(f"no message class {path!r} is known here")
+        raise UnknownClass(f"no message class {path!r} is known here{near}")
     return found
 
 

@@ -215,7 +215,7 @@ def test_set_writes_all_or_none(load: Load) -> None:
     status, outputs, root = run(load, "set: {n: 1, log: = $log + 'x'}")
     assert (status, outputs) == (Status.FAILURE, {})
     assert root.feedback_message == "$log has no value"
-    node = "{sequence: S, children: [{set: {x: [1]}}, {set: {n: 1, log: $x}}]}"
+    node = "{sequence: S, children: [{set: {x: [1, a]}}, {set: {n: 1, log: $x}}]}"
     status, outputs, root = run(load, node)
     assert (status, outputs) == (Status.FAILURE, {})
     assert root.children[1].feedback_message == "log: a text is needed, not a list"
