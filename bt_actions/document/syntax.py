@@ -117,7 +117,9 @@ def _cut_text(problem: str, text: str, span: Span) -> _Said | None:
         quoted = "put it in quotes"
         hint = f"write {named[1]}.{named[2]}, or {quoted}" if named is not None else quoted
         message = f"'[' ends a text inside {{ }} and [ ], so {match[0]!r} is cut"
-        return _Said(span, message, hint, "BT118")
+        bracket = start + match.start(2) + 1
+        place = Span(span.line, bracket, span.line, bracket + 1)
+        return _Said(place, message, hint, "BT118")
     return None
 
 
