@@ -32,6 +32,11 @@ class Write:
     value: object
     root: str | None = None
 
+    @property
+    def depends(self) -> bool:
+        """Does the type of what is written depend on those of variables?"""
+        return isinstance(self.value, Computed) and bool(self.value.expression.names)
+
     def type_in(self, checker: Checker) -> FieldType | None:
         """The type of what is written, without reporting anything."""
         if self.node.kind is not None and self.node.kind.name == "subtree":
@@ -151,16 +156,17 @@ def infer_variables(written: Iterable[Write], checker: Checker) -> None:
                 kinds = {write.type_in(checker) for write in writes} - {None}
                 checker.variables[name] = kinds.pop() if len(kinds) == 1 else None
                 changed |= checker.variables[name] is not None
+    open_still = {n: w for n, w in writers.items() if len(w) > 1 or w[0].depends}
     for _ in range(_ROUNDS):
         changed = False
-        for name, writes in writers.items():
+        for name, writes in open_still.items():
             known = checker.variables[name]
             if known is not None and any(write.type_in(checker) != known for write in writes):
                 checker.variables[name] = None
                 changed = True
         if not changed:
             return
-    for name in writers:
+    for name in open_still:
         checker.variables[name] = None
 
 
