@@ -104,10 +104,7 @@ class Soak:
         return random.uniform(-1.0, 1.0)
 
     def close(self) -> None:
-        """Measure for the last time, when whoever still looks for a lost server has ended."""
-        for thread in threading.enumerate():
-            if thread.name == "bt_actions-lookout":
-                thread.join(60.0)
+        """Measure for the last time."""
         self.measured.append((self._visits, held()))
         self._said.close()
 

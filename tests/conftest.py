@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 DOMAINS = range(70, 90)
 OUR_OWN = ("bt_actions-alarm", "bt_actions-log", "bt_actions-lookout")
-"""Threads that outlive what they were started for, and end by themselves."""
+"""Threads that outlive what they were started for, and end by themselves or with the process."""
 _names = itertools.count(1)
 
 

@@ -43,8 +43,11 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
     return blind
 
 
-def lookouts() -> list[threading.Thread]:
-    return [thread for thread in threading.enumerate() if thread.name == "bt_actions-lookout"]
+def nobody_looks() -> bool:
+    """Nobody has anything to look for, and no participant is being closed."""
+    threads = [each for each in threading.enumerate() if each.name == "bt_actions-lookout"]
+    known = lookout._lookouts.values()
+    return len(threads) <= len(known) and not any(each._missing for each in known)
 
 
 def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
@@ -63,7 +66,8 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
         assert (second.outcome, first.end) == (Outcome.SUCCEEDED, End.CANCELED)
     assert journal.ends() == ["canceled", "succeeded"]
     assert journal.max_live == 1
-    until(lambda: not lookouts(), what="the participant is taken away with its last line")
+    until(nobody_looks)
+    until(lambda: not lookout._sights, what="the participant is taken away with its last line")
 
 
 def test_a_server_whose_goals_are_all_done_is_found_too(
@@ -77,7 +81,7 @@ def test_a_server_whose_goals_are_all_done_is_found_too(
     with TreeRunner(leaf, node=node) as runner:
         runner.run(30.0)
     assert leaf.outcome is Outcome.SUCCEEDED
-    until(lambda: not lookouts())
+    until(nobody_looks)
 
 
 def test_nobody_looks_where_nothing_was_ever_lost(
@@ -87,7 +91,7 @@ def test_nobody_looks_where_nothing_was_ever_lost(
     leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=1.5))
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
-        assert holds_for(lambda: not lookouts(), 1.0)
+        assert holds_for(nobody_looks, 1.0)
         runner.wait(5.0)
     assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
 
@@ -99,7 +103,8 @@ def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
         raise OSError("no space left")
 
     monkeypatch.setattr(_domain(node), "lost_sight", True)
-    monkeypatch.setattr(lookout, "_lookouts", {})
+    for each in lookout._lookouts.values():
+        monkeypatch.setattr(each, "_told", False)
     monkeypatch.setattr(lookout, "Sight", refused)
     monkeypatch.setattr(lookout, "FIRST_AFTER", 0.01)
     monkeypatch.setattr(lookout, "PAUSE", 0.01)
@@ -107,7 +112,7 @@ def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
     with TreeRunner(leaf, node=node) as runner:
         runner.run(5.0)
     assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
-    until(lambda: not lookouts())
+    until(nobody_looks)
     assert capfd.readouterr().err.count("no second look for lost servers") == 1
 
 
@@ -150,7 +155,7 @@ class TestMoves:
         with lock:  # the thread that closes it has to wait
             sight.left_by(moved)
             sight.users.add(moved)
-        until(lambda: not lookouts())
+        until(nobody_looks)
         assert not sight.closed
         self.goes(name, node)
 
