@@ -2,8 +2,8 @@
 
 The servers run in another process and write a journal; it is compared with what the orchestrator
 said, goal by goal. Memory, threads and open files of the orchestrator are measured after a warm-up
-and at the end; in the warm-up the servers are stopped for longer than their lease, so that what the
-search for a lost server loads once is loaded. Exit code 0 when all of it holds. Takes an hour or
+and at the end; before it, another server is lost on purpose, so that what the search for a lost
+server loads once is loaded. Exit code 0 when all of it holds. Takes an hour or
 two; `--goals` shortens it.
 """
 
@@ -61,9 +61,6 @@ GROWTH = 1.0
 """MB that 10,000 goals may leave behind."""
 WARM = 0.2
 """Share of the goals before memory is first measured."""
-STOPPED = (0.05, 0.1)
-"""After these shares of the goals the servers are stopped, for `STOPPED_FOR` seconds."""
-STOPPED_FOR = 8.0
 SAID = {
     "succeeded": {End.SUCCEEDED},
     "aborted": {End.ABORTED},
@@ -78,9 +75,8 @@ SAID = {
 class Soak:
     """Counts goals, keeps what was said of each in a file, and measures."""
 
-    def __init__(self, goals: int, said: Path, servers: subprocess.Popen[bytes]) -> None:
+    def __init__(self, goals: int, said: Path) -> None:
         self.goals = goals
-        self._servers = servers
         self.outcomes: Counter[str] = Counter()
         self.measured: list[tuple[int, dict[str, float]]] = []
         self._said = said.open("w", encoding="utf-8")
@@ -97,9 +93,6 @@ class Soak:
         if self._visits % step == 0:
             self.measured.append((self._visits, held()))
             print(self._visits, self.measured[-1][1], flush=True)
-        if self._visits in [int(share * self.goals) for share in STOPPED]:
-            self._servers.send_signal(signal.SIGSTOP)
-            threading.Timer(STOPPED_FOR, self._servers.send_signal, [signal.SIGCONT]).start()
         self._visits += 1
         return random.uniform(-1.0, 1.0)
 
@@ -133,6 +126,28 @@ def held() -> dict[str, float]:
     }
 
 
+def lose_a_server() -> None:
+    """Kill a server under a goal, and want it for long enough that it is looked for."""
+    command = [sys.executable, "-m", "bt_actions.cli", "sim", "--namespace", "/lost"]
+    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    leaf = MoveRobot(
+        "lost",
+        9.0,
+        action_name="/lost/move_robot",
+        timeout=Timeouts(server=10.0),
+        retry=Retry(2, outcomes=frozenset({Outcome.SERVER_LOST})),
+        on_feedback=lambda feedback: server.kill(),
+    )
+    try:
+        with TreeRunner(leaf) as runner:
+            runner.run()
+    finally:
+        server.kill()
+        server.wait(20.0)
+    if [each.outcome for each in leaf.history] != [Outcome.SERVER_LOST, Outcome.SERVER_UNAVAILABLE]:
+        raise RuntimeError(f"the server that was to be lost was not: {leaf.history}")
+
+
 def run(goals: int, directory: Path) -> list[str]:
     """Run the goals against servers in another process; return what is wrong."""
     record, said = directory / "journal.jsonl", directory / "said.txt"
@@ -144,7 +159,7 @@ def run(goals: int, directory: Path) -> list[str]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    soak = Soak(goals, said, servers)
+    soak = Soak(goals, said)
     retry = Retry(2, outcomes=frozenset({*Retry().outcomes, *LOST}))
     move = MoveRobot("move", 0.0, timeout=TIMEOUTS, retry=retry, on_feedback=lambda feedback: None)
     grip = Gripper("grip", 0.0, timeout=TIMEOUTS, retry=retry)
@@ -167,7 +182,6 @@ def run(goals: int, directory: Path) -> list[str]:
             wrong += [f"{report} is unaccounted for" for report in runner.unaccounted]
             soak.close()
     finally:
-        servers.send_signal(signal.SIGCONT)
         servers.send_signal(signal.SIGINT)
         servers.wait(20.0)
     print(f"{goals} goals in {time.monotonic() - began:.0f} s")
@@ -225,6 +239,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as scratch:
         directory = given.keep or Path(scratch)
         directory.mkdir(parents=True, exist_ok=True)
+        lose_a_server()
         wrong = run(given.goals, directory)
     for line in wrong[:50]:
         print(f"WRONG: {line}")
