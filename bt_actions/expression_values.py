@@ -98,7 +98,12 @@ def _among(known: Iterable[object]) -> str:
 def item(value: object, index: object) -> object:
     index = plain(index)
     if isinstance(value, Mapping):
-        return field(value, index) if isinstance(index, str) else scalar(value[index])
+        if isinstance(index, str):
+            return field(value, index)
+        try:
+            return scalar(value[index])
+        except (KeyError, TypeError):  # a list is no key
+            raise ValueError(f"no key {show(index)}{_among(value)}") from None
     if isinstance(index, bool) or not isinstance(index, int):
         raise ValueError(f"an index is a whole number, not {show(index)}")
     if not hasattr(value, "__len__") or not hasattr(value, "__getitem__"):

@@ -73,14 +73,16 @@ value yet makes a goal INVALID_GOAL and a check FAILURE, and says so.
 Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, `int8` to `int64`,
 `uint8` to `uint64`, any `package/msg/Name`, and lists of them: `float64[]`, `float64[3]`,
 `float64[<=3]`. A whole number is a fine float; a fraction is no whole number. Goals and messages
-may hold `.inf` and `.nan`; inputs are finite.
+may hold `.inf` and `.nan`; inputs are finite. A mapping that is written out
+(`set: {{stop: {{at: 2.0}}}}`, the items of a `for_each`) has the keys that it was written with
+(`$stop.at`), and may fill a message.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
 `abs`, `min` and `max`, `true` and `false`, and constants (`MoveRobot.Result.STATUS_FAULT`). In
 `expect`, `save` and `when` the bare name
 `result` is the result; in `until` and `save` of `wait_for_message`, `message` is the message.
 
-In the fields of a message:
+In the fields of a message, and in variables that fill them (but for `now` and constants):
 
 | field | may be written |
 |---|---|

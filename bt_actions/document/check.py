@@ -15,10 +15,9 @@ from bt_actions.document.infer import BOOL, TEXT, infer, named
 from bt_actions.document.inner import inner_span
 from bt_actions.document.inputs import refuse_infinite
 from bt_actions.document.nodes import Mapping, Node, Scalar, span_of
-from bt_actions.document.shape import report_braces
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
-from bt_actions.document.types import TypeNameError, fits, interface_of, parse_type
+from bt_actions.document.types import TypeNameError, fits, interface_of, misfits, parse_type
 from bt_actions.document.unread import Doubts
 from bt_actions.document.values import (
     BAD,
@@ -31,7 +30,7 @@ from bt_actions.document.values import (
 )
 from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
 from bt_actions.expression import ExpressionError
-from bt_actions.ros.fields import FieldType, Message
+from bt_actions.ros.fields import FieldType, Message, Record
 from bt_actions.suggest import closest, listing
 
 __all__ = ["Checker", "Read"]
@@ -301,6 +300,9 @@ class Checker:
                 if not fits(given, wanted):
                     text = f"{named(wanted)} is needed, and {said} is {named(given)}"
                     self.source.report("BT204", span_of(item.node), text)
+                elif isinstance(given, Record) and isinstance(wanted, Message):
+                    for text in misfits(given, wanted):
+                        self.source.report("BT204", span_of(item.node), f"{said}.{text}")
                 elif (constant := constant_of(item)) is not None:
                     for problem in examine(wanted, constant):
                         self.source.report("BT204", span_of(item.node), problem.text)
@@ -316,9 +318,6 @@ class Checker:
 
         for problem in examine(kind, value, hole):
             at = locate(node, problem.path, at_key=problem.at_key)
-            if report_braces(at, self.source):
-                self.source.unread.nodes.append(at)
-                continue
             code = "BT203" if problem.at_key else "BT204"
             text = problem.text
             if isinstance(at, Scalar) and names_file(at.text):

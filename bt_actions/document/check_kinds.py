@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -10,10 +10,10 @@ from bt_actions.document.findings import Related
 from bt_actions.document.infer import FLOAT, INTEGER, named
 from bt_actions.document.nodes import Mapping as YamlMapping
 from bt_actions.document.nodes import Node, span_of
-from bt_actions.document.tree import TreeNode
+from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.types import TypeNameError, fits, parse_type
 from bt_actions.document.values import Computed, computed_in, constant_of, locate
-from bt_actions.ros.fields import FieldType, Listing, Message
+from bt_actions.ros.fields import FieldType, Listing, Message, Record
 from bt_actions.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
@@ -26,45 +26,29 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
     included = node.included
     given = node.values.get("with")
     written = node.written.get("with")
-    if isinstance(given, Computed):
+    names: Container[str] | None = None
+    if given is None:
+        names = () if not checker.doubts.own(node) else None
+    elif isinstance(given, Computed):
         kind = checker.expression(given, {})
-        if kind is not None:
+        if kind is not None and not isinstance(kind, Record):
             said = f"a mapping of inputs to values is needed, and this is {named(kind)}"
             checker.source.report("BT204", span_of(given.node), said)
-    if included is None:
-        if isinstance(given, dict) and written is not None:
-            checker.value(None, given, written)
-        return
-    if isinstance(given, dict) and isinstance(written, YamlMapping):
-        doubts = checker.doubts_of(included)
+        elif kind is not None and included is not None:
+            names = dict(kind.items)
+            _computed_inputs(checker, included, given, kind)
+    elif isinstance(given, dict) and included is None and written is not None:
+        checker.value(None, given, written)
+    elif isinstance(given, dict) and included is not None and isinstance(written, YamlMapping):
+        names = given
         for key, inner in written.pairs:
-            declared = included.inputs.get(key.text)
-            if declared is None and doubts.declares(key.text):
-                checker.value(None, given.get(key.text), inner)
-                continue
-            if declared is None:
-                near = did_you_mean(key.text, included.inputs)
-                known = listing(included.inputs)
-                hint = (
-                    None if near else (f"its inputs are {known}" if known else "it has no inputs")
-                )
-                checker.source.report(
-                    "BT212", span_of(key),
-                    f"the tree {included.name!r} has no input {key.text!r}{near}", hint=hint,
-                )  # fmt: skip
-                checker.value(None, given.get(key.text), inner)
-                continue
-            text = declared.values.get("type")
-            kind = None
-            if isinstance(text, str):
-                try:
-                    kind = parse_type(text, types=checker.types)
-                except TypeNameError:
-                    kind = None  # reported where it is declared
-            checker.value(kind, given.get(key.text), inner)
-    if (given is None and not checker.doubts.own(node)) or isinstance(given, dict):
+            wanted = _input_type(checker, included, key.text, key)
+            checker.value(wanted, given.get(key.text), inner)
+    if included is None:
+        return
+    if names is not None:
         for name, declared in included.inputs.items():
-            if "default" not in declared.values and name not in (given or {}):
+            if "default" not in declared.values and name not in names:
                 checker.source.report(
                     "BT211", span_of(node.key),
                     f"the tree {included.name!r} needs the input {name!r}",
@@ -72,6 +56,36 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
                     related=Related(declared.place, "declared here"),
                 )  # fmt: skip
     _outputs(checker, node)
+
+
+def _computed_inputs(checker: Checker, included: Document, given: Computed, kind: Record) -> None:
+    """Check the inputs that a variable gives, whose keys are known."""
+    for name, value in kind.items:
+        wanted = _input_type(checker, included, name, given.node)
+        if not fits(value, wanted):
+            said = given.expression.text.strip()
+            text = f"{name!r} is {named(wanted)}, and in {said} it is {named(value)}"
+            checker.source.report("BT204", span_of(given.node), text)
+
+
+def _input_type(checker: Checker, included: Document, name: str, at: Node) -> FieldType | None:
+    """The type of an input of an included tree, which is reported if it has none of that name."""
+    declared = included.inputs.get(name)
+    if declared is None:
+        if not checker.doubts_of(included).declares(name):
+            near = did_you_mean(name, included.inputs)
+            known = listing(included.inputs)
+            hint = None if near else (f"its inputs are {known}" if known else "it has no inputs")
+            checker.source.report(
+                "BT212", span_of(at),
+                f"the tree {included.name!r} has no input {name!r}{near}", hint=hint,
+            )  # fmt: skip
+        return None
+    text = declared.values.get("type")
+    try:
+        return parse_type(text, types=checker.types) if isinstance(text, str) else None
+    except TypeNameError:
+        return None  # reported where it is declared
 
 
 def _outputs(checker: Checker, node: TreeNode) -> None:

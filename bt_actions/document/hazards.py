@@ -242,12 +242,13 @@ def _is_action(node: TreeNode) -> bool:
 
 
 def _restarted(root: TreeNode) -> TreeNode | None:
-    """The first action below that is sent again when `root` begins anew, or the tree it is in."""
+    """The first action or service below that `root` begins anew with, or the tree it is in."""
     stack = [root]
     while stack:
         node = stack.pop()
         inner = node.included.root if node.included is not None else None
-        if _is_action(node) or (inner is not None and _restarted(inner) is not None):
+        service = node.kind is not None and node.kind.name == "service"
+        if service or _is_action(node) or (inner is not None and _restarted(inner) is not None):
             return node
         if node.kind is None or node.kind.name != "run_once":
             stack.extend(reversed(node.children))

@@ -6,7 +6,7 @@ Says what is wrong with it through a callback; an unknown type is None and never
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from bt_actions.expression import Expression
 from bt_actions.expression_values import BINARY, bounded, number, reason
@@ -17,6 +17,7 @@ from bt_actions.ros.fields import (
     FieldType,
     Listing,
     Message,
+    Record,
     Scalar,
     constants,
     describe,
@@ -24,7 +25,7 @@ from bt_actions.ros.fields import (
 from bt_actions.ros.interfaces import short_name
 from bt_actions.suggest import did_you_mean
 
-__all__ = ["BOOL", "FLOAT", "INTEGER", "TEXT", "infer", "named", "type_of_literal"]
+__all__ = ["BOOL", "FLOAT", "INTEGER", "TEXT", "common_type", "infer", "named", "type_of_literal"]
 
 BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
 Report = Callable[[str, str, int, int], None]
@@ -55,10 +56,26 @@ def type_of_literal(value: object) -> FieldType | None:
     if isinstance(value, float):
         return FLOAT
     if isinstance(value, list):
-        kinds = {type_of_literal(item) for item in value}
-        same = kinds.pop() if len(kinds) == 1 else None
+        same = common_type([type_of_literal(item) for item in value])
         return None if same is None else Listing(same, size=len(value))
+    if isinstance(value, dict):
+        return Record(tuple((str(name), type_of_literal(item)) for name, item in value.items()))
     return TEXT if isinstance(value, str) else None
+
+
+def common_type(kinds: Sequence[FieldType | None]) -> FieldType | None:
+    """The type of an item of a list whose items have these types, if there is one.
+
+    Where all are records, it is one with the keys of all; a key has a type where all agree on it.
+    """
+    records = [kind for kind in kinds if isinstance(kind, Record)]
+    if not records or len(records) < len(kinds):
+        return kinds[0] if len(set(kinds)) == 1 else None
+    keys: dict[str, list[FieldType | None]] = {}
+    for record in set(records):
+        for name, kind in record.items:
+            keys.setdefault(name, []).append(kind)
+    return Record(tuple((name, common_type(found)) for name, found in keys.items()))
 
 
 def named(kind: FieldType | None) -> str:
@@ -153,6 +170,8 @@ class _Inference:
     def _field(self, node: ast.expr, owner: FieldType | None, name: str) -> FieldType | None:
         if owner is None:
             return None
+        if isinstance(owner, Record):
+            return self._key(node, dict(owner.items), name)
         if not isinstance(owner, Message):
             self._wrong(node, f"{named(owner)} has no field {name!r}", "BT203")
             return None
@@ -167,12 +186,23 @@ class _Inference:
         self._wrong(node, f"{short_name(owner.cls)} has no field {name!r}{near}", "BT203")
         return None
 
+    def _key(
+        self, node: ast.expr, known: Mapping[str, FieldType | None], name: str
+    ) -> FieldType | None:
+        if name not in known:
+            near = did_you_mean(name, known) or (f"; it has {', '.join(known)}" if known else "")
+            self._wrong(node, f"this mapping has no key {name!r}{near}", "BT203")
+        return known.get(name)
+
     def _item(self, node: ast.expr, owner: FieldType | None, index: ast.expr) -> FieldType | None:
         kind = self.type_of(index)
         if owner is None:
             return None
-        if isinstance(owner, Message) and isinstance(index, ast.Constant) and _is_text(kind):
+        by_name = isinstance(owner, Message | Record)
+        if by_name and isinstance(index, ast.Constant) and _is_text(kind):
             return self._field(node, owner, str(index.value))
+        if isinstance(owner, Record) and (kind is None or _is_text(kind)):
+            return None
         if isinstance(owner, Scalar) and _is_text(owner):
             return TEXT
         if not isinstance(owner, Listing):
@@ -241,7 +271,7 @@ class _Inference:
                 if isinstance(second, Listing):
                     if not _comparable(first, second.item):
                         self._wrong(right, f"{named(first)} is never among {second.item}")
-                elif not (_is_text(first) and _is_text(second)):
+                elif not (_is_text(first) and (_is_text(second) or isinstance(second, Record))):
                     self._wrong(right, f"{named(second)} holds nothing that 'in' could look for")
             elif not _comparable(first, second):
                 self._wrong(right, f"{named(first)} is never compared with {named(second)}")
@@ -255,7 +285,7 @@ class _Inference:
     def _call(self, name: str, args: list[ast.expr]) -> FieldType | None:
         if name == "len":
             kind = self.type_of(args[0])
-            if kind is not None and not isinstance(kind, Listing) and not _is_text(kind):
+            if not (kind is None or isinstance(kind, Listing | Record) or _is_text(kind)):
                 self._wrong(args[0], f"{named(kind)} has no length")
             return INTEGER
         if name == "abs":

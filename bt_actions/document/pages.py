@@ -330,7 +330,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
         ),
         "BT306": Page(
             "A composite with 'memory: false' begins with its first child at each tick. An action "
-            "that has finished is thereby sent again while a later child runs.",
+            "that has finished is thereby sent again while a later child runs, a service is "
+            "called again.",
             _move("root:\n  sequence: Work\n  memory: false\n  children: [{move: Go}, {wait: 5 s}]"
                   "\n"),
             _move("inputs: {ready: bool}\nroot:\n  sequence: Work\n  memory: false\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from bt_actions.document.braces import report_braces
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD
@@ -13,7 +14,6 @@ __all__ = [
     "Shape",
     "is_computed",
     "or_variable",
-    "report_braces",
     "words_for",
     "wrong_form",
 ]
@@ -59,18 +59,6 @@ def wrong_form(shape: Shape, node: Node, source: Source, code: str = "BT109") ->
         hint = f'to mean the text, write "{node.text}"' if node.text else None
     source.report(code, span_of(node), f"{shape.words} is needed, not {words_for(node)}", hint=hint)
     return BAD
-
-
-def report_braces(node: Node, source: Source) -> bool:
-    """Report `{x}` where no mapping is meant: YAML reads it as a mapping of x to nothing."""
-    if not isinstance(node, Mapping) or not node.flow or len(node.pairs) != 1:
-        return False
-    key, value = node.pairs[0]
-    if not isinstance(value, Scalar) or value.value is not None or not value.plain:
-        return False
-    hint = f"leave the braces away, or write ${key.text} for a variable"
-    source.report("BT117", span_of(node), f"{{{key.text}}} is read as a mapping", hint=hint)
-    return True
 
 
 def is_computed(node: Node) -> bool:

@@ -8,16 +8,21 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Scalar
+from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Record, Scalar
 from bt_actions.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from bt_actions.ros.interfaces import Kind
 
-__all__ = ["PLAIN_TYPES", "TypeNameError", "fits", "interface_of", "parse_type"]
+__all__ = ["PLAIN_TYPES", "TypeNameError", "fits", "interface_of", "misfits", "parse_type"]
 
 PLAIN_TYPES = ("bool", *FLOATS, *(name for name in INTEGERS), "string")
 """The types that need no package."""
+_STAND_FOR = {
+    "builtin_interfaces/msg/Time": (*FLOATS, *INTEGERS),
+    "builtin_interfaces/msg/Duration": (*FLOATS, *INTEGERS, "string"),
+}
+"""The plain types whose values may be given for a message: seconds, and `500 ms`."""
 _SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{1,9}))?(\])?)?")
 
 
@@ -74,14 +79,14 @@ def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
     if given is None or wanted is None:
         return True
     if isinstance(wanted, Message):
-        return isinstance(given, Message) and given.cls is wanted.cls
+        return _fills(given, wanted.cls)
     if isinstance(wanted, Listing):
         return (
             isinstance(given, Listing)
             and fits(given.item, wanted.item)
             and (wanted.size is None or given.size is None or given.size == wanted.size)
         )
-    if not isinstance(given, Scalar):
+    if not isinstance(given, Scalar) or not isinstance(wanted, Scalar):
         return False
     if wanted.name in FLOATS:
         return given.name in FLOATS or given.name in INTEGERS
@@ -90,3 +95,34 @@ def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
     if wanted.name in ("string", "wstring"):
         return given.name in ("string", "wstring")
     return given.name == wanted.name
+
+
+def _fills(given: FieldType, cls: type) -> bool:
+    """Whether a value can stand where a message is needed; of a mapping, `misfits` says more."""
+    from bt_actions.ros.interfaces import interface_name
+
+    if isinstance(given, Message):
+        return given.cls is cls
+    if isinstance(given, Scalar):
+        return given.name in _STAND_FOR.get(interface_name(cls), ())
+    return isinstance(given, Record)
+
+
+def misfits(given: Record, wanted: Message) -> list[str]:
+    """What is wrong with a mapping of such types where a message is needed."""
+    from bt_actions.ros.messages import dotted, examine
+
+    found: list[str] = []
+
+    def hole(item: object, kind: FieldType, path: tuple[str | int, ...]) -> bool:
+        if isinstance(item, dict):  # the mapping itself
+            return False
+        inner = item if isinstance(item, FieldType) else None
+        if isinstance(inner, Record) and isinstance(kind, Message):
+            found.extend(f"{dotted(path)}.{text}" for text in misfits(inner, kind))
+        elif inner != Scalar("string") and not fits(inner, kind):  # a text may name a constant
+            found.append(f"{dotted(path)}: a value of {kind} is needed, not of {inner}")
+        return True
+
+    problems = examine(wanted, dict(given.items), hole)
+    return [str(problem) for problem in problems] + found

@@ -15,6 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from bt_actions.document.braces import report_braces
 from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError
 from bt_actions.document.inner import inner_span
@@ -98,6 +99,8 @@ def read_value(node: Node, source: Source) -> object:
         bad = any(item is BAD for item in items)
         return BAD if bad else items
     assert isinstance(node, Mapping)
+    if report_braces(node, source):
+        return BAD
     data: dict[str, object] = {}
     for key, inner in node.pairs:
         value = read_value(inner, source)

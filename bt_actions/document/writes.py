@@ -6,7 +6,7 @@ from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bt_actions.document.infer import infer, type_of_literal
+from bt_actions.document.infer import common_type, infer, type_of_literal
 from bt_actions.document.nodes import Mapping, Node
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.types import TypeNameError, parse_type
@@ -54,8 +54,7 @@ class Write:
     def _item_type(self, checker: Checker) -> FieldType | None:
         """The type of what a for_each gives its child."""
         if isinstance(self.value, list):
-            kinds = {type_of_literal(item) for item in self.value}
-            return kinds.pop() if len(kinds) == 1 else None
+            return common_type([type_of_literal(item) for item in self.value])
         if not isinstance(self.value, Computed):
             return None
         kind = infer(self.value.expression, {}, checker.types_at(self.node), lambda *_: None,

@@ -20,6 +20,7 @@ __all__ = [
     "FieldType",
     "Listing",
     "Message",
+    "Record",
     "Scalar",
     "constants",
     "describe",
@@ -80,7 +81,18 @@ class Listing:
         return f"{self.item}[]" if self.limit is None else f"{self.item}[<={self.limit}]"
 
 
-FieldType = Scalar | Message | Listing
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A mapping that a tree writes out: its keys, with their types where they are known."""
+
+    items: tuple[tuple[str, FieldType | None], ...]
+
+    def __str__(self) -> str:
+        return "mapping"
+
+
+FieldType = Scalar | Message | Listing | Record
+"""What a value is. No field of a message is a record: one is inferred, and never asked for."""
 
 
 @lru_cache(maxsize=4096)

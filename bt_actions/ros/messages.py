@@ -148,6 +148,7 @@ class _Filler:
             return self._message(kind.cls, value, path)
         if isinstance(kind, Listing):
             return self._listing(kind, value, path)
+        assert isinstance(kind, Scalar), "a message has no field of another kind"
         return self._scalar(kind, value, path)
 
     def _bad(self, path: Path, text: str, *, at_key: bool = False) -> None:
