@@ -220,8 +220,9 @@ class Expression:
     def _compile_name(self, node: ast.Name, names: list[tuple[str, tuple[int, int]]]) -> _Closure:
         variable = self.variable_of(node)
         if variable is not None:
-            names.append((variable, self.span(node)))
-            return _lookup(variable, *self.span(node))
+            span = self.span(node)
+            names.append((variable, span))
+            return _lookup(variable, *span)
         if node.id in _CONSTANTS:
             return _constant(_CONSTANTS[node.id])
         if node.id not in self.roots:
@@ -249,7 +250,6 @@ class Expression:
                 raise self._refusal(node, "write '==' or '!=' instead of 'is'")
             tests.append(COMPARE[type(op)])
         parts = [part(operand) for operand in operands]
-        start, end = self.span(node)
 
         def compare(roots: _Roots, variable: Variable) -> object:
             left = plain(parts[0](roots, variable))
@@ -259,7 +259,7 @@ class Expression:
                     if not test(left, right):
                         return False
                 except Exception as error:
-                    raise ExpressionError(reason(error), start, end) from error
+                    raise ExpressionError(reason(error), *self.span(node)) from error
                 left = right
             return True
 
@@ -267,14 +267,13 @@ class Expression:
 
     def _guard(self, node: ast.expr, function: Callable[..., object], *parts: _Closure) -> _Closure:
         """A closure that applies `function` and puts the place of `node` on what it raises."""
-        start, end = self.span(node)
 
         def apply(roots: _Roots, variable: Variable) -> object:
             values = [part(roots, variable) for part in parts]
             try:
                 return bounded(function(*values))
             except Exception as error:
-                raise ExpressionError(reason(error), start, end) from error
+                raise ExpressionError(reason(error), *self.span(node)) from error
 
         return apply
 

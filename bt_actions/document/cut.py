@@ -37,5 +37,6 @@ def cut_hint(node: Scalar, source: Source) -> str | None:
 
 def _behind(node: Scalar, source: Source) -> str:
     """What stands behind a plain text on its line, if a '#' is on that."""
-    line = source.line(node.end_line) if node.plain else None
-    return "" if line is None or "#" not in line else line[node.end_column - 1 :]
+    if not node.plain or node.end_line not in source.commented:
+        return ""
+    return (source.line(node.end_line) or "")[node.end_column - 1 :]

@@ -9,6 +9,7 @@ it is ten times as slow, and says other things about the same mistakes.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 import yaml
@@ -148,24 +149,23 @@ def _composed(composer: _Composer, source: Source) -> Node | None:
     if not yaml.__with_libyaml__:
         raise ImportError(NO_LIBYAML, name="libyaml")
     try:
-        for event in yaml.parse(source.text, Loader=yaml.CSafeLoader):
-            composer.take(event)
-            if composer.gave_up:
-                return None
+        composer.read(yaml.CSafeLoader(source.text).get_event)
     except yaml.YAMLError as error:
         report_syntax(source, error)
         return None
-    return composer.root
+    return None if composer.gave_up else composer.root
 
 
 class _Open:
     """A collection whose end has not come yet."""
 
-    __slots__ = ("anchor", "key", "keys", "node", "size")
+    __slots__ = ("anchor", "items", "key", "keys", "node", "pairs", "size")
 
-    def __init__(self, node: Any, anchor: str | None) -> None:
+    def __init__(self, node: Mapping | Listing, anchor: str | None) -> None:
         self.node = node
         self.anchor = anchor
+        self.items = node.items if isinstance(node, Listing) else None
+        self.pairs = node.pairs if isinstance(node, Mapping) else []
         self.key: Scalar | None = None
         self.keys: dict[str, Scalar] = {}
         self.size = 1
@@ -185,30 +185,33 @@ class _Composer:
         self._documents = 0
         self._size = 0
 
-    def take(self, event: Any) -> None:
-        kind = type(event)
-        if kind is yaml.ScalarEvent:
-            self._scalar(event)
-        elif kind is yaml.MappingStartEvent:
-            node = Mapping()
-            node.pairs = []
-            self._begin(node, event)
-        elif kind is yaml.SequenceStartEvent:
-            listing = Listing()
-            listing.items = []
-            self._begin(listing, event)
-        elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
-            self._end(event)
-        elif kind is yaml.AliasEvent:
-            self._alias(event)
-        if self._size > MAX_NODES and not self.gave_up:
-            self._report("BT105", event, f"this is, or unfolds to, more than {MAX_NODES:,} nodes")
-            self.gave_up = True
-        if kind is yaml.DocumentStartEvent:
-            self._documents += 1
-            if self._documents == 2:
-                self._report("BT106", event, "a second document begins here; one file, one tree")
+    def read(self, next_event: Callable[[], Any]) -> None:
+        """Take all events, or those before the first with which it gives up."""
+        takes = {
+            yaml.ScalarEvent: self._scalar,
+            yaml.MappingStartEvent: self._mapping,
+            yaml.MappingEndEvent: self._end,
+            yaml.SequenceStartEvent: self._listing,
+            yaml.SequenceEndEvent: self._end,
+            yaml.AliasEvent: self._alias,
+            yaml.DocumentStartEvent: self._document,
+            yaml.StreamStartEvent: _nothing,
+            yaml.DocumentEndEvent: _nothing,
+        }
+        while (kind := type(event := next_event())) is not yaml.StreamEndEvent:
+            takes[kind](event)
+            if self._size > MAX_NODES and not self.gave_up:
+                text = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
+                self._report("BT105", event, text)
                 self.gave_up = True
+            if self.gave_up:
+                return
+
+    def _document(self, event: Any) -> None:
+        self._documents += 1
+        if self._documents == 2:
+            self._report("BT106", event, "a second document begins here; one file, one tree")
+            self.gave_up = True
 
     def _report(self, code: str, event: Any, message: str, hint: str | None = None) -> None:
         self._source.report(code, _event_span(event), message, hint=hint)
@@ -217,13 +220,8 @@ class _Composer:
         node = Scalar()
         node.text = event.value
         node.plain = not event.style
-        tag = event.tag
-        if tag is not None:
-            node.plain = False
-            if tag not in ("!", "tag:yaml.org,2002:str"):
-                self._report("BT109", event, f"the tag {tag!r} has no meaning in a tree")
-                self._source.settled.add(_event_span(event))
-                self._source.unread.nodes.append(node)
+        if event.tag is not None:
+            self._tag(node, event)
         _place(node, event)
         if event.anchor is not None:
             self._source.anchored = True
@@ -231,7 +229,24 @@ class _Composer:
             self._anchors[event.anchor] = (node, 1)
         self._add(node, 1)
 
-    def _begin(self, node: Any, event: Any) -> None:
+    def _tag(self, node: Scalar, event: Any) -> None:
+        node.plain = False
+        if event.tag not in ("!", "tag:yaml.org,2002:str"):
+            self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
+            self._source.settled.add(_event_span(event))
+            self._source.unread.nodes.append(node)
+
+    def _mapping(self, event: Any) -> None:
+        node = Mapping()
+        node.pairs = []
+        self._begin(node, event)
+
+    def _listing(self, event: Any) -> None:
+        node = Listing()
+        node.items = []
+        self._begin(node, event)
+
+    def _begin(self, node: Mapping | Listing, event: Any) -> None:
         if len(self._stack) >= MAX_DEPTH:
             self._report("BT105", event, f"nested deeper than {MAX_DEPTH} levels")
             self.gave_up = True
@@ -254,13 +269,13 @@ class _Composer:
             node.end_line, node.end_column = mark.line + 1, mark.column + 1
         else:
             last = None
-            if type(node) is Mapping:
-                last = node.pairs[-1][1] if node.pairs else None
-            elif node.items:
-                last = node.items[-1]
+            if done.items is not None:
+                last = done.items[-1] if done.items else None
+            elif done.pairs:
+                last = done.pairs[-1][1]
             if last is not None and (last.end_line, last.end_column) > (node.line, node.column):
                 node.end_line, node.end_column = last.end_line, last.end_column
-        if type(node) is Mapping and "<<" in done.keys and self._unfold:
+        if isinstance(node, Mapping) and "<<" in done.keys and self._unfold:
             self._merge(node)
         if done.anchor is not None:
             self._anchors[done.anchor] = (node, done.size)
@@ -293,17 +308,16 @@ class _Composer:
             return
         frame = self._stack[-1]
         frame.size += size
-        owner = frame.node
-        if type(owner) is Listing:
-            owner.items.append(node)
-        elif frame.key is None:
+        if frame.items is not None:
+            frame.items.append(node)
+        elif (key := frame.key) is None:
             frame.key = self._key(frame, node)
         else:
-            if frame.key is _REFUSED:
+            frame.key = None
+            if key is _REFUSED:
                 self._source.unread.nodes.append(node)
             else:
-                owner.pairs.append((frame.key, node))
-            frame.key = None
+                frame.pairs.append((key, node))
 
     def _key(self, frame: _Open, node: Node) -> Scalar:
         if type(node) is not Scalar:
@@ -343,6 +357,10 @@ class _Composer:
 
 
 _REFUSED = Scalar()
+
+
+def _nothing(event: Any) -> None:
+    """Of this event nothing is to be kept."""
 
 
 def _place(node: Node, event: Any) -> None:

@@ -13,7 +13,7 @@ from bt_actions.document.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
 from bt_actions.document.scalars import Name
 from bt_actions.document.shape import words_for
-from bt_actions.document.shapes import Key, read_keys, report_unknown_key
+from bt_actions.document.shapes import Key, read_keys, report_unknown_key, required_in
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
@@ -145,20 +145,18 @@ class _Reader:
         node = TreeNode(kind, key, written, source)
         if kind is None:
             node.alias = key.text
-            self._fill(node, ACTION_KEYS, _ACTION_NAME)
+            self._fill(node, ACTION_KEYS, _ACTION_NAME, _ACTION_NEEDS)
         else:
-            self._fill(node, kind.keys, kind)
+            self._fill(node, kind.keys, kind, _NEEDS[kind.name])
         return node
 
     def _kind_key(self, written: Mapping) -> Scalar | None:
         """The one key that is a kind or an alias, or None after reporting."""
+        kinds = [key for key, _ in written.pairs if key.text in KINDS or key.text in self._actions]
+        if len(kinds) == 1 and kinds[0].text not in _BESIDE_CHILD:
+            return kinds[0]
         has_child = any(key.text == "child" for key, _ in written.pairs)
-        found = [
-            key
-            for key, _ in written.pairs
-            if (key.text in KINDS or key.text in self._actions)
-            and (has_child or key.text not in _BESIDE_CHILD)
-        ]
+        found = [key for key in kinds if has_child or key.text not in _BESIDE_CHILD]
         if len(found) > 1 and has_child:
             found = [key for key in found if key.text not in _BESIDE_CHILD] or found[:1]
         if len(found) == 1:
@@ -203,7 +201,9 @@ class _Reader:
             if inner is not None:
                 self._children(TreeNode(None, Scalar(), written, self._source), name, inner)
 
-    def _fill(self, node: TreeNode, keys: MappingType[str, Key], kind: Kind) -> None:
+    def _fill(
+        self, node: TreeNode, keys: MappingType[str, Key], kind: Kind, needs: tuple[Key, ...]
+    ) -> None:
         source = self._source
         unknown = False
         for key, inner in node.node.pairs:
@@ -238,8 +238,8 @@ class _Reader:
             node.name = own
         if unknown:
             return
-        for wanted in keys.values():
-            if wanted.required and wanted.name not in node.written:
+        for wanted in needs:
+            if wanted.name not in node.written:
                 source.report(
                     "BT108", span_of(node.key),
                     f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,
@@ -283,3 +283,6 @@ class _Reader:
 
 _ACTION_NAME = KINDS["sequence"]
 """The value of an alias is the node's name, as that of a composite is."""
+_ACTION_NEEDS = required_in(ACTION_KEYS)
+_NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
+"""The keys that must be there."""

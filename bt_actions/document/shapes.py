@@ -18,7 +18,7 @@ from bt_actions.suggest import did_you_mean
 
 __all__ = [
     "AnyValue", "Key", "ListOf", "ListValue", "OneOf", "Record", "Table", "Values", "keys_schema",
-    "read_keys", "report_unknown_key",
+    "read_keys", "report_unknown_key", "required_in",
 ]  # fmt: skip
 
 
@@ -135,6 +135,11 @@ class Key:
     default: str | None = None
 
 
+def required_in(keys: MappingType[str, Key]) -> tuple[Key, ...]:
+    """The keys that must be there."""
+    return tuple(key for key in keys.values() if key.required)
+
+
 @dataclass(frozen=True, slots=True)
 class Record:
     """A mapping with known keys; `short` is the key that a bare value stands for."""
@@ -226,7 +231,7 @@ def keys_schema(keys: MappingType[str, Key]) -> Schema:
             key.name: {"description": key.doc, **key.shape.schema()} for key in keys.values()
         },
     }
-    required = [key.name for key in keys.values() if key.required]
+    required = [key.name for key in required_in(keys)]
     if required:
         schema["required"] = required
     return schema

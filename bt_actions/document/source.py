@@ -68,6 +68,7 @@ class Source:
     settled: set[Span] = field(default_factory=set)
     """Scalars about which enough was said."""
     _lines: list[str] | None = None
+    _commented: frozenset[int] | None = None
 
     @property
     def lines(self) -> list[str]:
@@ -80,6 +81,14 @@ class Source:
         """Line `number` (from 1), or None past the end."""
         lines = self.lines
         return lines[number - 1] if 0 < number <= len(lines) else None
+
+    @property
+    def commented(self) -> frozenset[int]:
+        """The numbers of the lines that hold a '#'."""
+        if self._commented is None:
+            numbers = enumerate(self.lines, 1) if "#" in self.text else ()
+            self._commented = frozenset(number for number, line in numbers if "#" in line)
+        return self._commented
 
     def report(
         self,

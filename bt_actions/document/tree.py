@@ -100,13 +100,15 @@ class Document:
     """What each alias (None: no alias) has where a node says nothing; made when first asked for."""
     root: TreeNode | None = None
     imported: list[Document] = field(default_factory=list)
+    _nodes: tuple[TreeNode, ...] = ()
 
     @property
     def namespace(self) -> str:
         value = self.values.get("namespace", "")
         return value if isinstance(value, str) else ""
 
-    def nodes(self) -> Iterator[TreeNode]:
-        """All nodes of the tree, in the order of the text."""
-        if self.root is not None:
-            yield from self.root.walk()
+    def nodes(self) -> tuple[TreeNode, ...]:
+        """All nodes of the tree, which was read to its end, in the order of the text."""
+        if not self._nodes and self.root is not None:
+            self._nodes = tuple(self.root.walk())
+        return self._nodes
