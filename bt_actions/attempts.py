@@ -81,18 +81,25 @@ class Attempts:
         self._ros_seen = now.ros
         return True
 
-    def pause_left(self, now: Now) -> float:
-        """Return the seconds until the next attempt may begin; a clock that jumps back waits on."""
+    def pause_left(self, now: Now, *, look_only: bool = False) -> float:
+        """Return the seconds until the next attempt may begin; a clock that jumps back waits on.
+
+        With `look_only` nothing is noted, so that any thread may ask.
+        """
         if self._resume_at is None:
             return 0.0
-        if now.ros < self._ros_seen:
-            self._resume_at -= self._ros_seen - now.ros
-        self._ros_seen = now.ros
-        return max(0.0, self._resume_at - now.ros)
+        resume_at = self._resume_at - max(0.0, self._ros_seen - now.ros)
+        if not look_only:
+            self._resume_at, self._ros_seen = resume_at, now.ros
+        return max(0.0, resume_at - now.ros)
 
     def _worth_it(self, record: AttemptRecord) -> bool:
         if record.end is End.UNKNOWN:
             return False  # it may still be running: a second one beside it is what must not be
+        if record.end is End.SERVER_GONE and Outcome.SERVER_LOST not in self.retry.outcomes:
+            return False  # the same, whatever it was canceled for before its server went
+        if record.end is End.SUCCEEDED and record.outcome is not Outcome.UNEXPECTED_RESULT:
+            return False  # it was done, though the result came to nobody: not twice
         if record.outcome not in self.retry.outcomes:
             return False
         if self._when is not None and record.result is not None:

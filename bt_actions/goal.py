@@ -37,6 +37,10 @@ from bt_actions.policy import Busy, End, Outcome, Timeouts
 
 ASK_AGAIN = 1.0
 """Seconds between two questions to a server that owes an answer."""
+ASK_LESS = 10.0
+"""The same, after it was asked `OFTEN` times: a server that refuses to cancel keeps each question
+for the result until the goal ends, and answers them all."""
+OFTEN = 20
 ASK_IN_ANY_CASE = 30.0
 """Seconds between two questions to a server that need not have an answer yet: should the result
 and the status both be lost, a goal without deadlines would wait for ever."""
@@ -101,6 +105,7 @@ class Goal:
         self._doubts = 0
         self._seen_status: int | None = None  # terminal, from the status topic
         self._asked_since = 0  # questions for the result since then
+        self._asked = 0  # in a row, of a server that has it and does not say that it has ended
         self._commands: list[Command] = []
         self._deadlines = Deadlines(now)
         self._deadlines.arm(Event.QUEUE_DUE, timeouts.queue, now)
@@ -357,7 +362,7 @@ class Goal:
         """The silence is over; timeout.feedback begins anew."""
         self.feedback = detail
         self._doubts = 0
-        if not self._replaced:
+        if not self._replaced and self._seen_status is None:
             self._deadlines.arm(Event.FEEDBACK_DUE, self.timeouts.feedback, now)
         return State.EXECUTING
 
@@ -373,6 +378,7 @@ class Goal:
             self._doubts = 0  # whatever it was asked for, and denied: it has the goal
         elif self._seen_status is None:
             self._seen_status = detail
+            self._deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended
             self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
         return self.state
 
@@ -478,6 +484,8 @@ class Goal:
     def _finished_by_status(self) -> State:
         if self._seen_status is not None:
             self.end = ENDS[self._seen_status]
+            if self.outcome is None:
+                self.reason += f"; it ended as {self.end}, and its result was lost"
         self._settle_as_planned()
         return State.DONE
 
@@ -505,7 +513,7 @@ class Goal:
         if not self.lost:
             return self._drop(now, detail)
         self.lost = False
-        self._denied_since = None
+        self._denied_since, self._asked = None, 0
         if self.end is End.NEVER_STARTED:  # and this is the question whether that still holds
             self._ask(now)
             return State.CANCELING
@@ -637,9 +645,13 @@ class Goal:
     def _ask(self, now: Now) -> None:
         """Ask to cancel and, where there will be one, for the result; again in a while."""
         self._commands.append(Command.CANCEL)
+        again = ASK_AGAIN
         if self._accepted:
             self._commands.append(Command.ASK_RESULT)
-        self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
+            self._asked += 1
+            if self._asked > OFTEN and self._seen_status is None:
+                again = ASK_LESS
+        self._deadlines.arm(Event.ASK_DUE, again, now)
 
 
 @dataclass(frozen=True, slots=True)

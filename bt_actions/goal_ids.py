@@ -16,6 +16,9 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
+MACHINE = "BT_ACTIONS_MACHINE"
+"""The environment variable that names this machine, where its own name will not do: a container
+that is started again has another pid namespace, and its predecessor's goals would be somebody's."""
 _MAGIC = hashlib.sha256(b"bt_actions goal id 1").digest()[:3]
 _HIDDEN = b"\0\0"
 """Stands for the moment of a start that cannot be read."""
@@ -63,6 +66,11 @@ def author_of(goal_id: bytes) -> Author | None:
 
 
 def _machine() -> bytes:
+    named = os.environ.get(MACHINE)
+    return hashlib.sha256((named or _name_of_machine()).encode()).digest()[:3]
+
+
+def _name_of_machine() -> str:
     parts = [socket.gethostname()]
     try:
         parts.append(Path("/etc/machine-id").read_text(encoding="utf-8").strip())
@@ -72,7 +80,7 @@ def _machine() -> bytes:
         parts.append(str(Path("/proc/self/ns/pid").readlink()))
     except OSError:
         parts.append("")
-    return hashlib.sha256("\n".join(parts).encode()).digest()[:3]
+    return "\n".join(parts)
 
 
 def _start_of(pid: int) -> bytes | None:

@@ -273,8 +273,14 @@ class TreeRunner:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        with contextlib.suppress(Exception):
+        try:
             self.tree.shutdown()
+        except Exception as error:  # noqa: BLE001 - the user's: any
+            self.node.get_logger().error(f"shutdown of a behaviour raised: {error!r}")
+            for behaviour in self.tree.root.iterate():  # ours must let go all the same
+                if isinstance(behaviour, ActionBehaviour):
+                    with contextlib.suppress(Exception):
+                        behaviour.shutdown()
         self._traffic.unobserve(self._note)
         self._spinner.stop(self._close_guests)
 
@@ -326,21 +332,21 @@ class TreeRunner:
             if self._spin_error is not None:
                 raise TreeError(f"the spin thread died: {self._spin_error!r}") from self._spin_error
             self._spinner.check()
-            if self._stop_wanted or (deadline is not None and time.monotonic() >= deadline):
+            if self._stop_wanted or _past(deadline):
                 return Status.INVALID
             self._flush()
             if self._held():
                 wait = self.heartbeat
             else:
-                status = self._tick()
+                status = self._tick(deadline)
                 if status in (Status.SUCCESS, Status.FAILURE):
                     return status
                 wait = min([self.heartbeat, *self._dues()])
             if deadline is not None:
                 wait = min(wait, max(0.0, deadline - time.monotonic()))
 
-    def _tick(self) -> Status:
-        """Tick; again at once while each tick changes a status."""
+    def _tick(self, deadline: float | None) -> Status:
+        """Tick; again at once while each tick changes a status, and nobody wants it to stop."""
         for _ in range(BURST):
             self._visitor.begin()
             with self._traffic.begun_by(self._mark):
@@ -351,7 +357,9 @@ class TreeRunner:
                 message = node.feedback_message
                 self._emit(NodeChanged(time.monotonic(), path_of(node), node, status, message))
             status = self.tree.root.status
-            if not changed or status is not Status.RUNNING or self._stop_wanted:
+            if not changed or status is not Status.RUNNING:
+                return status
+            if self._stop_wanted or self._pause_wanted or _past(deadline):
                 return status
         return self.tree.root.status
 
@@ -419,7 +427,12 @@ class TreeRunner:
         self._wake()
 
     def _note(self, change: Change | None) -> None:
-        """Take note of a change of any goal of our node; called under the lock of the traffic."""
+        """Take note of a change of a goal of our node; called under the lock of the traffic.
+
+        Between two runs only of those that a run of ours has left.
+        """
+        if self._runs_on is None and (change is None or change.ticket not in self._tickets):
+            return
         if change is not None:
             self._changes.append(change)
         self._wake()
@@ -459,6 +472,10 @@ class TreeRunner:
             except Exception as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
                 self.node.get_logger().error(f"an observer raised and was removed: {error!r}")
+
+
+def _past(deadline: float | None) -> bool:
+    return deadline is not None and time.monotonic() >= deadline
 
 
 def _traffic_of(node: Any) -> Any:

@@ -106,3 +106,17 @@ def test_a_record_shows_an_end_that_became_known_later() -> None:
     assert filed.goal_id == "01" * 16
     assert filed.duration == 2.5
     assert not filed.late
+
+
+@pytest.mark.parametrize("outcome", sorted(RETRYABLE))
+def test_beside_a_server_that_is_gone_only_who_asked_for_it_tries_again(outcome: Outcome) -> None:
+    """Whatever it was canceled for: a goal that was cut off may still run where nobody sees it."""
+    named = Retry(2, outcomes=RETRYABLE - {Outcome.SERVER_LOST})
+    assert not attempts(named).again(record(outcome, End.SERVER_GONE), START)
+    assert attempts(Retry(2, outcomes=RETRYABLE)).again(record(outcome, End.SERVER_GONE), START)
+
+
+@pytest.mark.parametrize("outcome", sorted(RETRYABLE))
+def test_what_has_succeeded_is_not_done_twice(outcome: Outcome) -> None:
+    again = attempts(Retry(2, outcomes=RETRYABLE)).again(record(outcome, End.SUCCEEDED), START)
+    assert again == (outcome is Outcome.UNEXPECTED_RESULT)

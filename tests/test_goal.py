@@ -15,8 +15,10 @@ import bt_actions.goal
 from bt_actions.goal import (
     ASK_AGAIN,
     ASK_IN_ANY_CASE,
+    ASK_LESS,
     DENIED_FOR_GOOD,
     DOUBTS,
+    OFTEN,
     PATIENCE,
     RESULT_QUESTIONS,
     TABLE,
@@ -440,6 +442,29 @@ def test_a_cancel_that_is_refused_or_not_answered_is_asked_for_again() -> None:
         assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
 
 
+def test_a_server_that_refuses_for_long_is_asked_less_often() -> None:
+    life = executing(Timeouts(cancel=2.0))
+    life.on(Event.INTERRUPTED)
+    for _ in range(OFTEN):
+        assert life.pass_time(ASK_AGAIN)
+    assert life.pass_time(ASK_LESS - 0.5) == []
+    assert life.pass_time(0.5) == [CANCEL, ASK]
+    life.on(Event.STATUS, STATUS_CANCELED)
+    assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK], "it has ended: its result is due"
+    life.on(Event.SERVER_LOST, "gone")
+    life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+def test_a_server_that_is_back_is_asked_often_again() -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    for _ in range(OFTEN + 1):
+        life.pass_time(ASK_AGAIN)
+    life.on(Event.SERVER_LOST, "gone")
+    assert life.on(Event.SERVER_RETURNED) == [CANCEL, ASK]
+    assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
+
+
 # Rule 6: deadlines
 
 
@@ -655,6 +680,25 @@ def test_where_the_result_is_lost_the_status_topic_says_how_it_ended() -> None:
         assert life.pass_time(ASK_AGAIN) == [ASK]
     life.pass_time(ASK_AGAIN)
     life.ended(Outcome.SERVER_LOST, End.ABORTED)
+
+
+def test_a_goal_that_has_ended_is_not_stalled_because_it_is_silent() -> None:
+    life = executing(Timeouts(result=30.0, feedback=2.0))
+    life.on(Event.STATUS, STATUS_SUCCEEDED)
+    life.on(Event.FEEDBACK, "overtaken by the status")
+    for _ in range(RESULT_QUESTIONS):
+        assert life.pass_time(ASK_AGAIN) == [ASK]
+    life.pass_time(ASK_AGAIN)
+    life.ended(Outcome.SERVER_LOST, End.SUCCEEDED)
+
+
+def test_a_result_that_is_lost_until_the_deadline_leaves_its_end_known() -> None:
+    life = executing(Timeouts(result=3.0))
+    life.on(Event.STATUS, STATUS_SUCCEEDED)
+    for _ in range(3 + DOUBTS + 1):
+        life.pass_time(ASK_AGAIN)
+    life.ended(Outcome.RESULT_TIMEOUT, End.SUCCEEDED)
+    assert life.goal.reason.endswith("; it ended as SUCCEEDED, and its result was lost")
 
 
 def test_a_server_that_dies_after_showing_the_end_leaves_no_question() -> None:

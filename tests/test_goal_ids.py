@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.goal_ids import author_of, new_goal_id
+from bt_actions.goal_ids import MACHINE, author_of, new_goal_id
 
 MAKE = (
     "from bt_actions.goal_ids import new_goal_id; print(new_goal_id().hex(), flush=True); input()"
@@ -73,6 +73,22 @@ def test_an_id_from_another_machine_counts_as_alive() -> None:
     assert author is not None
     assert not author.here
     assert author.alive
+
+
+def test_a_name_of_its_own_makes_a_container_the_same_machine_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda: "of the first start")
+    monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
+    unnamed = new_goal_id()
+    monkeypatch.setenv(MACHINE, "arm 1")
+    monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
+    named = new_goal_id()
+    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda: "of the second")
+    monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
+    assert [author_of(each).here for each in (unnamed, named)] == [False, True]  # type: ignore[union-attr]
+    monkeypatch.setenv(MACHINE, "arm 2")
+    assert not author_of(named).here  # type: ignore[union-attr]
 
 
 def test_ids_that_others_chose_have_no_author() -> None:

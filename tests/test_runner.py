@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -261,6 +262,19 @@ class TestStart:
         thread.join(1.0)
         assert returned == [Status.INVALID]
 
+    def test_a_behaviour_that_raises_in_shutdown_keeps_no_client_alive(
+        self, name: str, node: Any, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        runner = TreeRunner(in_sequence(Raises("culprit", "shutdown"), leaf), node=node)
+        runner.interrupt()
+        runner.run()
+        assert leaf.server.startswith("/")
+        runner.shutdown()
+        with pytest.raises(RuntimeError, match="not set up"):
+            leaf.initialise()
+        assert "on purpose in shutdown" in capfd.readouterr().err
+
     @pytest.mark.parametrize("last", [GoalChanged, TreeFinished])
     def test_shutdown_by_an_observer_is_refused(
         self, journal: Journal, name: str, node: Any, last: type[Event]
@@ -303,6 +317,26 @@ class TestPause:
             runner.resume()
             assert runner.wait(5.0) is Status.SUCCESS
         assert journal.count("succeeded") == 2
+
+    def test_a_tree_that_changes_at_each_tick_is_paused_at_once(self, node: Any) -> None:
+        ticks: list[int] = []
+
+        class Step(py_trees.behaviour.Behaviour):
+            def update(self) -> Status:
+                ticks.append(1)
+                if len(ticks) == 10:
+                    runner.pause()
+                return Status.SUCCESS if len(ticks) % 2 else Status.RUNNING
+
+        root = py_trees.decorators.Repeat("for ever", Step("step"), num_success=-1)
+        with TreeRunner(root, node=node) as runner:
+            runner.start()
+            until(lambda: len(ticks) >= 10)
+            assert holds_for(lambda: len(ticks) == 10, 0.3)
+            runner.resume()
+            until(lambda: len(ticks) > 10)
+            runner.interrupt()
+            assert runner.wait(5.0) is Status.INVALID
 
     def test_a_paused_tree_can_be_interrupted(self, journal: Journal, name: str, node: Any) -> None:
         leaf = MoveRobot("m", 9.0, action_name=name)
@@ -575,6 +609,20 @@ class TestEvents:
         for leaf, events in zip(leaves, heard, strict=True):
             assert {e.behaviour for e in events if isinstance(e, GoalChanged)} == {leaf}
         assert journal.max_live == 1
+
+    def test_a_runner_that_rests_keeps_nothing_of_others(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        rests = MoveRobot("rests", 0.1, action_name=name)
+        with spun(node), TreeRunner(rests, node=node) as resting:
+            leaf = MoveRobot("m", 0.1, action_name=name)
+            with TreeRunner(leaf, node=node) as runner:
+                assert runner.run(timeout=9.0) is Status.SUCCESS
+            goal = weakref.ref(leaf.history[0].goal)
+            del leaf, runner
+            gc.collect()
+            assert goal() is None
+            assert resting.run(timeout=9.0) is Status.SUCCESS
 
 
 class TestWhoseGoalsTheyAre:

@@ -177,7 +177,7 @@ class ActionBehaviour(Behaviour):
             return Progress("IDLE", self.attempt, attempts, None, None, "")
         now = traffic.clocks.now()
         if self.status is Status.RUNNING and self._filed(ticket):
-            left = self._attempts.pause_left(now)
+            left = self._attempts.pause_left(now, look_only=True)
             return Progress("BACKOFF", self.attempt, attempts, None, left, "backoff")
         from bt_actions.ros.shared import lock
 
@@ -194,6 +194,11 @@ class ActionBehaviour(Behaviour):
         """Whether every goal this leaf has sent so far is accounted for."""
         return not self.open_tickets()
 
+    @property
+    def draining(self) -> bool:
+        """Whether a goal of this leaf has to end yet, within its `timeout.cancel` and the like."""
+        return any(ticket.goal.outcome is None for ticket in self.open_tickets())
+
     def due_in(self) -> float | None:
         """Return the seconds until this leaf needs a tick though nothing has happened."""
         if self._traffic is None or self._ticket is None or not self._filed(self._ticket):
@@ -205,8 +210,9 @@ class ActionBehaviour(Behaviour):
     def setup(self, **kwargs: Any) -> None:
         """Connect to the action, on the node given as ``node=``; again for the same node: fine.
 
-        Raises TypeError without a node, or when the name is in use with another type;
-        UnknownInterface (a LookupError) when the action type is not installed.
+        Raises TypeError without a node, or when the name is in use with another type; ValueError
+        for a name that ROS refuses; UnknownInterface (a LookupError) when the action type is not
+        installed.
         """
         node = node_in(kwargs, self)
         from bt_actions.ros.messages import interface
@@ -230,20 +236,21 @@ class ActionBehaviour(Behaviour):
         self._begin()
 
     def update(self) -> Status:
-        """Take the goal as far as it goes at this moment."""
+        """Take the goal as far as it goes at this moment; begins one attempt at most."""
         self._require_setup()
         if self._outcome is not None:
             self.initialise()  # shut down while RUNNING, and set up again: another visit
         traffic, ticket = self._traffic, self._ticket
         assert traffic is not None
         assert ticket is not None
+        begun = False
         while True:
             if self._filed(ticket):
                 left = self._attempts.pause_left(traffic.clocks.now())
-                if left > 0.0:
+                if left > 0.0 or begun:
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
                     return Status.RUNNING
-                ticket = self._begin()
+                ticket, begun = self._begin(), True
             traffic.advance(ticket, self._make_message)
             for _ in range(len(ticket.feedback)):  # not what comes meanwhile: a tick must end
                 message = ticket.feedback.popleft()

@@ -19,7 +19,8 @@ class Deadline(Gate):
     """Stops its child after some seconds, and fails when what it stopped has ended.
 
     py_trees' Timeout fails at once, so that whatever comes next runs beside a goal that is still
-    being canceled.
+    being canceled. A goal that does not end within its own deadlines is waited for no longer, as a
+    leaf waits for it no longer; its resources stay taken.
 
     Args:
         name: as in py_trees.
@@ -57,11 +58,14 @@ class Deadline(Gate):
             self.decorated.stop(Status.INVALID)
         if not self._expired:
             return None
-        stopping = [node.name for node in self.decorated.iterate() if not drained(node)]
+        stopping = [node.name for node in self.decorated.iterate() if draining(node)]
         if stopping:
             self.feedback_message = f"{self._limit:g} s are over; waiting for {stopping[0]} to end"
             return Status.RUNNING
         self.feedback_message = f"not done within {self._limit:g} s"
+        unknown = [node.name for node in self.decorated.iterate() if not drained(node)]
+        if unknown:
+            self.feedback_message += f"; the end of {', '.join(unknown)} is not known"
         return Status.FAILURE
 
     def update(self) -> Status:
@@ -98,6 +102,11 @@ class While(Gate):
 
     def update(self) -> Status:
         return self.decorated.status
+
+
+def draining(node: Behaviour) -> bool:
+    """Whether something of a behaviour goes on outside of the tree, and is waited for."""
+    return bool(getattr(node, "draining", False))
 
 
 def drained(node: Behaviour) -> bool:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 _EPILOG = """\
 A process that is killed (kill -9, out of memory) cannot cancel its goals; the robot goes on. This
 finds them by their ids in the status of every action in sight. Goals of other clients are never
-touched, nor those of an orchestrator that is alive or on another machine.
+touched, nor those of an orchestrator that is alive, on another machine or in another container. A
+container that is started again counts as another one, unless BT_ACTIONS_MACHINE names it: a name of
+its own for each container, the same each time.
 
 examples:
   bt-actions cleanup
@@ -60,7 +62,19 @@ def sweep(look: float, patience: float) -> Exit:
         note(f"canceling a goal of dead process {left.pid} on {left.action}: {left.goal_id.hex()}")
 
     actions: list[str] = []
-    goals = cleanup(look=look, patience=patience, found=found, sighted=actions.append)
+    foreign: list[str] = []
+    goals = cleanup(
+        look=look,
+        patience=patience,
+        found=found,
+        sighted=actions.append,
+        elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
+    )
+    if foreign:
+        note(
+            f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in another "
+            "container, where it cannot be seen whether it is alive (see BT_ACTIONS_MACHINE)"
+        )
     for goal in goals:
         write(f"{goal.action}  {goal.goal_id.hex()}  {goal.end}\n")
     if any(goal.end is End.UNKNOWN for goal in goals):
@@ -69,5 +83,6 @@ def sweep(look: float, patience: float) -> Exit:
     if not goals:
         count = "1 action" if len(actions) == 1 else f"{len(actions)} actions"
         where = f" on the {count} in sight" if actions else ": no action server is in sight"
-        write(f"nothing was left behind{where}\n")
+        nothing = "nothing of this machine" if foreign else "nothing"
+        write(f"{nothing} was left behind{where}\n")
     return Exit.SUCCESS

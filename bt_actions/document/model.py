@@ -280,7 +280,8 @@ def _all() -> Iterable[Kind]:
     )
     yield _decorator(
         "timeout",
-        "Stops its child after some time, and fails when what it stopped has ended.",
+        "Stops its child after some time, and fails when what it stopped has ended, or did not end "
+        "within its own 'cancel'.",
         "timeout: Ten seconds at most\nafter: 10 s\nchild:\n  success: Search",
         Key("after", Duration(values=True), "How long the child may take.", required=True),
     )

@@ -2,7 +2,8 @@
 
 A process that dies by SIGKILL cancels nothing. Its goals are found in the status topics of all
 actions in sight, told by their ids (goal_ids.py), and canceled one by one; goals of other clients,
-and of orchestrators that are alive, are never touched. No action type is needed for any of it.
+and of orchestrators that are alive, or that cannot be looked for from here, are never touched. No
+action type is needed for any of it.
 """
 
 from __future__ import annotations
@@ -49,13 +50,16 @@ def cleanup(
     patience: float = 5.0,
     found: Callable[[LeftBehind], None] = lambda left: None,
     sighted: Callable[[str], None] = lambda action: None,
+    elsewhere: Callable[[str, bytes], None] = lambda action, goal_id: None,
     context: Context | None = None,
 ) -> list[LeftBehind]:
     """Cancel what dead orchestrators of this machine left; return it with its ends.
 
     Looks for servers for `look` seconds (longer while new ones come in sight), and waits `patience`
-    seconds more for the goals that it canceled to end. `found` is called with each at once, and
-    `sighted` with the name of each action in sight. Blocks.
+    seconds more for the goals that it canceled to end. `found` is called with each at once,
+    `sighted` with the name of each action in sight, and `elsewhere` with the action and the id of
+    each unfinished goal of a bt_actions process on another machine, or in another container, of
+    which nobody here can tell whether it is alive. Blocks.
     """
     own = Context() if context is None else context
     if context is None:
@@ -63,7 +67,7 @@ def cleanup(
     node = Node("bt_actions_cleanup", context=own)
     executor = SingleThreadedExecutor(context=own)
     executor.add_node(node)
-    sweep = _Sweep(node, found, sighted)
+    sweep = _Sweep(node, found, sighted, elsewhere)
     try:
         began = time.monotonic()
         while True:
@@ -89,10 +93,13 @@ class _Sweep:
         node: Node,
         found: Callable[[LeftBehind], None],
         sighted: Callable[[str], None],
+        elsewhere: Callable[[str, bytes], None],
     ) -> None:
         self._node = node
         self._found = found
         self._sighted = sighted
+        self._elsewhere = elsewhere
+        self._foreign: set[bytes] = set()
         self._subscriptions: dict[str, Any] = {}
         self._clients: dict[str, Any] = {}
         self.left: dict[bytes, LeftBehind] = {}
@@ -125,7 +132,12 @@ class _Sweep:
                 left.end = ENDS.get(entry.status, End.UNKNOWN)
                 continue
             author = author_of(goal_id)
-            if entry.status in ENDS or author is None or author.alive:
+            if entry.status in ENDS or author is None:
+                continue
+            if author.alive:
+                if not author.here and goal_id not in self._foreign:
+                    self._foreign.add(goal_id)
+                    self._elsewhere(action, goal_id)
                 continue
             left = self.left[goal_id] = LeftBehind(action, goal_id, author.pid)
             self._found(left)

@@ -21,6 +21,7 @@ from bt_actions.goal_terms import ENDS, STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for, publishers
 from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
@@ -167,7 +168,7 @@ class Line:
         if goal.state is State.DONE:
             self.close_book(goal)
         if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
-            goal.reason += self._instead()
+            goal.reason += self._instead(ticket)
         if before != (goal.state, goal.outcome, goal.end):
             ticket.traffic.note(ticket)
         for command in commands:
@@ -212,10 +213,10 @@ class Line:
             alarm.forget(self)
             self.traffic.drop_if_unused(self)
 
-    def _instead(self) -> str:
+    def _instead(self, ticket: Ticket) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
-        if any(ticket.goal.owed for ticket in self.goals.values()):
-            return ": it is there, but still has a goal that was given up, and would run both"
+        if any(line.in_the_way_of(ticket) for line in self.neighbors()):
+            return ": what it would use still has a goal that was given up, and would run both"
         node, actions = self.traffic.node, dict[str, str]()
         try:
             for topic, _ in node.get_topic_names_and_types():
@@ -225,8 +226,11 @@ class Line:
                         actions[topic.removesuffix(FEEDBACK)] = kind
         except Exception:  # noqa: BLE001 - our node was destroyed
             return ""
-        if self.name in actions:
-            return f"; there is one of another type or version, {actions[self.name]}"
+        kind = actions.get(self.name)
+        if kind == interface_name(self.action_type):
+            return ": it is in sight, but was not ready, or has requests enough to answer"
+        if kind is not None:
+            return f"; there is one of another type or version, {kind}"
         if not actions:
             return "; no action server at all is in sight in this ROS domain"
         return did_you_mean(self.name, actions)
@@ -280,6 +284,12 @@ class Line:
         if self._sight is not None:
             self._sight.left_by(self)
             self._sight = None
+
+    def neighbors(self) -> list[Line]:
+        """Return the lines with goals in our ROS domain, of all nodes of this process."""
+        domain = self.traffic.domain
+        lines = [line for line in alarm.minded() if isinstance(line, Line)]
+        return [line for line in lines if line.traffic.domain is domain]
 
     def look_for_lost(self, ticket: Ticket) -> None:
         """See whether goals are back that were lost here, and that `ticket` could run beside."""

@@ -21,6 +21,7 @@ import weakref
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
 from bt_actions.goal import Goal
@@ -72,9 +73,10 @@ class Traffic:
     def line(self, action_type: Any, action_name: str) -> Line:
         """Return the shared line to an action, and count its user.
 
-        Raises TypeError when the name is in use with another type.
+        Remapping rules do not reach action names. Raises ValueError for a name that ROS refuses,
+        and TypeError when it is in use with another type.
         """
-        name = expand(action_name, self.node.get_namespace())
+        name = expand_topic_name(action_name, self.node.get_name(), self.node.get_namespace())
         with lock:
             line = self._lines.get(name)
             if line is None:
@@ -145,8 +147,8 @@ class Traffic:
     def advance(self, ticket: Ticket, make_message: Callable[[], Any]) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
 
-        `make_message` is called without the lock, on the caller's thread, at most once; what it
-        raises makes the goal INVALID_GOAL.
+        `make_message` is called without the lock, on the caller's thread, at most once a call (the
+        server may go meanwhile); what it raises makes the goal INVALID_GOAL.
         """
         line = ticket.line
         with lock:
@@ -185,11 +187,10 @@ class Traffic:
 
         One that was lost holds nothing any more; should its server be back, it is canceled first.
         """
-        minded = [line for line in alarm.minded() if isinstance(line, Line)]
-        ours = [line for line in minded if line.traffic.domain is self.domain]
-        for line in ours:
+        lines = ticket.line.neighbors()
+        for line in lines:
             line.look_for_lost(ticket)  # all of them first: one may take over another's
-        return any(line.in_the_way_of(ticket) for line in ours)
+        return any(line.in_the_way_of(ticket) for line in lines)
 
     def interrupt(self, ticket: Ticket) -> None:
         """The tree no longer wants it. Returns at once; the goal is drained."""
@@ -293,13 +294,6 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
 
 def _who_begins() -> object:
     return getattr(_begins, "who", None)
-
-
-def expand(name: str, namespace: str) -> str:
-    """Return the fully qualified form of `name`; remapping rules do not reach action names."""
-    if name.startswith("/"):
-        return name
-    return f"{namespace.rstrip('/')}/{name}"
 
 
 @atexit.register

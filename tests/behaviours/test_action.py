@@ -5,9 +5,11 @@ from typing import Any
 
 import py_trees
 import pytest
+from py_trees.common import Status
 
-from bt_actions import MoveRobot, Outcome, TreeRunner
+from bt_actions import MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.behaviours import action
+from tests.support.waiting import until
 
 
 def test_an_unexpected_result_says_what_was_expected_and_what_came(
@@ -38,3 +40,46 @@ def test_the_first_leaf_that_is_shut_down_closes_for_the_whole_tree(
         runner.interrupt()
         runner.run()
     assert len(walks) == 1
+
+
+def test_a_tick_begins_one_more_attempt_at_most(node: Any, name: str) -> None:
+    first = MoveRobot("first", 1.0, action_name=name)
+    second = MoveRobot("second", 1.0, action_name=name, busy="fail", retry=1000)
+    for leaf in (first, second):
+        leaf.setup(node=node)
+        leaf.tick_once()
+        assert leaf.status is Status.RUNNING
+    assert [each.outcome for each in second.history] == [Outcome.SERVER_BUSY] * 2
+    second.tick_once()
+    assert len(second.history) == 3
+    for leaf in (first, second):
+        leaf.shutdown()
+
+
+def test_a_name_of_the_nodes_own(node: Any) -> None:
+    leaf = MoveRobot("m", 1.0, action_name="~/dock")
+    leaf.setup(node=node)
+    assert leaf.server == f"{node.get_fully_qualified_name()}/dock"
+    leaf.shutdown()
+
+
+def test_a_name_that_ros_refuses_is_refused_in_setup(node: Any) -> None:
+    with pytest.raises(ValueError, match="topic name 'a b' is invalid"):
+        MoveRobot("m", 1.0, action_name="a b").setup(node=node)
+
+
+def test_a_loop_that_stands_still_is_not_told_of_another_type(
+    host: Any, name: str, node: Any
+) -> None:
+    host.open(name)
+    leaf = MoveRobot("m", 1.0, action_name=name, timeout=Timeouts(server=0.5))
+    leaf.setup(node=node)
+    until(leaf._line.client.server_is_ready)
+    leaf.initialise()  # and is not ticked until its deadline is over
+    ticket = leaf.open_tickets()[0]
+    until(lambda: ticket.goal.outcome is not None)
+    assert leaf.update() is Status.FAILURE
+    assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
+    assert leaf.reason.endswith("is in sight, but was not ready, or has requests enough to answer")
+    leaf.shutdown()
+    host.close_server(name)

@@ -277,3 +277,33 @@ def test_timeout_waits_until_the_goal_it_stopped_has_ended(
     assert journal.events()[-1] == "succeeded"
     assert stopped.feedback_message == "not done within 0.5 s"
     host.close_server(name)
+
+
+def test_timeout_does_not_wait_for_ever_for_a_goal_that_does_not_end(
+    load: Load, node: Any, host: Any, name: str
+) -> None:
+    journal = host.open(name, "*:ignore_cancel", "*:stall")
+    root = load(
+        f"""
+        tree: t
+        root:
+          fallback: F
+          children:
+            - timeout: T
+              after: 5 s
+              child:
+                action: A
+                type: robot_control_interfaces/action/MoveRobot
+                server: {name}
+                goal: {{distance: 10.0}}
+                timeout: {{result: none, cancel: 500 ms}}
+            - log: Ring the alarm
+        """
+    )
+    stopped = root.children[0]
+    with TreeRunner(root, node=node) as runner:
+        assert runner.run(timeout=60) is Status.SUCCESS
+        assert [report.server for report in runner.unaccounted] == [name]
+    assert stopped.feedback_message == "not done within 5 s; the end of A is not known"
+    assert journal.ends() == [None], "it still runs, as far as the server is concerned"
+    host.close_server(name)

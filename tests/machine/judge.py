@@ -65,9 +65,12 @@ class Judge:
                 self._in_turn(ticket)
             ledger.since = now.steady
         if goal.accepted and not before.accepted:
-            ledger.begun_at = ledger.heard_at = ledger.forward
-        if event is Event.FEEDBACK:
+            ledger.begun_at = ledger.forward
+            ledger.heard_at = None if event is Event.STATUS and detail in ENDS else ledger.forward
+        if event is Event.FEEDBACK and ledger.heard_at is not None:
             ledger.heard_at = ledger.forward
+        if event is Event.STATUS and detail in ENDS:
+            ledger.heard_at = None  # a goal that has ended is silent
         if before.outcome is None:
             if event is Event.INTERRUPTED and before.state is not State.DONE:
                 ledger.unwanted = True
@@ -193,7 +196,8 @@ class Judge:
             self._within(here, limits.accept, "accept")
         elif state is State.EXECUTING and not ledger.replaced:
             self._within(ledger.forward - ledger.begun_at, limits.result, "result")
-            self._within(ledger.forward - ledger.heard_at, limits.feedback, "feedback")
+            if ledger.heard_at is not None:
+                self._within(ledger.forward - ledger.heard_at, limits.feedback, "feedback")
         elif state is State.CANCELING:
             accept = limits.accept or limits.cancel or PATIENCE
             here -= 2 * ledger.slow
@@ -209,7 +213,7 @@ class Judge:
         if state is State.EXECUTING:
             if not ledger.replaced and ticket.goal.state is not State.DONE:
                 running = ledger.forward - ledger.begun_at + JUST
-                silent = ledger.forward - ledger.heard_at + JUST
+                silent = 0.0 if ledger.heard_at is None else ledger.forward - ledger.heard_at + JUST
                 passed = (limits.result is not None and running >= limits.result) or (
                     limits.feedback is not None and silent >= limits.feedback
                 )
@@ -265,6 +269,11 @@ class Judge:
         if again and leaf.attempts is not None:
             self._hold(record.end is not End.UNKNOWN, "a retry waits until the end is known")
             self._hold(not ticket.ledger.unwanted, "what was given up is not tried again")
+            outcomes = leaf.plan.retry.outcomes
+            gone = record.end is End.SERVER_GONE and Outcome.SERVER_LOST not in outcomes
+            self._hold(not gone, "a goal whose server is gone is tried again only if asked for")
+            done = record.end is End.SUCCEEDED and record.outcome is not Outcome.UNEXPECTED_RESULT
+            self._hold(not done, "what has succeeded is not done twice")
             in_bounds = len(leaf.attempts.history) < leaf.plan.retry.attempts
             self._hold(in_bounds, "attempts counts all tries")
 

@@ -39,7 +39,7 @@ class Ledger:
     forward: float = 0.0
     """How far the node's clock has gone forward, as the goal saw it."""
     begun_at: float = 0.0
-    heard_at: float = 0.0
+    heard_at: float | None = 0.0
     """Values of `forward`: at acceptance, and at the last feedback."""
     polled_at: float = 0.0
     slow: float = 0.0

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bt_actions.attempts import Attempts
+from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.deadlines import Deadlines
 from bt_actions.goal import TABLE, Goal, Row
 from bt_actions.goal_terms import Command, Event, State
@@ -72,6 +72,35 @@ def takes_a_late_answer_for_the_attempt_that_runs_now(patch: Patch) -> None:
 @mutation
 def retries_before_the_end_is_known(patch: Patch) -> None:
     patch.setattr(Attempts, "_worth_it", lambda self, record: record.outcome in self.retry.outcomes)
+
+
+def tried_again_unless(patch: Patch, refused: Callable[[AttemptRecord], bool]) -> None:
+    """Ask nothing of an attempt but its outcome, and one thing more."""
+    patch.setattr(
+        Attempts,
+        "_worth_it",
+        lambda self, record: record.outcome in self.retry.outcomes and not refused(record),
+    )
+
+
+@mutation
+def does_twice_what_has_succeeded(patch: Patch) -> None:
+    tried_again_unless(patch, lambda record: record.end in (End.UNKNOWN, End.SERVER_GONE))
+
+
+@mutation
+def retries_beside_a_server_that_is_gone(patch: Patch) -> None:
+    tried_again_unless(patch, lambda record: record.end in (End.UNKNOWN, End.SUCCEEDED))
+
+
+@mutation
+def waits_for_feedback_of_a_goal_that_has_ended(patch: Patch) -> None:
+    def seen(goal: Goal, now: Any, detail: Any) -> State:
+        state = Goal._terminal_status_seen(goal, now, detail)
+        goal._deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
+        return state
+
+    decide(patch, State.EXECUTING, Event.STATUS, seen)
 
 
 @mutation

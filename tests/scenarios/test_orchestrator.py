@@ -462,6 +462,30 @@ def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
 
 
 @pytest.mark.chaos
+def test_what_a_killed_container_left_is_found_by_its_name(
+    launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
+) -> None:
+    """SIGKILL to an orchestrator of another machine's name; cleanup without it, and with it"""
+    journal = serve("*:slow=10")
+    there = {"BT_ACTIONS_MACHINE": "another container"}
+    run = launch("run", str(tree(name, distance=9.0)), environment=there)
+    run.line("executing on")
+    journal.wait_for("accepted")
+    run.send(signal.SIGKILL)
+    run.wait()
+    here = launch("cleanup", "--look", "3")
+    assert here.wait() == 0, here
+    assert any(line.startswith("not touched: ") for line in here.errors), here
+    assert here.lines[-1].startswith("nothing of this machine was left behind on the ")
+    assert journal.ends() == [None]
+    again = launch("cleanup", "--look", "3", environment=there)
+    assert again.wait() == 0, again
+    assert journal.ends() == ["canceled"]
+    record.shows = "asked to cancel by the second cleanup only"
+    record.outcome = "named, and not touched; then canceled"
+
+
+@pytest.mark.chaos
 def test_cleanup_first_cancels_before_the_tree_starts(
     launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
 ) -> None:
