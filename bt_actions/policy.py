@@ -146,8 +146,8 @@ class Retry:
     itself in both directions. `when` is asked with the result of an attempt that has one (a
     callable, or an expression over ``result``); without it every outcome in `outcomes` is retried.
 
-    Whatever is in `outcomes`: nothing is tried again beside a goal whose end is UNKNOWN, or (without
-    SERVER_LOST among them) SERVER_GONE, and nothing that has succeeded, but for UNEXPECTED_RESULT.
+    Whatever is in `outcomes`: nothing is tried again beside a goal whose end is UNKNOWN, nor,
+    unless SERVER_LOST is among them, SERVER_GONE; what has SUCCEEDED, only for UNEXPECTED_RESULT.
 
     Raises ValueError when a field is out of its range, or an outcome can never be retried.
     """
