@@ -65,6 +65,7 @@ class Line:
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
         self._warned_crowd = False
+        self._warned_take = False
         for ticket in traffic.domain.take_lost(name, action_type):
             ticket.line, ticket.traffic, ticket.was_gone = self, traffic, True
             self.goals[ticket.goal.id] = ticket
@@ -154,7 +155,7 @@ class Line:
             goal = ticket.goal
             if ticket.paused_at is None or goal.sent:
                 if goal.sent and goal.due_in(self.traffic.clocks.now()) == 0.0:
-                    self.client.pump()
+                    self.pump()
                 self._apply(ticket, goal.poll, None)
 
     def _apply(
@@ -204,6 +205,15 @@ class Line:
                 self.tell(ticket, Event.SEND_FAILED, error)
             else:
                 log.warning(f"{self.name}: {command.name} could not be sent: {error!r}")
+
+    def pump(self) -> None:
+        """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
+        try:
+            self.client.pump()
+        except Exception as error:  # noqa: BLE001 - the middleware's: any
+            if not self._warned_take:
+                self._warned_take = True
+                log.error(f"{self.name}: something that arrived could not be taken: {error!r}")
 
     def close_book(self, goal: Goal) -> None:
         """Know nothing of this goal any more, and mind only what is left."""
@@ -407,7 +417,7 @@ class Line:
             if was_gone and not gone:
                 self.tell(ticket, Event.SERVER_RETURNED)
         elif gone:
-            self.client.pump()  # its last words
+            self.pump()  # its last words
             how = "was restarted" if watch.gids else "went away"
             self.tell(ticket, Event.SERVER_LOST, f"{self.name} {how} under the goal")
         elif not watch.changed(ticket.sent_to):
@@ -453,7 +463,7 @@ class Line:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
         if self.orphaned or self._sight is not None:
-            self.client.pump()
+            self.pump()
             if not all(ticket.accounted_for for ticket in self.goals.values()):
                 wait = min(wait, PUMP_EVERY)
         for ticket in list(self.goals.values()):

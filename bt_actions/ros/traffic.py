@@ -281,7 +281,7 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     while waits and time.monotonic() < deadline and not hurry():
         with lock:
             for line in {ticket.line for ticket in waits}:
-                line.client.pump()
+                line.pump()
             for ticket in waits:
                 ticket.line.poll(ticket)
             waits = [ticket for ticket in waits if not ticket.accounted_for]

@@ -9,6 +9,7 @@ from py_trees.common import Status
 
 from bt_actions import MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.behaviours import action
+from tests.support.trees import state, together
 from tests.support.waiting import until
 
 
@@ -83,3 +84,23 @@ def test_a_loop_that_stands_still_is_not_told_of_another_type(
     assert leaf.reason.endswith("is in sight, but was not ready, or has requests enough to answer")
     leaf.shutdown()
     host.close_server(name)
+
+
+def test_an_answer_that_cannot_be_taken_keeps_no_other_goal_from_being_canceled(
+    host: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    def broken() -> None:
+        raise RuntimeError("of a type from another build")
+
+    journals = [host.open(f"{name}_{which}") for which in ("broken", "sound")]
+    leaves = [MoveRobot(which, 9.0, action_name=f"{name}_{which}") for which in ("broken", "sound")]
+    with TreeRunner(together(*leaves), node=node) as runner:
+        runner.start()
+        until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
+        monkeypatch.setattr(leaves[0]._line.client, "pump", broken)
+    assert [journal.ends() for journal in journals] == [["canceled"], ["canceled"]]
+    told: list[str] = []  # by the log's own thread
+    until(lambda: "not be taken: RuntimeError('of a type" in "".join(told),
+          meanwhile=lambda: told.append(capfd.readouterr().err))  # fmt: skip
+    for which in ("broken", "sound"):
+        host.close_server(f"{name}_{which}")
