@@ -89,6 +89,8 @@ class Sight:
             context.try_shutdown()
             raise
         self.users: set[Seeker] = set()
+        self.looking = True
+        """A look goes on in it, which must not find it closed."""
         self.closed = False
         self._context = context
         with lock:
@@ -101,13 +103,13 @@ class Sight:
     def left_by(self, user: Seeker) -> None:
         """Close it when nobody uses it any more; on another thread, as the caller has the lock."""
         self.users.discard(user)
-        if not self.users:
+        if not self.users and not self.looking:
             _start(self.close)  # or else at exit
 
     def close(self) -> None:
         """Take the participant away, unless somebody uses it by now."""
         with lock:
-            if self.closed or (self.users and not _closing):
+            if self.closed or ((self.users or self.looking) and not _closing):
                 return
             self.closed = True
             _sights.discard(self)
@@ -201,8 +203,8 @@ class Lookout:
     def _look(self) -> bool:
         """Make a participant, and wait until clients in it are ready that ours are missing."""
         sight = Sight(self._domain)
+        look = _Look(sight)
         try:
-            look = _Look(sight)
             until = time.monotonic() + LASTS
             while time.monotonic() < until:
                 with lock:
@@ -211,11 +213,13 @@ class Lookout:
                 if not lines:
                     break
                 time.sleep(GLANCE)
+        finally:
             with lock:
                 look.clear_up()
-        finally:
+                sight.looking = False
+                found = bool(sight.users)
             sight.close()
-        return bool(sight.users)
+        return found
 
 
 class _Look:

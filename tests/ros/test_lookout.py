@@ -132,6 +132,7 @@ class TestMoves:
         leaf = MoveRobot("keeps the line", 0.1, action_name=name)
         leaf.setup(node=node)
         sight = Sight(_domain(node).number)
+        sight.looking = False
         with lock:
             leaf._line.move_to(sight, leaf._line.client_in(sight))
         yield leaf._line
@@ -183,6 +184,48 @@ class TestMoves:
         assert not sight.closed
         self.goes(name, node)
         sight.close()
+
+
+def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
+    name: str, node: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its goal is soon done; it still counts as missing, and is looked for on."""
+    from action_msgs.msg import GoalStatusArray
+
+    class Seeker:
+        status_topic = f"{name}/_action/status"
+        tried = 0
+
+        def misses(self) -> bool:
+            return True
+
+        def is_waited_for(self) -> bool:
+            return True
+
+        def client_in(self, sight: Sight) -> Any:
+            self.sight = sight
+            self.tried += 1
+            return self
+
+        def server_is_ready(self) -> bool:
+            return True
+
+        def move_to(self, sight: Sight, client: Any) -> None:
+            sight.users.add(self)
+            sight.left_by(self)
+
+        def destroy(self) -> None:
+            assert not self.sight.closed
+
+    monkeypatch.setattr(lookout, "LASTS", 3.0)
+    publisher = node.create_publisher(GoalStatusArray, Seeker.status_topic, 1)
+    seeker = Seeker()
+    looks = lookout.Lookout(_domain(node).number)
+    looks._missing = {seeker}
+    assert looks._look() is False
+    assert seeker.tried > 1
+    assert seeker.sight.closed
+    node.destroy_publisher(publisher)
 
 
 def test_an_action_that_had_a_server_once_is_looked_for(
