@@ -94,13 +94,11 @@ class Attempts:
         return max(0.0, resume_at - now.ros)
 
     def _worth_it(self, record: AttemptRecord) -> bool:
-        if record.end is End.UNKNOWN:
-            return False  # it may still be running: a second one beside it is what must not be
-        if record.end is End.SERVER_GONE and Outcome.SERVER_LOST not in self.retry.outcomes:
-            return False  # the same, whatever it was canceled for before its server went
-        if record.end is End.SUCCEEDED and record.outcome is not Outcome.UNEXPECTED_RESULT:
-            return False  # it was done, though the result came to nobody: not twice
         if record.outcome not in self.retry.outcomes:
+            return False
+        why_not = self._why_not(record)
+        if why_not:
+            record.reason += f" (not tried again: {why_not})"
             return False
         if self._when is not None and record.result is not None:
             try:
@@ -109,3 +107,13 @@ class Attempts:
                 record.reason += f" (not tried again: retry.when raised {error!r})"
                 return False
         return True
+
+    def _why_not(self, record: AttemptRecord) -> str:
+        """Why nothing is tried again beside a goal, or after it, whatever its outcome; or ""."""
+        if record.end is End.UNKNOWN:
+            return "it may still be running"
+        if record.end is End.SERVER_GONE and Outcome.SERVER_LOST not in self.retry.outcomes:
+            return "its server went away, and it may still be running there"
+        if record.end is End.SUCCEEDED and record.outcome is not Outcome.UNEXPECTED_RESULT:
+            return "it has succeeded, though its result was lost"
+        return ""

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from bt_actions.goal import TABLE, Row
 from bt_actions.goal_terms import Command, Event, State
+from bt_actions.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Outcome
 
 PATH = Path(__file__).resolve().parent.parent / "docs" / "goal.md"
 
@@ -27,6 +28,31 @@ anything: it is counted and dropped.
 
 An arrow for SERVER_LOST into CANCELING may surprise: the leaf is free at once, and the goal is kept
 in mind, because a server that was only out of reach may come back with the goal still running.
+"""
+OUTCOMES = {
+    Outcome.SUCCEEDED: "the server succeeded, and `expect` holds",
+    Outcome.UNEXPECTED_RESULT: "the server succeeded, but `expect` does not hold",
+    Outcome.REJECTED: "the server refused the goal",
+    Outcome.ABORTED: "the server gave up; its result is kept",
+    Outcome.CANCELED: "this process stopped it, or replaced it, whatever status it ended with",
+    Outcome.CANCELED_BY_OTHER: "it ended as canceled, and this process had not asked for it",
+    Outcome.SERVER_UNAVAILABLE: "no server within `timeout.server`",
+    Outcome.SERVER_AMBIGUOUS: "two live servers under the name: it would be executed twice",
+    Outcome.SERVER_BUSY: "the resource was not free within `timeout.queue`, or `busy: fail`",
+    Outcome.ACCEPT_TIMEOUT: "no answer within `timeout.accept`; it may have been executed",
+    Outcome.RESULT_TIMEOUT: "not finished within `timeout.result`, and canceled",
+    Outcome.STALLED: "no feedback for `timeout.feedback`, and canceled",
+    Outcome.SERVER_LOST: "the server died or was restarted under the goal",
+    Outcome.INVALID_GOAL: "the message could not be built; nothing was sent",
+}
+ENDS = """\
+How a goal stands on its server is its *end*: SUCCEEDED, ABORTED or CANCELED as the server said,
+NEVER_STARTED where nothing was begun, SERVER_GONE where the server went away with it, and UNKNOWN,
+which is logged, is in the report, and makes the exit code 3.
+
+Whatever `retry.outcomes` names, nothing is tried again beside a goal whose end is UNKNOWN; nor
+where it is SERVER_GONE, unless SERVER_LOST is named; nor what has SUCCEEDED, but for
+UNEXPECTED_RESULT.
 """
 STATES = {
     State.QUEUED: "It waits for its resources.",
@@ -73,9 +99,19 @@ def table(state: State) -> str:
     return "\n".join(lines)
 
 
+def outcomes() -> str:
+    """Return why a leaf may stop, and what is tried again, as a table."""
+    lines = ["| outcome of a leaf | when | tried again |", "|---|---|---|"]
+    for outcome in Outcome:
+        again = "by default" if outcome in RETRIED_BY_DEFAULT else ""
+        again = "if named" if outcome in RETRIED_IF_NAMED else again
+        lines.append(f"| {outcome} | {OUTCOMES[outcome]} | {again} |")
+    return "\n".join(lines)
+
+
 def page() -> str:
     """Return the whole page."""
-    parts = [HEAD, diagram(), "## States"]
+    parts = [HEAD, diagram(), "## Outcomes and ends", outcomes(), ENDS, "## States"]
     for state in State:
         parts += [f"### {state.value}", STATES[state], table(state)]
     parts += ["## Events", "| event | meaning |\n|---|---|"]
