@@ -86,7 +86,7 @@ class Goal:
         self.late = False
         """The result came while the goal was already being canceled for a deadline."""
         self.lost = False
-        """The server went away under the goal; should it come back, the goal is canceled first."""
+        """Its server went away, or our node did; where both meet again, it is canceled first."""
         self.waited_for = False
         """The end of its tree was held up for it, in vain; nobody waits for it again, unless its
         server comes back."""
@@ -439,6 +439,8 @@ class Goal:
         return self._forgotten()
 
     def _forgotten(self) -> State:
+        if self._seen_status is None:
+            self._commands.append(Command.CANCEL)  # should it run all the same
         self._settle_as_planned()
         self._settle(Outcome.SERVER_LOST, f"{self.server} no longer knows the goal it accepted")
         return self._finished_by_status()
@@ -608,6 +610,21 @@ class Goal:
             self.end = End.UNKNOWN  # canceled if it turns up all the same
         return State.CANCELING
 
+    def _left(self, now: Now, detail: Any) -> State:
+        """Keep it in mind as if its server were lost; what is not known stays UNKNOWN."""
+        if self.lost:
+            return self.state
+        self._settle_as_planned()
+        self._settle(Outcome.CANCELED, "its node was closed")
+        if self._seen_status is not None:
+            return self._finished_by_status()
+        if self.suspect:
+            self.end = End.UNKNOWN
+        self.lost = True
+        self._deadlines.clear()
+        self._release()
+        return State.CANCELING
+
     def _close_unsent(self, now: Now, detail: Any) -> State:
         """Give up: CANCELED."""
         return self._give_up_unsent(Outcome.CANCELED, "the process ended")
@@ -731,6 +748,7 @@ def _table() -> dict[tuple[State, Event], Row]:
         decided[state, Event.SERVER_CHANGED] = (Goal._ask_changed_server, {state})
         decided[state, Event.SERVER_LOST] = (Goal._lose, {canceling, done})
     for state in (sending, executing, canceling):
+        decided[state, Event.LEFT] = (Goal._left, {canceling, done})
         decided[state, Event.CLOSED] = (Goal._close, {done})
     table = {}
     for state in State:

@@ -62,6 +62,7 @@ class Event(Enum):
     INTERRUPTED = "the tree no longer wants it"
     REPLACED = "a newer goal of this process was accepted in its place"
     DRAINED = "it was waited for long enough: what is not known stays so"
+    LEFT = "its node goes, and the process stays: somebody else has to see to it"
     CLOSED = "the process ends: give up"
     QUEUE_DUE = "timeout.queue has passed"
     SERVER_DUE = "timeout.server has passed"

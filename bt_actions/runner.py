@@ -208,12 +208,14 @@ class TreeRunner:
     def wait(self, timeout: float | None = None) -> Status:
         """Wait for a tree that was started, and return or raise what `run` would.
 
+        Signals take effect as in `run` while this waits on the main thread, and not before.
         Raises TimeoutError when it is still running after `timeout` seconds; it goes on.
         """
         thread = self._thread
         if thread is None:
             raise RuntimeError("nothing to wait for: the tree has not been started")
-        thread.join(timeout)
+        with self._mind_signals():
+            thread.join(timeout)
         if thread.is_alive():
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s")
         self._thread = None

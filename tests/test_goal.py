@@ -665,6 +665,27 @@ def test_feedback_clears_the_doubt() -> None:
     assert life.goal.state is State.EXECUTING
 
 
+def test_a_goal_that_its_server_denies_is_canceled_all_the_same() -> None:
+    life = executing()
+    assert [life.on(Event.RESULT_UNKNOWN) for _ in range(DOUBTS - 1)] == [[]] * (DOUBTS - 1)
+    assert life.on(Event.RESULT_UNKNOWN) == [CANCEL, RELEASE]
+    life.ended(Outcome.SERVER_LOST, End.UNKNOWN)
+
+
+@pytest.mark.parametrize("make", [sending, executing, suspect])
+def test_what_its_node_leaves_is_canceled_where_its_server_is_seen_again(make: Any) -> None:
+    life = make()
+    life.on(Event.INTERRUPTED)
+    assert life.on(Event.LEFT) == [RELEASE]
+    life.is_free(Outcome.CANCELED, End.UNKNOWN)
+    assert life.due_in is None
+    assert life.on(Event.LEFT) == []
+    assert CANCEL in life.on(Event.SERVER_RETURNED)
+    assert life.goal.owed
+    life.on(Event.RESULT, CANCELED)
+    assert (life.goal.state, life.goal.end) == (State.DONE, End.CANCELED)
+
+
 def test_a_canceled_goal_that_the_server_has_forgotten_ends() -> None:
     life = executing()
     life.on(Event.INTERRUPTED)

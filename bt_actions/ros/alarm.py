@@ -53,6 +53,13 @@ def minded() -> list[Attended]:
         return list(_open)
 
 
+def disown() -> None:
+    """In the child of a fork: nothing that is minded is ours, and the thread is not here."""
+    global _thread
+    _open.clear()
+    _thread = None
+
+
 def wake_by(moment: float) -> None:
     """See to it that the alarm is awake at `moment` (steady clock); the caller holds the lock."""
     global _wakes_at

@@ -66,10 +66,7 @@ class Line:
         self._last_probes: deque[int] = deque()
         self._warned_crowd = False
         self._warned_take = False
-        for ticket in traffic.domain.take_lost(name, action_type):
-            ticket.line, ticket.traffic, ticket.was_gone = self, traffic, True
-            self.goals[ticket.goal.id] = ticket
-            alarm.mind(self)
+        self._adopt()
 
     def __repr__(self) -> str:
         return f"<Line {self.name}, {len(self.goals)} goals>"
@@ -339,14 +336,22 @@ class Line:
         same_domain = self.traffic.domain is other.traffic.domain
         return same_domain and self.name == other.name and self.action_type is other.action_type
 
-    def put_away(self) -> None:
-        """Leave lost goals to the next line of this action; give up on those without an answer."""
+    def put_away(self, *, all_of_them: bool = False) -> None:
+        """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
         for ticket in list(self.goals.values()):
-            if ticket.goal.lost:
+            goal = ticket.goal
+            if all_of_them or (goal.outcome is not None and not goal.holding):
+                self.tell(ticket, Event.LEFT)
+            if goal.lost:
                 self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
-                self.close_book(ticket.goal)
-            elif ticket.goal.outcome is not None and not ticket.goal.holding:
-                self.tell(ticket, Event.CLOSED)
+                self.close_book(goal)
+
+    def _adopt(self) -> None:
+        """Take over what was lost, or left, at this action before, to cancel it first."""
+        for ticket in self.traffic.domain.take_lost(self.name, self.action_type):
+            ticket.line, ticket.traffic, ticket.was_gone = self, self.traffic, True
+            self.goals[ticket.goal.id] = ticket
+            alarm.mind(self)
 
     def _bound_the_lost(self) -> None:
         settled = [
@@ -377,6 +382,7 @@ class Line:
             return Server.ABSENT
         before = self.watch.state(now)
         self.watch.observe(now, ready, gids)
+        self._adopt()
         self._take_over()
         if self.watch.wants_probe(now):
             self._probe()
@@ -416,6 +422,8 @@ class Line:
         if goal.lost:
             if was_gone and not gone:
                 self.tell(ticket, Event.SERVER_RETURNED)
+            elif gone and goal.end is End.UNKNOWN:  # it was left, not lost
+                self.tell(ticket, Event.SERVER_LOST, f"{self.name} is gone")
         elif gone:
             self.pump()  # its last words
             how = "was restarted" if watch.gids else "went away"

@@ -49,6 +49,14 @@ class Domain:
         kept.append(ticket)
         del kept[:-LOST_KEPT]
 
+    def lost_with(self, resources: frozenset[str]) -> list[tuple[str, Any]]:
+        """Return the actions of which goals are remembered that had some of these resources."""
+        return [
+            action
+            for action, kept in self._lost.items()
+            if any(ticket.goal.resources & resources for ticket in kept)
+        ]
+
     def take_lost(self, action: str, action_type: Any) -> list[Ticket]:
         """Give them to a new line."""
         return self._lost.pop((action, action_type), [])
@@ -64,6 +72,12 @@ def domain_of(number: int) -> Domain:
         if domain is None:
             domain = _domains[number] = Domain(number)
         return domain
+
+
+def disown() -> None:
+    """In the child of a fork: the goals are the parent's, and nobody is here who has the lock."""
+    lock._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001 - as threading itself does
+    _domains.clear()
 
 
 @dataclass(eq=False, slots=True)

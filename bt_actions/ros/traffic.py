@@ -29,7 +29,7 @@ from bt_actions.goal_ids import new_goal_id
 from bt_actions.goal_terms import Event, State
 from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
-from bt_actions.ros import alarm
+from bt_actions.ros import alarm, shared
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.line import Line, is_valid
 from bt_actions.ros.log import log
@@ -187,6 +187,10 @@ class Traffic:
 
         One that was lost holds nothing any more; should its server be back, it is canceled first.
         """
+        if ticket.goal.busy in (Busy.WAIT, Busy.FAIL):
+            for action, action_type in self.domain.lost_with(ticket.goal.resources):
+                if action not in self._lines:  # another's server, which nobody speaks to any more
+                    self._lines[action] = Line(self, action_type, action)
         lines = ticket.line.neighbors()
         for line in lines:
             line.look_for_lost(ticket)  # all of them first: one may take over another's
@@ -254,7 +258,7 @@ class Traffic:
         with lock:
             lines, self._lines = list(self._lines.values()), {}
             for line in lines:
-                line.put_away()
+                line.put_away(all_of_them=True)
                 for ticket in list(line.goals.values()):
                     line.tell(ticket, Event.CLOSED)
                 line.close()
@@ -316,6 +320,8 @@ def _close_at_exit() -> None:
 def _disown() -> None:
     """In the child of a fork: the goals are the parent's, and so is what guards them."""
     atexit.unregister(_close_at_exit)
+    alarm.disown()
+    shared.disown()
 
 
 os.register_at_fork(after_in_child=_disown)

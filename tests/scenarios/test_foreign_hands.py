@@ -9,7 +9,9 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import threading
 import time
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -18,8 +20,11 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
-from bt_actions import End, MoveRobot, Outcome, Timeouts
+from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
+from bt_actions.ros import alarm, shared
+from bt_actions.ros.shared import lock
 from tests.support.processes import PATIENCE, Host, Journal, Process
+from tests.support.reliability import Record
 from tests.support.trees import state, together
 from tests.support.waiting import until
 
@@ -71,7 +76,7 @@ def programs(session_host: Host) -> Iterator[dict[str, Program]]:
     """All programs, started at once: they spend their time with starting."""
     names = [*END_BY_THEMSELVES, *TO_SUCCEED, "just_end_soon"]
     names += [f"{each} {number}" for each in END_BY_A_SIGNAL for number in ("INT", "TERM")]
-    names += [f"{each} INT" for each in RUNNERS]
+    names += [f"{each} {number}" for each in RUNNERS for number in ("INT", "TERM")]
     started: dict[str, Program] = {}
     with contextlib.ExitStack() as stack:
         for number, name in enumerate(names):
@@ -116,15 +121,17 @@ def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
     assert journal.ends() == ["canceled"], process
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["INT", "TERM"])
 @pytest.mark.parametrize("name", RUNNERS)
 def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
-    programs: dict[str, Program], name: str
+    programs: dict[str, Program], name: str, number: signal.Signals
 ) -> None:
-    process, journal = programs[f"{name} INT"].process, programs[f"{name} INT"].journal
+    program = programs[f"{name} {number.name.removeprefix('SIG')}"]
+    process, journal = program.process, program.journal
     process.line("executing", within=60.0)
-    process.send(signal.SIGINT)
+    process.send(number)
     code = process.wait()
-    assert code in (130, -signal.SIGINT), process
+    assert code in (128 + number, -number), process
     assert journal.ends() == ["canceled"], process
 
 
@@ -215,6 +222,68 @@ def test_a_goal_left_behind_by_a_visit_before_is_drained_too(
     assert not leaf.drained
     tree.shutdown()
     assert leaf.drained
+    assert journal.ends() == ["canceled"]
+    host.close_server(name)
+
+
+@pytest.mark.parametrize("queued", [False, True], ids=["afterwards", "in the queue"])
+def test_what_a_runner_leaves_is_waited_for_by_another(
+    host: Host, name: str, domain: int, queued: bool, record: Record
+) -> None:
+    """A goal that refuses to be canceled; its runner is shut down; another runner of the process"""
+    journal = host.open(name, "1:reject_cancel")
+    first = MoveRobot("first", 4.0, action_name=name, timeout=Timeouts(result=0.5, cancel=0.5))
+    second = MoveRobot("second", 0.3, action_name=name, timeout=Timeouts(queue=30.0, server=30.0))
+    runner, other = TreeRunner(first), TreeRunner(second)
+    runner.start()
+    until(lambda: state(first) == "EXECUTING")
+    if queued:
+        other.start()
+    assert runner.wait(9.0) is Status.FAILURE
+    assert (first.outcome, first.end) == (Outcome.RESULT_TIMEOUT, End.UNKNOWN)
+    assert queued == (state(second) == "QUEUED")
+    runner.shutdown()
+    assert journal.ends() == [None]
+    if not queued:
+        other.start()
+    assert other.wait(30.0) is Status.SUCCESS
+    other.shutdown()
+    assert journal.ends() == ["succeeded", "succeeded"]
+    assert journal.max_live == 1
+    assert first.end is End.SUCCEEDED
+    host.close_server(name)
+    record.outcome = "UNKNOWN; the other runner sent only when it had ended"
+
+
+def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
+    host: Host, name: str, node: Any
+) -> None:
+    """Another thread has the one lock at that moment"""
+    journal = host.open(name)
+    leaf = MoveRobot("m", 9.0, action_name=name)
+    held, over = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with lock:
+            held.set()
+            over.wait(9.0)
+
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        until(lambda: state(leaf) == "EXECUTING")
+        holder = threading.Thread(target=hold)
+        holder.start()
+        held.wait(9.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
+            pid = os.fork()
+        if pid == 0:
+            minds = lock.acquire(timeout=5.0) and not alarm.minded() and not shared._domains
+            os._exit(0 if minds else 1)
+        assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+        over.set()
+        holder.join()
+        assert alarm.minded()
     assert journal.ends() == ["canceled"]
     host.close_server(name)
 

@@ -230,6 +230,56 @@ class TestStopped:
         record.outcome = "SERVER_LOST; back: canceled first, though its run had ended"
 
     @pytest.mark.chaos
+    def test_stopped_and_back_for_a_runner_that_was_there_before(
+        self, new_host: HostFactory, name: str, domain: int, record: Record
+    ) -> None:
+        """SIGSTOP beyond the lease; its run ends; SIGCONT; another runner has used it already"""
+        host = new_host()
+        journal = host.open(name)
+        timeouts = Timeouts(server=20.0)
+        first = MoveRobot("first", 9.0, action_name=name, timeout=timeouts)
+        second = MoveRobot("second", 0.3, action_name=name, timeout=timeouts)
+        other = TreeRunner(second)
+        assert other.run(20.0) is Status.SUCCESS
+        with TreeRunner(first) as runner:
+            runner.start()
+            until(lambda: first.progress().feedback is not None)
+            host.send(signal.SIGSTOP)
+            assert runner.wait(20.0) is Status.FAILURE
+        assert stood(first) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+        host.send(signal.SIGCONT)
+        assert other.run(30.0) is Status.SUCCESS
+        other.shutdown()
+        assert journal.max_live == 1
+        assert journal.ends() == ["succeeded", "canceled", "succeeded"]
+        record.outcome = "SERVER_LOST; back: canceled first, by the other runner"
+
+    @pytest.mark.chaos
+    def test_stopped_and_back_while_another_runner_uses_its_resource(
+        self, new_host: HostFactory, name: str, domain: int, record: Record
+    ) -> None:
+        """SIGSTOP beyond the lease; its run ends; SIGCONT; a new run, another server of one arm"""
+        hosts = [new_host(), new_host()]
+        journals = [hosts[which].open(f"{name}_{which}") for which in range(2)]
+        timeouts = Timeouts(server=20.0)
+        first, second = (
+            MoveRobot("m", 9.0 if which == 0 else 0.3, action_name=f"{name}_{which}",
+                      resources={"arm"}, timeout=timeouts)
+            for which in range(2)
+        )  # fmt: skip
+        with TreeRunner(first) as runner:
+            runner.start()
+            until(lambda: first.progress().feedback is not None)
+            hosts[0].send(signal.SIGSTOP)
+            assert runner.wait(20.0) is Status.FAILURE
+        hosts[0].send(signal.SIGCONT)
+        with TreeRunner(second) as runner:
+            assert runner.run(30.0) is Status.SUCCESS
+            journals[0].wait_for("canceled")
+        assert [journal.ends() for journal in journals] == [["canceled"], ["succeeded"]]
+        record.outcome = "SERVER_LOST; back: canceled, though nobody speaks to its server any more"
+
+    @pytest.mark.chaos
     def test_stopped_and_back_while_another_server_has_its_resource(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
