@@ -76,6 +76,7 @@ Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, 
 may hold `.inf` and `.nan`; inputs are finite. A mapping that is written out
 (`set: {{stop: {{at: 2.0}}}}`, the items of a `for_each`) has the keys that it was written with
 (`$stop.at`), and may fill a message.
+The names of nodes are taken as they stand.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
 `abs`, `min` and `max`, `true` and `false`, and constants (`MoveRobot.Result.STATUS_FAULT`). In

@@ -30,7 +30,7 @@ from bt_actions.document.values import (
 )
 from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
 from bt_actions.expression import ExpressionError
-from bt_actions.ros.fields import FieldType, Message, Record
+from bt_actions.ros.fields import Either, FieldType, Message, Record
 from bt_actions.suggest import closest, listing
 
 __all__ = ["Checker", "Read"]
@@ -298,6 +298,9 @@ class Checker:
                 given = self.expression(item, {})
                 said = item.expression.text.strip()
                 if not fits(given, wanted):
+                    if isinstance(given, Either):
+                        given = next(kind for kind in given.kinds if not fits(kind, wanted))
+                        said = f"in one item {said}"
                     text = f"{named(wanted)} is needed, and {said} is {named(given)}"
                     self.source.report("BT204", span_of(item.node), text)
                 elif isinstance(given, Record) and isinstance(wanted, Message):

@@ -14,6 +14,7 @@ from bt_actions.ros.conveniences import UnknownClass
 from bt_actions.ros.fields import (
     FLOATS,
     INTEGERS,
+    Either,
     FieldType,
     Listing,
     Message,
@@ -44,7 +45,7 @@ def infer(
 
     With `types=False` no constant of a message is looked up.
     """
-    return _Inference(expression, roots, variable, report, types).type_of(expression.tree)
+    return _Inference(expression, roots, variable, report, types).any_type_of(expression.tree)
 
 
 def type_of_literal(value: object) -> FieldType | None:
@@ -57,25 +58,42 @@ def type_of_literal(value: object) -> FieldType | None:
         return FLOAT
     if isinstance(value, list):
         same = common_type([type_of_literal(item) for item in value])
-        return None if same is None else Listing(same, size=len(value))
+        return None if same is None or isinstance(same, Either) else Listing(same, size=len(value))
     if isinstance(value, dict):
         return Record(tuple((str(name), type_of_literal(item)) for name, item in value.items()))
     return TEXT if isinstance(value, str) else None
 
 
 def common_type(kinds: Sequence[FieldType | None]) -> FieldType | None:
-    """The type of an item of a list whose items have these types, if there is one.
+    """The type of an item of a list whose items have these types; None where one is not known.
 
-    Where all are records, it is one with the keys of all; a key has a type where all agree on it.
+    Where all are records, it is one with the keys of all.
     """
-    records = [kind for kind in kinds if isinstance(kind, Record)]
-    if not records or len(records) < len(kinds):
-        return kinds[0] if len(set(kinds)) == 1 else None
+    known = [kind for kind in dict.fromkeys(kinds) if kind is not None]
+    if not known or None in kinds:
+        return None
+    records = [kind for kind in known if isinstance(kind, Record)]
+    if len(records) == len(known):
+        return _merged(records)
+    lists = [kind for kind in known if isinstance(kind, Listing)]
+    if len(lists) == len(known):
+        item = common_type([kind.item for kind in lists])
+        sizes = {kind.size for kind in lists}
+        size = sizes.pop() if len(sizes) == 1 else None
+        return None if item is None or isinstance(item, Either) else Listing(item, size=size)
+    return known[0] if len(known) == 1 else Either(tuple(known))
+
+
+def _merged(records: Sequence[Record]) -> Record:
     keys: dict[str, list[FieldType | None]] = {}
-    for record in set(records):
+    for record in records:
         for name, kind in record.items:
             keys.setdefault(name, []).append(kind)
-    return Record(tuple((name, common_type(found)) for name, found in keys.items()))
+    sometimes = {name for name, found in keys.items() if len(found) < len(records)}
+    return Record(
+        tuple((name, common_type(found)) for name, found in keys.items()),
+        frozenset(sometimes.union(*(record.sometimes for record in records))),
+    )
 
 
 def named(kind: FieldType | None) -> str:
@@ -108,6 +126,12 @@ class _Inference:
         self._report = report
 
     def type_of(self, node: ast.expr) -> FieldType | None:
+        """The one type that a part has, or None."""
+        kind = self.any_type_of(node)
+        return None if isinstance(kind, Either) else kind
+
+    def any_type_of(self, node: ast.expr) -> FieldType | None:
+        """As `type_of`, or one of several."""
         match node:
             case ast.Constant(value=value):
                 return type_of_literal(value)
@@ -116,7 +140,7 @@ class _Inference:
             case ast.Attribute() if (constant := self._expression.constant_of(node)) is not None:
                 return self._constant(node, constant)
             case ast.Attribute(value=inner, attr=attr):
-                return self._field(node, self.type_of(inner), attr)
+                return self._field(node, self.any_type_of(inner), attr)
             case ast.Subscript(value=inner, slice=index):
                 return self._item(node, self.type_of(inner), index)
             case ast.UnaryOp(op=ast.Not(), operand=inner):
@@ -144,7 +168,7 @@ class _Inference:
 
     def _wrong(self, node: ast.expr, message: str, code: str = "BT206") -> None:
         start, end = self._expression.span(node)
-        if code == "BT203" and isinstance(node, ast.Attribute):
+        if code in ("BT203", "BT313") and isinstance(node, ast.Attribute):
             start = max(start, end - len(node.attr))
         self._report(code, message, start, end)
 
@@ -170,8 +194,10 @@ class _Inference:
     def _field(self, node: ast.expr, owner: FieldType | None, name: str) -> FieldType | None:
         if owner is None:
             return None
+        if isinstance(owner, Either):
+            return common_type([self._field(node, kind, name) for kind in owner.kinds])
         if isinstance(owner, Record):
-            return self._key(node, dict(owner.items), name)
+            return self._key(node, owner, name)
         if not isinstance(owner, Message):
             self._wrong(node, f"{named(owner)} has no field {name!r}", "BT203")
             return None
@@ -186,13 +212,23 @@ class _Inference:
         self._wrong(node, f"{short_name(owner.cls)} has no field {name!r}{near}", "BT203")
         return None
 
-    def _key(
-        self, node: ast.expr, known: Mapping[str, FieldType | None], name: str
-    ) -> FieldType | None:
+    def _key(self, node: ast.expr, owner: Record, name: str) -> FieldType | None:
+        known = dict(owner.items)
         if name not in known:
             near = did_you_mean(name, known) or (f"; it has {', '.join(known)}" if known else "")
             self._wrong(node, f"this mapping has no key {name!r}{near}", "BT203")
+        elif name in owner.sometimes and not self._asks_for(name):
+            self._wrong(node, f"not every item has the key {name!r}", "BT313")
         return known.get(name)
+
+    def _asks_for(self, name: str) -> bool:
+        """Whether the expression asks if a key is there: ``'quick' in $item and $item.quick``."""
+        return any(
+            isinstance(part, ast.Compare)
+            and isinstance(part.left, ast.Constant)
+            and part.left.value == name
+            for part in ast.walk(self._expression.tree)
+        )
 
     def _item(self, node: ast.expr, owner: FieldType | None, index: ast.expr) -> FieldType | None:
         kind = self.type_of(index)

@@ -370,6 +370,14 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("inputs: {limit: float64}\nroot:\n  for_each: Item\n  in: [1.0, 2.0]\n"
                   "  as: value\n  child: {check: $limit > $value}\n"),
         ),
+        "BT313": Page(
+            "The items of a list are mappings, and this key is not in every one of them; what "
+            "reads it fails there. Where that is meant, ask first: 'at' in $item and $item.at > 1.",
+            _tree("root:\n  for_each: Stop\n  in: [{at: 1.0}, {to: 2.0}]\n"
+                  "  child: {check: $item.at > 0.0}\n"),
+            _tree("root:\n  for_each: Stop\n  in: [{at: 1.0}, {at: 2.0}]\n"
+                  "  child: {check: $item.at > 0.0}\n"),
+        ),
     }
 )  # fmt: skip
 """The page of each rule by its code."""

@@ -81,6 +81,7 @@ RULES = MappingProxyType(
             _warning("BT310", "a variable that nothing reads"),
             _warning("BT311", "an output that nothing writes"),
             _warning("BT312", "a loop's item under a name that is taken"),
+            _warning("BT313", "a key that not every item has"),
         )
     }
 )

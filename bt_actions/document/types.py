@@ -8,7 +8,16 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Record, Scalar
+from bt_actions.ros.fields import (
+    FLOATS,
+    INTEGERS,
+    Either,
+    FieldType,
+    Listing,
+    Message,
+    Record,
+    Scalar,
+)
 from bt_actions.suggest import did_you_mean
 
 if TYPE_CHECKING:
@@ -78,6 +87,8 @@ def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
     """Whether a value of one type can be put where another is needed; unknown types fit."""
     if given is None or wanted is None:
         return True
+    if isinstance(given, Either):
+        return all(fits(kind, wanted) for kind in given.kinds)
     if isinstance(wanted, Message):
         return _fills(given, wanted.cls)
     if isinstance(wanted, Listing):

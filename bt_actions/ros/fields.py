@@ -17,6 +17,7 @@ from bt_actions.ros.interfaces import short_name
 __all__ = [
     "FLOATS",
     "INTEGERS",
+    "Either",
     "FieldType",
     "Listing",
     "Message",
@@ -86,13 +87,25 @@ class Record:
     """A mapping that a tree writes out: its keys, with their types where they are known."""
 
     items: tuple[tuple[str, FieldType | None], ...]
+    sometimes: frozenset[str] = frozenset()
+    """Keys that not every one of several mappings has."""
 
     def __str__(self) -> str:
         return "mapping"
 
 
-FieldType = Scalar | Message | Listing | Record
-"""What a value is. No field of a message is a record: one is inferred, and never asked for."""
+@dataclass(frozen=True, slots=True)
+class Either:
+    """One of several types: that of an item of a list that a tree writes out."""
+
+    kinds: tuple[FieldType, ...]
+
+    def __str__(self) -> str:
+        return " or ".join(map(str, self.kinds))
+
+
+FieldType = Scalar | Message | Listing | Record | Either
+"""What a value is. The last two are inferred; no field of a message asks for them."""
 
 
 @lru_cache(maxsize=4096)
