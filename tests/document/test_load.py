@@ -302,8 +302,8 @@ def test_a_subtree_that_is_given_no_mapping_fails_and_says_why(load: Load) -> No
         tree: t
         root:
           for_each: E
-          in: [{home: 1.0}, 5]
-          child: {subtree: inner.yaml, with: $item}
+          in: [[{home: 1.0}], [5]]     # items of items, whose types nobody follows
+          child: {subtree: inner.yaml, with: "$item[0]"}
         """,
         inner="tree: inner\ninputs: {home: float64}\nroot: {check: $home > 0.5}\n",
     )
