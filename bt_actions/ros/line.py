@@ -255,6 +255,8 @@ class Line:
             return False
         if now - self.traffic.seen_since < TOO_NEW:
             return False
+        if self.users <= 0 and all(ticket.goal.lost for ticket in self.goals.values()):
+            return False  # nobody here wants it; it is remembered, as what is put away is
         domain = self.traffic.domain
         known = domain.lost_sight or (self.name, self.action_type) in domain.known
         absent = self.watch.state(now) is Server.ABSENT

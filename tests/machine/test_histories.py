@@ -36,6 +36,7 @@ def test_the_histories_come_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
         (State.CANCELING, Event.SEND_FAILED),
         (State.DONE, Event.REPLACED),
     }
+    unreached -= {(state, Event.LEFT) for state in State}  # the nodes here stay; see test_goal.py
     unseen: set[object] = {*Outcome, *End} - {Outcome.UNEXPECTED_RESULT}  # which a leaf decides
 
     def on(goal: Goal, event: Event, *details: object) -> object:
