@@ -76,7 +76,7 @@ def programs(session_host: Host) -> Iterator[dict[str, Program]]:
     """All programs, started at once: they spend their time with starting."""
     names = [*END_BY_THEMSELVES, *TO_SUCCEED, "just_end_soon"]
     names += [f"{each} {number}" for each in END_BY_A_SIGNAL for number in ("INT", "TERM")]
-    names += [f"{each} {number}" for each in RUNNERS for number in ("INT", "TERM")]
+    names += ["wait_for_a_runner TERM", "run_and_clean_up INT"]
     started: dict[str, Program] = {}
     with contextlib.ExitStack() as stack:
         for number, name in enumerate(names):
@@ -121,8 +121,9 @@ def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
     assert journal.ends() == ["canceled"], process
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["INT", "TERM"])
-@pytest.mark.parametrize("name", RUNNERS)
+@pytest.mark.parametrize(
+    ("name", "number"), zip(RUNNERS, (signal.SIGTERM, signal.SIGINT), strict=True)
+)
 def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
     programs: dict[str, Program], name: str, number: signal.Signals
 ) -> None:
