@@ -186,11 +186,12 @@ class Publish(Behaviour):
         node = node_in(kwargs, self)
         if node is self._node:
             return
+        from bt_actions.ros.closable import closable
         from bt_actions.ros.topics import qos_profile
 
         self.shutdown()
         profile = qos_profile(self._qos)
-        self._publisher = node.create_publisher(_class(self._type), self._topic, profile)
+        self._publisher = closable(node.create_publisher(_class(self._type), self._topic, profile))
         self._node = node
 
     def update(self) -> Status:

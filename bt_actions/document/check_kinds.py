@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -73,19 +73,23 @@ def _input_type(checker: Checker, included: Document, name: str, at: Node) -> Fi
     declared = included.inputs.get(name)
     if declared is None:
         if not checker.doubts_of(included).declares(name):
-            near = did_you_mean(name, included.inputs)
-            known = listing(included.inputs)
-            hint = None if near else (f"its inputs are {known}" if known else "it has no inputs")
-            checker.source.report(
-                "BT212", span_of(at),
-                f"the tree {included.name!r} has no input {name!r}{near}", hint=hint,
-            )  # fmt: skip
+            _no_such(checker, included, "input", name, included.inputs, at)
         return None
     text = declared.values.get("type")
     try:
         return parse_type(text, types=checker.types) if isinstance(text, str) else None
     except TypeNameError:
         return None  # reported where it is declared
+
+
+def _no_such(
+    checker: Checker, included: Document, what: str, name: str, known: Iterable[str], at: Node
+) -> None:
+    """Report an input or an output that an included tree does not have."""
+    near, names = did_you_mean(name, known), listing(known)
+    hint = None if near else (f"its {what}s are {names}" if names else f"it has no {what}s")
+    message = f"the tree {included.name!r} has no {what} {name!r}{near}"
+    checker.source.report("BT212" if what == "input" else "BT213", span_of(at), message, hint=hint)
 
 
 def _outputs(checker: Checker, node: TreeNode) -> None:
@@ -101,13 +105,7 @@ def _outputs(checker: Checker, node: TreeNode) -> None:
         if declared is None and checker.doubts_of(included).declares(output):
             continue
         if declared is None:
-            near = did_you_mean(output, included.outputs)
-            known = listing(included.outputs)
-            hint = None if near else (f"its outputs are {known}" if known else "it has no outputs")
-            checker.source.report(
-                "BT213", span_of(inner),
-                f"the tree {included.name!r} has no output {output!r}{near}", hint=hint,
-            )  # fmt: skip
+            _no_such(checker, included, "output", output, included.outputs, inner)
             continue
         text = declared.values.get("type")
         if isinstance(text, str):

@@ -18,6 +18,7 @@ from rclpy.qos import (
     qos_profile_services_default,
 )
 
+from bt_actions.ros.closable import closable
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
 
@@ -60,12 +61,14 @@ class Latest:
         self._age = 0.0
         self._aged_at = 0.0
         self.count = 0
-        self._subscription = node.create_subscription(
-            message_type,
-            topic,
-            self._take,
-            qos_profile(qos),
-            callback_group=MutuallyExclusiveCallbackGroup(),
+        self._subscription = closable(
+            node.create_subscription(
+                message_type,
+                topic,
+                self._take,
+                qos_profile(qos),
+                callback_group=MutuallyExclusiveCallbackGroup(),
+            )
         )
         self.topic: str = self._subscription.topic_name
         """The topic's full name."""

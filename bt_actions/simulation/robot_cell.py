@@ -10,6 +10,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState
 
+from bt_actions.ros.closable import closable
 from bt_actions.simulation.battery import Battery
 from bt_actions.simulation.gripper_control import GripperServer
 from bt_actions.simulation.move_robot import MoveRobotServer
@@ -39,7 +40,8 @@ class RobotCell:
         self._node = node
         self.move_robot = MoveRobotServer(node, self.world, f"{prefix}move_robot", **settings)
         self.gripper = GripperServer(node, self.world, f"{prefix}gripper_control", **settings)
-        self._battery_state = node.create_publisher(BatteryState, f"{prefix}battery_state", 10)
+        battery_state = node.create_publisher(BatteryState, f"{prefix}battery_state", 10)
+        self._battery_state = closable(battery_state)
 
     def __repr__(self) -> str:
         return f"<RobotCell {self.namespace or '/'} {self.world!r}>"

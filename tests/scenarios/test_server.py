@@ -18,7 +18,7 @@ from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
 from bt_actions.goal import State
 from tests.support.middleware import AS_IT_COMES
-from tests.support.processes import HostFactory, Journal
+from tests.support.processes import Host, HostFactory, Journal
 from tests.support.reliability import Record
 from tests.support.trees import in_sequence, in_turn, state
 from tests.support.waiting import holds_for, until
@@ -120,6 +120,15 @@ class TestKilled:
         assert len(leaf.history) == 1
 
 
+def lose(host: Host, leaf: MoveRobot, runner: TreeRunner) -> None:
+    """Stop a server under a goal until its lease is over, and the run with it."""
+    runner.start()
+    until(lambda: leaf.progress().feedback is not None)
+    host.send(signal.SIGSTOP)
+    assert runner.wait(20.0) is Status.FAILURE
+    assert stood(leaf) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+
+
 class TestStopped:
     def test_stopped_for_less_than_the_feedback_deadline(
         self, new_host: HostFactory, name: str, node: Any, record: Record
@@ -216,11 +225,7 @@ class TestStopped:
         first = MoveRobot("first", 40.0, action_name=name)
         second = MoveRobot("second", 0.3, action_name=name, timeout=Timeouts(server=20.0))
         with TreeRunner(first, node=node) as runner:
-            runner.start()
-            until(lambda: first.progress().feedback is not None)
-            host.send(signal.SIGSTOP)
-            assert runner.wait(20.0) is Status.FAILURE
-        assert stood(first) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+            lose(host, first, runner)
         host.send(signal.SIGCONT)
         with TreeRunner(second, node=node) as runner:
             assert runner.run(30.0) is Status.SUCCESS
@@ -242,11 +247,7 @@ class TestStopped:
         other = TreeRunner(second)
         assert other.run(20.0) is Status.SUCCESS
         with TreeRunner(first) as runner:
-            runner.start()
-            until(lambda: first.progress().feedback is not None)
-            host.send(signal.SIGSTOP)
-            assert runner.wait(20.0) is Status.FAILURE
-        assert stood(first) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+            lose(host, first, runner)
         host.send(signal.SIGCONT)
         assert other.run(30.0) is Status.SUCCESS
         other.shutdown()
@@ -268,10 +269,7 @@ class TestStopped:
             for which in range(2)
         )  # fmt: skip
         with TreeRunner(first) as runner:
-            runner.start()
-            until(lambda: first.progress().feedback is not None)
-            hosts[0].send(signal.SIGSTOP)
-            assert runner.wait(20.0) is Status.FAILURE
+            lose(hosts[0], first, runner)
         hosts[0].send(signal.SIGCONT)
         with TreeRunner(second) as runner:
             assert runner.run(30.0) is Status.SUCCESS
