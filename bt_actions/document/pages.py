@@ -310,8 +310,9 @@ PAGES: Mapping[str, Page] = MappingProxyType(
                   "      save: {at: result.final_pose}\n    - check: $at > 1.0\n"),
         ),
         "BT303": Page(
-            "Two branches of a 'parallel' use one action server (or one declared resource): one of "
-            "them waits for the other, or fails when its queue timeout passes.",
+            "Two branches of a 'parallel' need one resource: an action server, or what 'resources' "
+            "names in its place. One of them waits for the other, or fails when its queue timeout "
+            "passes.",
             _move("root:\n  parallel: Both\n  children: [{move: Left}, {move: Right}]\n"),
             _move("root:\n  sequence: One after the other\n  children: [{move: Left},"
                   " {move: Right}]\n"),
