@@ -90,11 +90,12 @@ class Row:
         self.reason = event.reason
 
     def settle(self) -> None:
-        """Take over the leaf's own judgement: it may have expected more than the server did."""
+        """Take over the leaf's own judgement: it may have expected more than the server did, and
+        knows why it did not try again."""
         outcome = getattr(self.behaviour, "outcome", None)
-        if outcome is not None and outcome is not self.outcome:  # None: it is visited anew already
+        if outcome is not None:  # None: it is visited anew already
             self.outcome = outcome
-            self.reason = str(getattr(self.behaviour, "reason", ""))
+            self.reason = str(getattr(self.behaviour, "reason", "")) or self.reason
 
     def leave(self, now: float) -> None:
         """Its goals are waited for no longer: how they end is not known."""

@@ -138,6 +138,18 @@ def test_the_leaf_s_own_judgement_wins_over_the_server_s(leaf: FakeAction, story
     assert (row.outcome, row.reason) == (Outcome.UNEXPECTED_RESULT, "not held")
 
 
+def test_a_leaf_says_why_it_did_not_try_again(leaf: FakeAction, story: Story) -> None:
+    leaf.outcome = Outcome.STALLED  # type: ignore[attr-defined]
+    leaf.reason = "silent (not tried again: its server went away)"  # type: ignore[attr-defined]
+    stalled, gone = Outcome.STALLED, End.SERVER_GONE
+    row = row_of(
+        leaf,
+        story.goal(leaf, "CANCELING", outcome=stalled, end=gone, reason="silent"),
+        story.node(leaf, Status.FAILURE),
+    )
+    assert (row.outcome, row.reason) == (stalled, leaf.reason)  # type: ignore[attr-defined]
+
+
 def fail(story: Story, leaf: FakeAction, reason: str = "") -> list[Event]:
     return [
         story.goal(leaf, "EXECUTING"),
