@@ -54,6 +54,8 @@ DENIED_FOR_GOOD = 30.0
 the tree need not wait for it: it has not got it. Should it turn up all the same, it is canceled."""
 PATIENCE = 5.0
 """Seconds for an answer that nobody wants any more, where the user gave no deadline."""
+_NEVER_DONE = (Outcome.CANCELED, Outcome.SERVER_AMBIGUOUS)
+"""Outcomes that a goal was canceled for and that stand, should it succeed all the same."""
 
 
 class Goal:
@@ -176,6 +178,20 @@ class Goal:
                 return event, max(0.0, left)
         return None
 
+    def twin(self, now: Now) -> Goal:
+        """Return the same goal, which has ended here, as a second server runs it.
+
+        It counts as lost, and is canceled at SERVER_RETURNED.
+        """
+        twin = Goal(
+            self.id, self.server, self.timeouts, now, resources=self.resources, busy=self.busy
+        )
+        twin._deadlines.clear()
+        twin._holding, twin._sent, twin._accepted, twin.lost = False, True, True, True
+        twin.state, twin.end = State.CANCELING, End.SERVER_GONE
+        twin._settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
+        return twin
+
     # What the caller may tell
 
     def on(self, event: Event, now: Now, detail: Any = None) -> tuple[Command, ...]:
@@ -251,6 +267,26 @@ class Goal:
         """Give up: SERVER_AMBIGUOUS."""
         why = f"two action servers answer to {self.server}: a goal would be executed twice"
         return self._give_up_unsent(Outcome.SERVER_AMBIGUOUS, why)
+
+    def _taken_by_two(self, now: Now, detail: Any) -> State:
+        """Cancel, at both: SERVER_AMBIGUOUS."""
+        why = f"two action servers answer to {self.server}, and both may have it"
+        outcome = Outcome.CANCELED if self._replaced else Outcome.SERVER_AMBIGUOUS
+        return self._cancel(now, outcome, why)
+
+    def _taken_by_two_unanswered(self, now: Now, detail: Any) -> State:
+        """Cancel, at whoever has it: SERVER_AMBIGUOUS."""
+        self._interrupted_unanswered(now, detail)
+        why = f"two action servers answer to {self.server}, and both may have it"
+        self._plan(Outcome.SERVER_AMBIGUOUS, why)
+        self._ask(now)
+        return State.CANCELING
+
+    def _taken_by_two_while_canceling(self, now: Now, detail: Any) -> State:
+        """Whatever it was canceled for, it must not count as done, or be tried again."""
+        if self.outcome is None and self._why not in _NEVER_DONE:
+            self._plan(Outcome.SERVER_AMBIGUOUS, f"both of two servers may have it ({self.reason})")
+        return State.CANCELING
 
     def _invalid(self, now: Now, detail: Any) -> State:
         """Give up: INVALID_GOAL."""
@@ -417,7 +453,7 @@ class Goal:
         """What it was canceled for; SUCCEEDED, late, if only a deadline had passed."""
         status, self.result = detail
         self.end = ENDS[status]
-        if status == STATUS_SUCCEEDED and self._why is not Outcome.CANCELED:
+        if status == STATUS_SUCCEEDED and self._why not in _NEVER_DONE:
             self.late = True
             self._settle(Outcome.SUCCEEDED, f"late: {self.reason}")
         self._settle_as_planned()
@@ -706,6 +742,7 @@ def _table() -> dict[tuple[State, Event], Row]:
         (sending, Event.FEEDBACK): (Goal._begin_by_feedback, {executing}),
         (sending, Event.STATUS): (Goal._begin_by_status, {executing}),
         (sending, Event.ACCEPT_DUE): (Goal._accept_due, {canceling}),
+        (sending, Event.SERVER_AMBIGUOUS): (Goal._taken_by_two_unanswered, {canceling}),
         (sending, Event.INTERRUPTED): (Goal._interrupted_unanswered, {canceling}),
         (sending, Event.REPLACED): (Goal._replaced_unanswered, {canceling}),
         (executing, Event.FEEDBACK): (Goal._feedback, {executing}),
@@ -716,6 +753,7 @@ def _table() -> dict[tuple[State, Event], Row]:
         (executing, Event.RESULT_DUE): (Goal._result_due, {canceling}),
         (executing, Event.FEEDBACK_DUE): (Goal._feedback_due, {canceling}),
         (executing, Event.INTERRUPTED): (Goal._interrupted, {canceling}),
+        (executing, Event.SERVER_AMBIGUOUS): (Goal._taken_by_two, {canceling}),
         (executing, Event.REPLACED): (Goal._replaced_while_executing, {executing}),
         (executing, Event.CANCEL_DUE): (Goal._replaced_too_long, {canceling}),
         (canceling, Event.SEND_FAILED): (Goal._send_failed, {done}),
@@ -731,6 +769,7 @@ def _table() -> dict[tuple[State, Event], Row]:
         (canceling, Event.ASK_DUE): (Goal._ask_again, {canceling, done}),
         (canceling, Event.DRAINED): (Goal._drained, {canceling}),
         (canceling, Event.INTERRUPTED): (Goal._interrupted_while_canceling, {canceling}),
+        (canceling, Event.SERVER_AMBIGUOUS): (Goal._taken_by_two_while_canceling, {canceling}),
         (canceling, Event.REPLACED): (Goal._replaced_while_canceling, {canceling}),
         (canceling, Event.SERVER_RETURNED): (Goal._server_returned, {canceling}),
         (canceling, Event.SERVER_RESTARTED): (Goal._server_restarted, {canceling, done}),

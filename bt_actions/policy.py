@@ -30,7 +30,7 @@ class Outcome(StrEnum):
     SERVER_UNAVAILABLE = "SERVER_UNAVAILABLE"
     """No server within ``Timeouts.server``."""
     SERVER_AMBIGUOUS = "SERVER_AMBIGUOUS"
-    """Two live servers under the name: a goal would be executed twice."""
+    """Two live servers under the name: a goal would be, or may be, executed twice."""
     SERVER_BUSY = "SERVER_BUSY"
     """The resource was not free within ``Timeouts.queue``."""
     ACCEPT_TIMEOUT = "ACCEPT_TIMEOUT"

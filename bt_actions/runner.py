@@ -28,7 +28,7 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.policy import End, Outcome
 from bt_actions.signals import ended_by_signals
-from bt_actions.ticking import ChangeVisitor, culprit_of, path_of, root_of, tick_once
+from bt_actions.ticking import ChangeVisitor, Patience, culprit_of, path_of, root_of, tick_once
 
 if TYPE_CHECKING:
     from bt_actions.ros.shared import Change, Ticket
@@ -102,7 +102,7 @@ class TreeRunner:
         self._closed = False
         self._pid = os.getpid()
         self._tickets: set[Ticket] = set()
-        self._mark = object()  # of the goals that a tick of ours begins
+        self._patience = Patience(_warn)  # on its behalf the ticks of ours begin goals
         self._spinner = Spinner(node, executor, namespace=namespace, died=self._spin_died)
         self._traffic = _traffic_of(self._spinner.node)
         self._traffic.observe(self._note)
@@ -244,7 +244,16 @@ class TreeRunner:
         """
         self._abandoned = self._abandoned or abandon
         self._stop_wanted = True
+        self._patience.end_now()
         self._wake()
+
+    def catch_up(self) -> None:
+        """Tell the observers, on this thread, what became of goals since a tick does not return.
+
+        For who leaves without waiting for it; does nothing unless the run was to end by then.
+        """
+        if self._patience.gave_up:
+            self._flush()
 
     def shutdown(self) -> None:
         """End the run if there is one, and shut down the tree and all that was made here.
@@ -306,6 +315,7 @@ class TreeRunner:
         self._visitor.forget()
         self.tree.visitors.append(self._visitor)
         self._runs_on = threading.get_ident()
+        self._patience.begin(deadline)
         try:
             self._guarded("setup", self._set_up)  # clients are made before anything spins
             self._spinner.start()
@@ -341,6 +351,8 @@ class TreeRunner:
                 wait = self.heartbeat
             else:
                 status = self._tick(deadline)
+                if self._patience.gave_up:
+                    return Status.INVALID
                 if status in (Status.SUCCESS, Status.FAILURE):
                     return status
                 wait = min([self.heartbeat, *self._dues()])
@@ -351,7 +363,7 @@ class TreeRunner:
         """Tick; again at once while each tick changes a status, and nobody wants it to stop."""
         for _ in range(BURST):
             self._visitor.begin()
-            with self._traffic.begun_by(self._mark):
+            with self._traffic.begun_by(self._patience):
                 self._guarded("tick", lambda: tick_once(self.tree))
             changed = self._visitor.finish()
             self._flush()
@@ -397,6 +409,7 @@ class TreeRunner:
                 for node in root.iterate():
                     if isinstance(node, ActionBehaviour):
                         node.terminate(Status.INVALID)
+        self._patience.end()
         _drain(self._tickets, self._hurry)
         self._flush()
         for node, changed in self._visitor.finish(interrupted=True):
@@ -440,10 +453,13 @@ class TreeRunner:
         self._wake()
 
     def _flush(self) -> None:
-        while self._changes:
-            change = self._changes.popleft()
+        while True:
+            try:
+                change = self._changes.popleft()
+            except IndexError:
+                return
             leaf = change.ticket.owner
-            if not self._is_ours(change.ticket):
+            if leaf is None or not self._is_ours(change.ticket):
                 continue  # another tree on the same node
             self._tickets.add(change.ticket)
             self._emit(
@@ -463,9 +479,9 @@ class TreeRunner:
 
     def _is_ours(self, ticket: Ticket) -> bool:
         """Whether the goal is this tree's: begun in a tick of it, wherever its leaf is by now."""
-        if ticket in self._tickets or ticket.begun_by is self._mark:
+        if ticket in self._tickets or ticket.begun_by is self._patience:
             return True
-        return root_of(ticket.owner) is self.tree.root
+        return ticket.owner is not None and root_of(ticket.owner) is self.tree.root
 
     def _emit(self, event: Event) -> None:
         for observer in list(self._observers):
@@ -478,6 +494,12 @@ class TreeRunner:
 
 def _past(deadline: float | None) -> bool:
     return deadline is not None and time.monotonic() >= deadline
+
+
+def _warn(message: str) -> None:
+    from bt_actions.ros.log import log
+
+    log.warning(message)
 
 
 def _traffic_of(node: Any) -> Any:

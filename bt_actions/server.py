@@ -1,11 +1,11 @@
 """What is known of one action server, seen from outside: is it there, alone, and still the same?
 
-Fed with what discovery shows (readiness and the GIDs of the status topic's publishers) and with
-the answers to probes. No ROS, no thread, no clock of its own; it sends nothing: `wants_probe`
-says that a probe is due.
+Fed with what discovery shows (readiness, and the GIDs of who reads goal requests) and with the
+answers to probes. No ROS, no thread, no clock of its own; it sends nothing: `wants_probe` says
+that a probe is due.
 
-Two publishers on the status topic are not yet two servers: after a server was killed, its ghost
-stays in discovery until the lease runs out (20 s with Fast DDS as it comes). A probe is a question
+Two readers of goal requests are not yet two servers: after a server was killed, its ghost stays
+in discovery until the lease runs out (20 s with Fast DDS as it comes). A probe is a question
 that every live server answers once. Two answers: two servers. One answer and then silence: a
 ghost and its successor.
 """
@@ -27,7 +27,7 @@ PROBES_KEPT = 20
 LEASE = 25.0
 """Seconds after which no ghost is left: a server that is still shown is there."""
 NOT_READY_FOR = 1.0
-"""Seconds without readiness, though the status topic is there, until the server counts as gone."""
+"""Seconds without readiness, though requests would be read, until the server counts as gone."""
 
 
 class Server(Enum):
@@ -98,9 +98,19 @@ class ServerWatch:
         self._answers[probe] = (count + 1, first)
         if len(self._answers) > PROBES_KEPT:
             del self._answers[next(iter(self._answers))]
-        if count + 1 > 1 and self._crowded_since is not None:
+        if count + 1 > 1:
+            self.two_answered()
+
+    def two_answered(self) -> None:
+        """Take note that two have answered one question, a probe or another."""
+        if self._crowded_since is not None:
             self._both_answered = True
             self.alone = False
+
+    @property
+    def both_live(self) -> bool:
+        """Whether two of those that are shown have answered one question."""
+        return self._both_answered
 
     def state(self, now: float) -> Server:
         """Return what answers under the name, as far as is known at `now`."""

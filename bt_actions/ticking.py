@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+import threading
+import time
+from collections.abc import Callable
+
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
@@ -25,6 +30,58 @@ def tick_once(tree: BehaviourTree) -> None:
     for handler in tree.post_tick_handlers:
         handler(tree)
     tree.count += 1
+
+
+class Patience:
+    """How long a tick may take that should have been the last.
+
+    While a behaviour does not return from it, nobody else can stop the tree. So whoever minds the
+    tree's goals asks here, on any thread and at any time, whether they are wanted still.
+    """
+
+    GRACE = 1.0
+    """Seconds for a tick to return when the tree is to end."""
+
+    def __init__(self, told: Callable[[str], None]) -> None:
+        """`told` is called, once a run, with what does not return."""
+        self._told = told
+        self._ends_at: float | None = None
+        self._ticks_on: int | None = None
+        self.gave_up = False
+        """Whether it was so in this run: what the tree says since is of no account."""
+
+    def begin(self, ends_at: float | None) -> None:
+        """A run begins on this thread; it is to end at `ends_at` (time.monotonic), or some time."""
+        self._ticks_on, self._ends_at, self.gave_up = threading.get_ident(), ends_at, False
+
+    def end_now(self) -> None:
+        """The run is to end; safe in a signal handler."""
+        now = time.monotonic()
+        self._ends_at = now if self._ends_at is None else min(self._ends_at, now)
+
+    def end(self) -> None:
+        """The last tick is over, and so is all that a behaviour does when it is stopped."""
+        self._ends_at = self._ticks_on = None
+
+    def gives_up(self) -> bool:
+        """Whether the last tick should have been over for long."""
+        ends_at = self._ends_at
+        if ends_at is None or time.monotonic() - ends_at < self.GRACE:
+            return False
+        if not self.gave_up:
+            self.gave_up = True
+            self._told(f"{self._stuck_in()} does not return from its tick: canceling all goals")
+        return True
+
+    def _stuck_in(self) -> str:
+        """Name the innermost behaviour that the ticking thread is in."""
+        frame = sys._current_frames().get(self._ticks_on or 0)  # noqa: SLF001 - documented
+        while frame is not None:
+            behaviour = frame.f_locals.get("self")
+            if isinstance(behaviour, Behaviour):
+                return "/".join(path_of(behaviour))
+            frame = frame.f_back
+        return "the tree"
 
 
 class ChangeVisitor(VisitorBase):

@@ -17,7 +17,7 @@ PARTS = [
     {"document", "runner", "simulation"},
     {"behaviours"},
     {"ros"},
-    {"attempts"},
+    {"attempts", "testimony"},
     {"goal", "resources", "server", "goal_ids"},
     {"deadlines"},
     {"goal_terms"},

@@ -221,6 +221,55 @@ def test_two_servers_are_sent_nothing() -> None:
     assert SEND not in life.sent
 
 
+def test_what_two_servers_may_have_taken_is_canceled() -> None:
+    life = executing()
+    assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL, ASK]
+    assert life.on(Event.SERVER_AMBIGUOUS) == []
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.SERVER_AMBIGUOUS, End.SUCCEEDED)
+    assert not life.goal.late
+
+
+def test_what_two_servers_may_have_taken_unanswered_is_asked_for_and_canceled() -> None:
+    life = sending()
+    assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL]
+    assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.SERVER_AMBIGUOUS, End.CANCELED)
+
+
+@pytest.mark.parametrize("why", [Event.INTERRUPTED, Event.RESULT_DUE])
+def test_what_two_servers_may_have_taken_is_no_late_success(why: Event) -> None:
+    life = executing()
+    life.on(why)
+    assert life.on(Event.SERVER_AMBIGUOUS) == []
+    life.on(Event.RESULT, SUCCEEDED)
+    canceled = why is Event.INTERRUPTED
+    life.ended(Outcome.CANCELED if canceled else Outcome.SERVER_AMBIGUOUS, End.SUCCEEDED)
+
+
+def test_what_was_replaced_and_is_at_two_servers_ends_as_canceled() -> None:
+    life = executing()
+    life.on(Event.REPLACED)
+    assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL, ASK]
+    life.on(Event.RESULT, ABORTED)
+    life.ended(Outcome.CANCELED, End.ABORTED)
+
+
+def test_a_twin_is_canceled_and_holds_nothing() -> None:
+    """A goal that has ended, and that a second server runs."""
+    life = executing()
+    life.on(Event.RESULT, SUCCEEDED)
+    twin = life.goal.twin(life.now)
+    assert (twin.id, twin.outcome) == (life.goal.id, Outcome.SERVER_AMBIGUOUS)
+    assert not twin.holding
+    assert list(twin.on(Event.SERVER_RETURNED, life.now)) == [CANCEL, ASK]
+    assert twin.end is End.UNKNOWN
+    assert twin.bars(waiting().goal, same_server=True)
+    assert list(twin.on(Event.RESULT, life.now, CANCELED)) == []
+    assert (twin.state, twin.end) == (State.DONE, End.CANCELED)
+
+
 @pytest.mark.parametrize("how", ["at once", "in time"])
 def test_a_taken_resource_ends_as_server_busy(how: str) -> None:
     life = Life()

@@ -16,9 +16,10 @@ from typing import Any
 
 import py_trees
 import pytest
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions import MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
+from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
 from tests.support.processes import Host, Journal
 from tests.support.trees import Gate, Raises, in_sequence, state, together
@@ -148,6 +149,77 @@ class TestRun:
         with pytest.raises(ValueError, match="'multi', 'single'"):
             TreeRunner(Gate(), executor="fast")
         assert threading.active_count() == before
+
+
+class Stuck(Behaviour):
+    """Does not return from its first tick after its cue until it is let go; then SUCCESS."""
+
+    def __init__(self, cue: Callable[[], object], name: str = "Stuck") -> None:
+        super().__init__(name)
+        self.cue = cue
+        self.entered, self.may_return = threading.Event(), threading.Event()
+
+    def update(self) -> Status:
+        if self.cue():
+            self.entered.set()
+            assert self.may_return.wait(30.0)
+        return Status.SUCCESS if self.entered.is_set() else Status.RUNNING
+
+
+def until_it_ends(runner: TreeRunner, why: str) -> None:
+    with contextlib.suppress(TimeoutError):
+        runner.run(2.0 if why == "out of time" else None)
+
+
+class TestStuckInATick:
+    """A behaviour that does not return must not keep the goals of a tree alive that is to end."""
+
+    @pytest.mark.parametrize("why", ["interrupted", "out of time"])
+    def test_the_goals_are_canceled_all_the_same(
+        self, journal: Journal, name: str, node: Any, why: str, capfd: Any
+    ) -> None:
+        leaf = MoveRobot("m", 30.0, action_name=name)
+        stuck = Stuck(lambda: state(leaf) == "EXECUTING")
+        with TreeRunner(together(leaf, in_sequence(stuck, name="Look")), node=node) as runner:
+            thread = threading.Thread(target=until_it_ends, args=[runner, why])
+            thread.start()
+            assert stuck.entered.wait(9.0)
+            if why == "interrupted":
+                runner.interrupt()
+            until(lambda: journal.ends() == ["canceled"], 9.0)
+            assert thread.is_alive()
+            stuck.may_return.set()
+            thread.join()
+        assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.CANCELED)
+        told = "together/Look/Stuck does not return from its tick"
+        until(lambda: told in capfd.readouterr().err)
+
+    def test_nothing_is_sent_in_the_rest_of_the_tick(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        leaf = MoveRobot("m", 30.0, action_name=name)
+        stuck = Stuck(lambda: state(leaf) == "EXECUTING")
+        other = MoveRobot("other", 0.1, action_name=name)
+        with TreeRunner(together(leaf, in_sequence(stuck, other)), node=node) as runner:
+            runner.start()
+            assert stuck.entered.wait(9.0)
+            runner.interrupt()
+            until(lambda: journal.ends() == ["canceled"], 9.0)
+            stuck.may_return.set()
+            assert runner.wait(9.0) is Status.INVALID
+        assert journal.count("received") == 1
+
+    def test_a_tick_that_is_slow_when_nothing_is_to_end_cancels_nothing(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        leaf = MoveRobot("m", 2.0, action_name=name)
+        stuck = Stuck(lambda: state(leaf) == "EXECUTING")
+        with TreeRunner(together(leaf, stuck), node=node) as runner:
+            runner.start()
+            assert stuck.entered.wait(9.0)
+            until(lambda: journal.ends() == ["succeeded"], 9.0)
+            stuck.may_return.set()
+            assert runner.wait(9.0) is Status.SUCCESS
 
 
 class TestInterrupt:

@@ -60,6 +60,9 @@ class Runner(Protocol):
     def interrupt(self, *, abandon: bool = False) -> None:
         """Make `tick_to_end` drain and return; with `abandon`, drain no longer."""
 
+    def catch_up(self) -> None:
+        """Tell what became of goals while a behaviour does not return from its tick."""
+
     @property
     def unaccounted(self) -> list[GoalReport]:
         """The goals whose end is not known."""
@@ -222,6 +225,9 @@ class Drive:
         until = self._clock() + SAME_WISH
         while not self._report.finished and (left := until - self._clock()) > 0.0:
             self._signals.wait(left)
+            self._take_events()
+        if not self._report.finished:
+            self._runner.catch_up()
             self._take_events()
 
     def _await_readers(self) -> None:

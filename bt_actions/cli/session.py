@@ -143,6 +143,10 @@ class Session:
         """Make the run drain and end; with `abandon`, drain no longer."""
         self._runner.interrupt(abandon=abandon)
 
+    def catch_up(self) -> None:
+        """Tell what became of goals while a behaviour does not return from its tick."""
+        self._runner.catch_up()
+
     @property
     def unaccounted(self) -> list[GoalReport]:
         """The goals whose end is not known."""

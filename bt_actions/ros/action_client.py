@@ -8,6 +8,8 @@ follow that this project cannot live with, and each has its cure here:
 - The done-callbacks of futures are tasks of the executor: where nobody spins any more, they never
   run. Here answers go straight to a listener, and `pump` takes them from any thread.
 - Futures of requests that are never answered are kept for ever. Here `forget` drops them.
+And one that matters where two servers have one name: the first answer is all that rclpy hears. Here
+every answer to a question is told, with those before it.
 
 What is taken waits in one inbox and is delivered in its order by whoever comes first: the executor,
 or a `pump`. After a pump, nothing that had arrived before it is still under way.
@@ -19,7 +21,9 @@ set and destruction; it uses the low-level handle, whose methods are checked for
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from action_msgs.srv import CancelGoal
@@ -37,6 +41,10 @@ TAKE_AT_MOST = 200
 DEPTH = 100
 """Of our end of the services; with the default of 10 a burst of answers is lost silently."""
 
+GOALS_KEPT = 20
+"""Goal requests, of those that are forgotten, of which a further acceptance is told all the same: a
+server that wakes up has the last ten in its queue."""
+
 _USED_OF_HANDLE = (
     "send_goal_request",
     "send_result_request",
@@ -51,15 +59,21 @@ _USED_OF_HANDLE = (
 
 
 class Listener(Protocol):
-    """Who is told what the servers say: under the one lock, from whichever thread delivers."""
+    """Who is told what the servers say: under the one lock, from whichever thread delivers.
 
-    def goal_answered(self, goal_id: bytes, accepted: bool) -> None:
-        """The goal request was answered."""
+    `answers` are all that one question has had by now, the newest last: one of each server. `asked`
+    is when it was asked (time.monotonic).
+    """
 
-    def result_came(self, goal_id: bytes, status: int, result: Any) -> None:
-        """The result came; status 0 means that the server does not know the goal."""
+    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
+        """The goal request was answered: accepted or not. Told of forgotten goals, too."""
 
-    def cancel_answered(self, goal_id: bytes, code: int) -> None:
+    def result_came(
+        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    ) -> None:
+        """Status and result came; status 0 means that the server does not know the goal."""
+
+    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         """A cancel request was answered, with a return code of action_msgs/srv/CancelGoal."""
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
@@ -72,6 +86,16 @@ class Listener(Protocol):
         """A server answered the probe of this number; each live server answers once."""
 
 
+@dataclass(slots=True)
+class _Question:
+    """A request that was sent, and what came back."""
+
+    about: bytes | int
+    """A goal's id, or a probe's number."""
+    asked: float = field(default_factory=time.monotonic)
+    answers: list[Any] = field(default_factory=list)
+
+
 class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typed
     """The one client of an action on a node, shared by all leaves that use it."""
 
@@ -82,9 +106,10 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         """
         self._lock = threading.RLock()
         self._listener = listener
-        self._goal_requests: dict[int, bytes] = {}
-        self._result_requests: dict[int, bytes | int] = {}  # an int is a probe's number
-        self._cancel_requests: dict[int, bytes] = {}
+        self._goal_requests: dict[int, _Question] = {}
+        self._past_requests: dict[int, _Question] = {}
+        self._result_requests: dict[int, _Question] = {}
+        self._cancel_requests: dict[int, _Question] = {}
         self._inbox: deque[tuple[str, Any, Any]] = deque()
         self._closed = False
         self._impl = action_type.Impl  # before rclpy's part: the executor may take at once
@@ -111,7 +136,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request.goal_id = UUID(uuid=list(goal_id))
         request.goal = goal
         with self._lock:
-            self._goal_requests[self._client_handle.send_goal_request(request)] = goal_id
+            number = self._client_handle.send_goal_request(request)
+            self._goal_requests[number] = _Question(goal_id)
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result; every accepted goal must be asked for, or the server keeps it."""
@@ -122,24 +148,30 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request = CancelGoal.Request()
         request.goal_info.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
-            self._cancel_requests[self._client_handle.send_cancel_request(request)] = goal_id
+            number = self._client_handle.send_cancel_request(request)
+            self._cancel_requests[number] = _Question(goal_id)
 
     def probe(self, probe: int, random_id: bytes) -> None:
         """Ask for a goal that nobody knows: each live server answers once, with status 0."""
         self._ask_result(random_id, probe)
 
-    def _ask_result(self, goal_id: bytes, asked_for: bytes | int) -> None:
+    def _ask_result(self, goal_id: bytes, about: bytes | int) -> None:
         request = self._impl.GetResultService.Request()
         request.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
-            self._result_requests[self._client_handle.send_result_request(request)] = asked_for
+            number = self._client_handle.send_result_request(request)
+            self._result_requests[number] = _Question(about)
 
     def forget(self, goal: bytes | int) -> None:
         """Drop what is still filed for a goal (its id) or a probe (its number)."""
         with self._lock:
             for filed in (self._goal_requests, self._result_requests, self._cancel_requests):
-                for number in [number for number, of in filed.items() if of == goal]:
-                    del filed[number]
+                for number in [number for number, asked in filed.items() if asked.about == goal]:
+                    question = filed.pop(number)
+                    if filed is self._goal_requests:
+                        self._past_requests[number] = question
+            while len(self._past_requests) > GOALS_KEPT:
+                del self._past_requests[next(iter(self._past_requests))]
 
     # The executor's view. It may have this client in hand while it is destroyed on another thread;
     # rclpy's own methods then raise in the executor, which ends its spin.
@@ -175,9 +207,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                     )
                     if response is None:
                         break
-                    goal_id = self._goal_requests.pop(number, None)
-                    if goal_id is not None:
-                        taken.append(("goal", goal_id, response.accepted))
+                    question = self._goal_requests.get(number) or self._past_requests.get(number)
+                    self._file("goal", question, response.accepted)
                 for _ in range(TAKE_AT_MOST):
                     feedback = self._client_handle.take_feedback(self._impl.FeedbackMessage)
                     if feedback is None:
@@ -187,38 +218,37 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                     number, response = self._client_handle.take_cancel_response(CancelGoal.Response)
                     if response is None:
                         break
-                    goal_id = self._cancel_requests.pop(number, None)
-                    if goal_id is not None:
-                        taken.append(("cancel", goal_id, _cancel_code(response, goal_id)))
+                    question = self._cancel_requests.get(number)
+                    if question is not None:
+                        self._file("cancel", question, _cancel_code(response, question.about))
                 for _ in range(TAKE_AT_MOST):
                     number, response = self._client_handle.take_result_response(
                         self._impl.GetResultService.Response
                     )
                     if response is None:
                         break
-                    self._file_result(number, response)
+                    status = response.status
+                    result = response.result if status else None
+                    self._file("result", self._result_requests.get(number), (status, result))
                 for _ in range(TAKE_AT_MOST):
-                    status = self._client_handle.take_status(self._impl.GoalStatusMessage)
-                    if status is None:
+                    message = self._client_handle.take_status(self._impl.GoalStatusMessage)
+                    if message is None:
                         break
                     statuses = {
                         bytes(entry.goal_info.goal_id.uuid): entry.status
-                        for entry in status.status_list
+                        for entry in message.status_list
                     }
                     taken.append(("status", statuses, None))
 
-    def _file_result(self, number: int, response: Any) -> None:
-        asked_for = self._result_requests.get(number)
-        if isinstance(asked_for, int):
-            self._inbox.append(
-                ("probe", asked_for, None)
-            )  # stays filed: a second server may answer
-        elif asked_for is not None:
-            if response.status == 0:  # with two servers, the other may know the goal
-                self._inbox.append(("result", asked_for, (0, None)))
-            else:
-                del self._result_requests[number]
-                self._inbox.append(("result", asked_for, (response.status, response.result)))
+    def _file(self, kind: str, question: _Question | None, answer: Any) -> None:
+        """Put an answer into the inbox, with those before it; none that nobody waits for."""
+        if question is None:
+            return
+        if isinstance(question.about, int):
+            self._inbox.append(("probe", question.about, None))
+            return
+        question.answers.append(answer)
+        self._inbox.append((kind, question.about, (question.asked, tuple(question.answers))))
 
     async def execute(self, taken: None) -> None:
         """Deliver what the executor has had taken."""
@@ -238,11 +268,11 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         if kind == "feedback":
             tell.feedback_came(about, detail)
         elif kind == "goal":
-            tell.goal_answered(about, detail)
+            tell.goal_answered(about, detail[1])
         elif kind == "result":
             tell.result_came(about, *detail)
         elif kind == "cancel":
-            tell.cancel_answered(about, detail)
+            tell.cancel_answered(about, *detail)
         elif kind == "status":
             tell.statuses_came(about)
         else:
@@ -257,7 +287,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
             super().destroy()
 
 
-def _cancel_code(response: Any, goal_id: bytes) -> int:
+def _cancel_code(response: Any, goal_id: bytes | int) -> int:
     """Return the code that is meant: rclpy's servers answer 0 with an empty list for a refusal."""
     code = int(response.return_code)
     canceling = {bytes(goal.goal_id.uuid) for goal in response.goals_canceling}

@@ -1,15 +1,18 @@
 """One action server as one node sees it: the shared client, the watch, and the goals on it.
 
 Takes what the server says and what discovery shows, tells the goals, and does what they say. It
-decides nothing about a goal (goal.py) or about who is alive (server.py). All under the one lock.
+decides nothing about a goal (goal.py), about who is alive (server.py), or about what is believed
+(testimony.py). All under the one lock.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
 import time
 import uuid
+import weakref
 from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -17,16 +20,18 @@ from typing import TYPE_CHECKING, Any
 from rclpy.exceptions import InvalidHandle
 
 from bt_actions.goal import Goal
-from bt_actions.goal_terms import ENDS, STATUS_SUCCEEDED, Command, Event, State
+from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm
-from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
+from bt_actions.ros.graph import servers
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
-from bt_actions.ros.lookout import Sight, look_for, publishers
+from bt_actions.ros.lookout import Sight, look_for
 from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
 from bt_actions.server import Server, ServerWatch
 from bt_actions.suggest import did_you_mean
+from bt_actions.testimony import Told
 
 if TYPE_CHECKING:
     from bt_actions.ros.traffic import Traffic
@@ -37,8 +42,6 @@ LOOK_WHILE_LOST = 1.0
 PUMP_EVERY = 0.01
 """Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
-ASK_EVERY = 0.5
-"""Seconds between two questions for a goal while another server is in sight."""
 TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
 PROBES_KEPT = 20
@@ -59,11 +62,11 @@ class Line:
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
         self.orphaned = False
-        self.status_topic = f"{name}/_action/status"
         self._sight: Sight | None = None  # where the client lives if our node was blind to it
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
+        self._past: deque[tuple[Any, Ticket]] = deque(maxlen=GOALS_KEPT)  # owners, by weakref
         self._warned_crowd = False
         self._warned_take = False
         self._adopt()
@@ -73,9 +76,15 @@ class Line:
 
     # What the server says (ActionClient's Listener)
 
-    def goal_answered(self, goal_id: bytes, accepted: bool) -> None:
-        """Pass on the answer to a goal request."""
-        self._tell_by_id(goal_id, Event.ACCEPTED if accepted else Event.REJECTED)
+    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
+        """Pass on an answer to a goal request; see to one that has ended and is accepted again."""
+        with lock:
+            ticket = self.goals.get(goal_id)
+            if ticket is not None:
+                now, said = time.monotonic(), ticket.testimony
+                self._pass_on(ticket, said.answered(self.watch, now, answers))
+            elif answers[-1]:
+                self._found_twice(goal_id)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
@@ -88,27 +97,44 @@ class Line:
                 ticket.feedback.append(feedback)
                 self.traffic.notify(None)
 
-    def cancel_answered(self, goal_id: bytes, code: int) -> None:
-        """Pass on the answer to a cancel request."""
-        self._tell_by_id(goal_id, Event.CANCEL_ANSWERED, code)
-
-    def result_came(self, goal_id: bytes, status: int, result: Any) -> None:
-        """Pass on a result; judge by the watch what it means that a goal is not known."""
+    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
+        """Pass on an answer to a cancel request."""
         with lock:
             ticket = self.goals.get(goal_id)
-            if ticket is None:
-                return
-            if status in ENDS:
-                if status != STATUS_SUCCEEDED and self._rival_sent(ticket):
-                    self.tell(ticket, Event.REPLACED)  # this has overtaken the rival's acceptance
-                self.tell(ticket, Event.RESULT, (status, result))
-            elif status != 0:  # answered too soon, by a server that is none of rclpy's or rclcpp's
-                self.tell(ticket, Event.STATUS, status)
-            elif not self.watch.changed(ticket.sent_to):
-                if self.watch.state(time.monotonic()) is Server.READY:
-                    self.tell(ticket, Event.RESULT_UNKNOWN)
-            elif ticket.denied_at is None:  # by one of several; `_judge` finds out what that means
-                ticket.denied_at = time.monotonic()
+            if ticket is not None:
+                self._pass_on(ticket, ticket.testimony.canceled(self.watch, asked, answers))
+
+    def result_came(
+        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    ) -> None:
+        """Pass on a result."""
+        with lock:
+            ticket = self.goals.get(goal_id)
+            if ticket is not None:
+                now, said = time.monotonic(), ticket.testimony
+                self._pass_on(ticket, said.finished(self.watch, now, asked, answers))
+
+    def _pass_on(self, ticket: Ticket, told: Told) -> None:
+        for event, detail in told:
+            if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(ticket):
+                self.tell(ticket, Event.REPLACED)  # this has overtaken the rival's acceptance
+            self.tell(ticket, event, detail)
+
+    def _found_twice(self, goal_id: bytes) -> None:
+        """A second server has accepted a goal that has ended here: it is to cancel it."""
+        past = next((past for past in self._past if past[1].goal.id == goal_id), None)
+        if past is None:
+            return
+        self._past.remove(past)
+        owner, twin = past
+        twin.owner = owner()
+        with contextlib.suppress(Exception):  # our node is gone; the next look tells
+            self._observe(time.monotonic())
+        self.watch.two_answered()
+        twin.testimony.sent(self.watch)
+        self.goals[goal_id] = twin
+        alarm.mind(self)
+        self.tell(twin, Event.SERVER_RETURNED)
 
     def _rival_sent(self, ticket: Ticket) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
@@ -128,12 +154,6 @@ class Line:
         with lock:
             self.watch.probe_answered(time.monotonic(), probe)
             self.traffic.notify(None)
-
-    def _tell_by_id(self, goal_id: bytes, event: Event, detail: Any = None) -> None:
-        with lock:
-            ticket = self.goals.get(goal_id)
-            if ticket is not None:
-                self.tell(ticket, event, detail)
 
     # What the goals want
 
@@ -189,10 +209,11 @@ class Line:
             return
         try:
             if command is Command.SEND:
-                ticket.sent_to = self.watch.gids
+                ticket.testimony.sent(self.watch)
                 self.client.send(goal.id, message)
                 with contextlib.suppress(Exception):  # it has left: what fails now is no failure
-                    ticket.sent_to |= self._shown()  # restarted since the last look: it went there
+                    self._observe(time.monotonic())
+                    ticket.testimony.sent(self.watch)  # who opened since got it, too
             elif command is Command.CANCEL:
                 self.client.cancel(goal.id)
             else:
@@ -214,8 +235,13 @@ class Line:
 
     def close_book(self, goal: Goal) -> None:
         """Know nothing of this goal any more, and mind only what is left."""
-        if self.goals.pop(goal.id, None) is not None:
+        ticket = self.goals.pop(goal.id, None)
+        if ticket is not None:
             self.client.forget(goal.id)
+            if goal.sent and goal.state is State.DONE:
+                twin = goal.twin(self.traffic.clocks.now())
+                kept = dataclasses.replace(ticket, goal=twin, owner=None, feedback=deque())
+                self._past.append((weakref.ref(ticket.owner), kept))
         if not self.goals:
             alarm.forget(self)
             self.traffic.drop_if_unused(self)
@@ -327,8 +353,8 @@ class Line:
             if not isinstance(line, Line) or line is self or not line.shares_server_with(self):
                 continue
             for ticket in list(line.goals.values()):
-                if ticket.goal.lost and ticket.sent_to & self.watch.gids:
-                    ticket.line, ticket.was_gone = self, True
+                if ticket.goal.lost and ticket.testimony.sent_to & self.watch.gids:
+                    ticket.line, ticket.testimony.was_gone = self, True
                     self.goals[ticket.goal.id] = ticket
                     line.close_book(ticket.goal)
                     alarm.mind(self)
@@ -351,7 +377,7 @@ class Line:
     def _adopt(self) -> None:
         """Take over what was lost, or left, at this action before, to cancel it first."""
         for ticket in self.traffic.domain.take_lost(self.name, self.action_type):
-            ticket.line, ticket.traffic, ticket.was_gone = self, self.traffic, True
+            ticket.line, ticket.traffic, ticket.testimony.was_gone = self, self.traffic, True
             self.goals[ticket.goal.id] = ticket
             alarm.mind(self)
 
@@ -368,29 +394,33 @@ class Line:
     def _shown(self) -> frozenset[bytes]:
         """Return the GIDs of the servers in sight; raises where our node is gone."""
         if self._sight is not None:
-            return self._sight.shows(self.status_topic)
-        return publishers(self.traffic.node, self.status_topic)
+            return self._sight.shows(self.name)
+        return servers(self.traffic.node, self.name)
+
+    def _observe(self, now: float) -> None:
+        """Let the watch see what discovery shows; raises where our node is gone."""
+        self.watch.observe(now, self.client.server_is_ready(), self._shown())
 
     def look(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
         if not is_valid(self.traffic.node):
             self._orphan()
             return Server.ABSENT
+        before = self.watch.state(now)
         try:
-            ready = self.client.server_is_ready()
-            gids = self._shown()
+            self._observe(now)
         except Exception:  # noqa: BLE001 - InvalidHandle: it was destroyed since
             self._come_home()
             return Server.ABSENT
-        before = self.watch.state(now)
-        self.watch.observe(now, ready, gids)
         self._adopt()
         self._take_over()
         if self.watch.wants_probe(now):
             self._probe()
         for ticket in list(self.goals.values()):
             if ticket.goal.sent:
-                self._judge(ticket, now)
+                if not ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to):
+                    self.pump()  # its last words
+                self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
         state = self.watch.state(now)
         if state is not before:
             self.traffic.notify(None)
@@ -416,30 +446,6 @@ class Line:
             self._orphan()
         else:
             self._go_on_with(client, None)
-
-    def _judge(self, ticket: Ticket, now: float) -> None:
-        goal, watch = ticket.goal, self.watch
-        gone = watch.gone(now, ticket.sent_to)
-        was_gone, ticket.was_gone = ticket.was_gone, gone
-        if goal.lost:
-            if was_gone and not gone:
-                self.tell(ticket, Event.SERVER_RETURNED)
-            elif gone and goal.end is End.UNKNOWN:  # it was left, not lost
-                self.tell(ticket, Event.SERVER_LOST, f"{self.name} is gone")
-        elif gone:
-            self.pump()  # its last words
-            how = "was restarted" if watch.gids else "went away"
-            self.tell(ticket, Event.SERVER_LOST, f"{self.name} {how} under the goal")
-        elif not watch.changed(ticket.sent_to):
-            ticket.denied_at = None
-        elif not goal.accepted or watch.state(now) is Server.AMBIGUOUS:
-            pass
-        elif ticket.denied_at is not None and watch.alone_since(now, ticket.denied_at):
-            self.tell(ticket, Event.SERVER_LOST, f"{self.name} was restarted under the goal")
-            self.tell(ticket, Event.SERVER_RESTARTED)
-        elif now - ticket.asked_at > ASK_EVERY:
-            ticket.asked_at = now
-            self.tell(ticket, Event.SERVER_CHANGED)
 
     def _probe(self) -> None:
         probe = next(_probes)
@@ -477,6 +483,8 @@ class Line:
             if not all(ticket.accounted_for for ticket in self.goals.values()):
                 wait = min(wait, PUMP_EVERY)
         for ticket in list(self.goals.values()):
+            if ticket.given_up:
+                self.tell(ticket, Event.INTERRUPTED)
             self.poll(ticket)
             due = ticket.goal.due_in(self.traffic.clocks.now())
             if due is not None and ticket.paused_at is None:

@@ -26,6 +26,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.graph import servers
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 
@@ -54,7 +55,8 @@ _closing = False  # the process ends
 class Seeker(Protocol):
     """Who has lost sight of a server (ros/line.py)."""
 
-    status_topic: str
+    name: str
+    """Of the action."""
 
     def misses(self) -> bool:
         """Whether a server is wanted, and is not in sight, by now."""
@@ -96,9 +98,9 @@ class Sight:
         with lock:
             _sights.add(self)
 
-    def shows(self, topic: str) -> frozenset[bytes]:
-        """The GIDs of who publishes a topic."""
-        return publishers(self.node, topic)
+    def shows(self, action: str) -> frozenset[bytes]:
+        """The GIDs of the servers of an action."""
+        return servers(self.node, action)
 
     def left_by(self, user: Seeker) -> None:
         """Close it when nobody uses it any more; on another thread, as the caller has the lock."""
@@ -237,7 +239,7 @@ class _Look:
         """
         now = time.monotonic()
         for line in lines:
-            if line not in self._clients and self._sight.shows(line.status_topic):
+            if line not in self._clients and self._sight.shows(line.name):
                 self._clients[line] = line.client_in(self._sight)
             if line in self._clients and self._clients[line].server_is_ready():
                 self._ready_since.setdefault(line, now)
@@ -251,12 +253,6 @@ class _Look:
         for client in self._clients.values():
             client.destroy()
         self._clients.clear()
-
-
-def publishers(node: Node, topic: str) -> frozenset[bytes]:
-    """Return the GIDs of who publishes a topic, as far as this node knows; raises InvalidHandle."""
-    infos = node.get_publishers_info_by_topic(topic)
-    return frozenset(bytes(info.endpoint_gid) for info in infos)
 
 
 def _enclave() -> list[str]:

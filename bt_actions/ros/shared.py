@@ -10,12 +10,13 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import State
 from bt_actions.policy import End, Outcome
 from bt_actions.resources import Resources
+from bt_actions.testimony import Testimony
 
 if TYPE_CHECKING:
     from bt_actions.ros.line import Line
@@ -80,6 +81,13 @@ def disown() -> None:
     _domains.clear()
 
 
+class Beginner(Protocol):
+    """On whose behalf goals are begun: a runner of trees."""
+
+    def gives_up(self) -> bool:
+        """Whether it wants none of its goals any more, and cannot tell them so by itself."""
+
+
 @dataclass(eq=False, slots=True)
 class Ticket:
     """A goal on its way, with what its owner and its server need to know."""
@@ -90,18 +98,23 @@ class Ticket:
     traffic: Traffic
     """Of the node that it was begun on, which is told of its changes."""
     owner: Any
-    begun_by: object = None
+    """The leaf; None where it is gone, and a second server has taken its goal, too."""
+    begun_by: Beginner | None = None
     """What `Traffic.begun_by` said at the time; None where nobody did."""
     attempt: int = 1
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
-    sent_to: frozenset[bytes] = frozenset()
-    was_gone: bool = False
-    """When last looked at, none of the servers it was sent to was there."""
-    asked_at: float = float("-inf")
-    denied_at: float | None = None
-    """When a server first did not know it, while another than the one it was sent to is shown."""
+    testimony: Testimony = field(init=False)
     paused_at: float | None = None
+
+    def __post_init__(self) -> None:
+        self.testimony = Testimony(self.goal)
+
+    @property
+    def given_up(self) -> bool:
+        """Whether it is to be interrupted, though no leaf has said so."""
+        begun_by = self.begun_by
+        return self.goal.outcome is None and begun_by is not None and begun_by.gives_up()
 
     @property
     def accounted_for(self) -> bool:

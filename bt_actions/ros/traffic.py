@@ -33,7 +33,7 @@ from bt_actions.ros import alarm, shared
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.line import Line, is_valid
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import Change, Observer, Ticket, changed, domain_of, lock
+from bt_actions.ros.shared import Beginner, Change, Observer, Ticket, changed, domain_of, lock
 from bt_actions.server import Server
 
 JUST_PAST = 0.1
@@ -108,7 +108,7 @@ class Traffic:
 
     @staticmethod
     @contextlib.contextmanager
-    def begun_by(who: object) -> Iterator[None]:
+    def begun_by(who: Beginner) -> Iterator[None]:
         """Have what this thread begins meanwhile known as begun by `who` (Ticket.begun_by)."""
         before = _who_begins()
         _begins.who = who
@@ -153,7 +153,7 @@ class Traffic:
         line = ticket.line
         with lock:
             line.poll(ticket)
-            if _closing:
+            if _closing or ticket.given_up:
                 line.tell(ticket, Event.INTERRUPTED)
             if ticket.goal.state is not State.WAITING_FOR_SERVER:
                 return
@@ -174,7 +174,7 @@ class Traffic:
         line = ticket.line
         return (
             ticket.goal.state is State.WAITING_FOR_SERVER
-            and not _closing
+            and not (_closing or ticket.given_up)
             and not line.orphaned
             and is_valid(self.node)
             and line.watch.state(time.monotonic()) is Server.READY
@@ -296,7 +296,7 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     return [ticket for ticket in wanted if not ticket.accounted_for]
 
 
-def _who_begins() -> object:
+def _who_begins() -> Beginner | None:
     return getattr(_begins, "who", None)
 
 

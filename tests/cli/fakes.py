@@ -120,6 +120,9 @@ class FakeRunner:
     def interrupt(self, *, abandon: bool = False) -> None:
         self.interrupted.set()
 
+    def catch_up(self) -> None:
+        pass
+
     def tick_to_end(self) -> None:
         self._play(self.before)
         self.playing.set()

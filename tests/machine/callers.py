@@ -15,9 +15,10 @@ from bt_actions.goal import Goal
 from bt_actions.goal_terms import ENDS, STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.resources import Answer, Resources
-from bt_actions.server import Server, ServerWatch
+from bt_actions.server import Server
+from bt_actions.testimony import Told
 from tests.machine.judge import Judge
-from tests.machine.parts import Before, Leaf, LeafPlan, Line, Ticket
+from tests.machine.parts import Before, Leaf, LeafPlan, Ledger, Line, Ticket
 from tests.machine.world import NODES, Job, Message, World
 
 
@@ -37,10 +38,13 @@ class Caller:
         self.closed = False
         self.fails_to_send = False
         self.restarts_meanwhile = False
+        self.opens_meanwhile = False
         self.builds_nonsense = False
         self.unexpected = False
-        self._requests: dict[int, Ticket | None] = {}
         self._askers: dict[int, Line] = {}
+        self._answers: dict[int, dict[bytes, Any]] = {}
+        self._asked: dict[int, float] = {}
+        self._moments = 0
         self._chance = random.Random(0)
         world.client = self
         judge.caller = self
@@ -54,6 +58,7 @@ class Caller:
                         "builds_nonsense",
                         "unexpected",
                         "restarts_meanwhile",
+                        "opens_meanwhile",
                     ),
                     lambda what: setattr(self, what, True),
                 ),
@@ -128,7 +133,7 @@ class Caller:
             line = self.lines[key] = Line(*key)
             for ticket in list(before.tickets.values()):
                 if ticket.goal.lost:
-                    ticket.line, ticket.was_gone = line, True
+                    ticket.line, ticket.testimony.was_gone = line, True
                     line.tickets[ticket.goal.id] = ticket
                 else:
                     self.tell(ticket, Event.CLOSED)
@@ -197,19 +202,26 @@ class Caller:
         """
         action, world = lost.line.action, self.world
         return not any(
-            lost.sent_to & world.shown(action, line.node) and world.ready(action, line.node)
+            lost.testimony.sent_to & world.shown(action, line.node)
+            and world.ready(action, line.node)
             for line in [wanted.line, *self._looks_at(wanted)]
             if line.action == action
         )
 
     def tell(self, ticket: Ticket, event: Event, detail: Any = None) -> None:
         """Tell a goal what happened and do what it says."""
+        if ticket.twin:
+            self._follow_twin(ticket, ticket.goal.on(event, self.world.now, detail))
+            return
         before = self.judge.before(ticket)
         commands = ticket.goal.on(event, self.world.now, detail)
         self._follow(ticket, before, event, detail, commands)
 
     def poll(self, ticket: Ticket) -> None:
         """Let the goal's deadlines take effect."""
+        if ticket.twin:
+            self._follow_twin(ticket, ticket.goal.poll(self.world.now))
+            return
         before = self.judge.before(ticket)
         commands = ticket.goal.poll(self.world.now)
         self._follow(ticket, before, None, None, commands)
@@ -235,12 +247,18 @@ class Caller:
                     break
                 self.tell(older, Event.REPLACED)
 
+    def _follow_twin(self, twin: Ticket, commands: tuple[Command, ...]) -> None:
+        if twin.goal.state is State.DONE:
+            twin.line.tickets.pop(twin.goal.id, None)
+        for command in commands:
+            self._carry_out(twin, command)
+
     def _carry_out(self, ticket: Ticket, command: Command) -> None:
         if command is Command.RELEASE:
             for next_one in self.resources.release(ticket):
                 self.tell(next_one, Event.GRANTED)
         elif command is Command.SEND:
-            ticket.sent_to = ticket.line.watch.gids
+            ticket.testimony.sent(ticket.line.watch)
             if self.fails_to_send:
                 self.fails_to_send = False
                 self.tell(ticket, Event.SEND_FAILED, "no space left")
@@ -248,20 +266,24 @@ class Caller:
             if self.restarts_meanwhile:
                 self.restarts_meanwhile = False
                 self.world.restart(ticket.line.action)
+            if self.opens_meanwhile:
+                self.opens_meanwhile = False
+                self.world.start(ticket.line.action)
             self.judge.sent(ticket, self._request("goal", ticket))
-            line = ticket.line  # it may have reached these, too
-            ticket.sent_to |= self.world.shown(line.action, line.node)
+            self._observe(ticket.line)
+            ticket.testimony.sent(ticket.line.watch)  # it may have reached these, too
         elif command is Command.CANCEL:
             self._request("cancel", ticket)
         else:
             self._request("result", ticket)
 
     def _request(self, kind: str, ticket: Ticket) -> int:
-        return self._ask(kind, ticket.line, ticket.goal.id, ticket.name, ticket)
+        return self._ask(kind, ticket.line, ticket.goal.id, ticket.name)
 
-    def _ask(self, kind: str, line: Line, goal: bytes, name: str, ticket: Ticket | None) -> int:
-        number = len(self._requests) + 1
-        self._requests[number], self._askers[number] = ticket, line
+    def _ask(self, kind: str, line: Line, goal: bytes, name: str) -> int:
+        number = len(self._askers) + 1
+        self._askers[number], self._answers[number] = line, {}
+        self._asked[number] = self._moment()
         nobody = self.world.servers[0]
         message = Message(kind, nobody, goal, name, number=number, to_server=True)
         return self.world.send(message, line.action, line.node)
@@ -283,38 +305,66 @@ class Caller:
                 if line.action == message.server.action
                 and self.world.in_sight(message.server, line.node)
             ]
+        if message.kind == "answer" and message.detail and asker in self.lines.values():
+            self.judge.hears_acceptance(self.tickets[int(message.goal_id)], message.server)
         for line in hearing:
             ticket = self.addressee(line, message)
-            if ticket is not None:
-                self._pass_on(ticket, message)
+            if ticket is None and message.kind == "answer" and message.detail:
+                self._found_twice(line, message)
+            elif ticket is not None:
+                self._take(ticket, message)
 
-    def _pass_on(self, ticket: Ticket, message: Message) -> None:
-        if message.kind == "answer":
-            self._goal_answered(ticket, message)
-        elif message.kind == "feedback":
+    def _take(self, ticket: Ticket, message: Message) -> None:
+        if message.kind == "feedback":
             self.tell(ticket, Event.FEEDBACK, message.detail)
         elif message.kind == "status":
             if message.detail in ENDS or not ticket.goal.accepted:
                 self.tell(ticket, Event.STATUS, message.detail)
-        elif message.kind == "cancel answer":
-            self.tell(ticket, Event.CANCEL_ANSWERED, message.detail)
-        elif message.detail in ENDS:
-            if message.detail != STATUS_SUCCEEDED and self._rival_sent(ticket):
-                self.tell(ticket, Event.REPLACED)  # its result has overtaken the rival's acceptance
-            self.tell(ticket, Event.RESULT, (message.detail, None))
         else:
-            self._denied(ticket)
+            self._answered(ticket, message)
+
+    def _answered(self, ticket: Ticket, message: Message) -> None:
+        """Pass on an answer with those before it; one that comes twice is the same answer."""
+        testimony, watch, now = ticket.testimony, ticket.line.watch, self._moment()
+        by_server = self._answers.setdefault(message.number, {})
+        by_server.pop(message.server.gid, None)
+        by_server[message.server.gid] = message.detail
+        answers = list(by_server.values())
+        asked = self._asked.get(message.number, now)
+        if message.kind == "answer":
+            self._pass_on(ticket, testimony.answered(watch, now, answers))
+        elif message.kind == "cancel answer":
+            self._pass_on(ticket, testimony.canceled(watch, asked, answers))
+        else:
+            results = [(status, None) for status in answers]
+            self._pass_on(ticket, testimony.finished(watch, now, asked, results))
+
+    def _found_twice(self, line: Line, message: Message) -> None:
+        """One more acceptance of a goal that has ended: by a second server, which cancels it."""
+        known = self._answers.setdefault(message.number, {})
+        past = self.tickets[int(message.goal_id)]
+        if message.server.gid in known or past.line is not line or not past.goal.sent:
+            return  # the same one again; or its run is over
+        if past.goal.state is State.DONE and line in self.lines.values():
+            known[message.server.gid] = True
+            twin = Ticket(past.goal.twin(self.world.now), f"{past.name}'", line, twin=True)
+            twin.ledger = Ledger(0.0, 0.0)
+            twin.testimony.was_gone = True
+            line.tickets[twin.goal.id] = twin
+            self._observe(line)
+            line.watch.two_answered()
+            twin.testimony.sent(line.watch)
+            self.tell(twin, Event.SERVER_RETURNED)
+
+    def _pass_on(self, ticket: Ticket, told: Told) -> None:
+        for event, detail in told:
+            if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(ticket):
+                self.tell(ticket, Event.REPLACED)  # its result has overtaken the rival's acceptance
+            self.tell(ticket, event, detail)
 
     def addressee(self, line: Line, message: Message) -> Ticket | None:
         """Return whose answer this is, unless the goal is DONE."""
         return line.tickets.get(message.goal_id)
-
-    def _goal_answered(self, ticket: Ticket, message: Message) -> None:
-        """With two servers the first answer counts, as in rclpy."""
-        if self._requests.get(message.number, ticket) is None and not message.detail:
-            return
-        self._requests[message.number] = None
-        self.tell(ticket, Event.ACCEPTED if message.detail else Event.REJECTED)
 
     def _rival_sent(self, ticket: Ticket) -> bool:
         """Whether a newer goal that replaces this one is on its way."""
@@ -322,29 +372,29 @@ class Caller:
         newer = holders[holders.index(ticket) + 1 :] if ticket in holders else []
         return any(t.goal.busy is Busy.REPLACE and t.goal.state is State.SENDING for t in newer)
 
-    def _denied(self, ticket: Ticket) -> None:
-        watch = ticket.line.watch
-        if not watch.changed(ticket.sent_to):
-            if watch.state(self.world.now.steady) is Server.READY:
-                self.tell(ticket, Event.RESULT_UNKNOWN)
-        elif ticket.denied_at is None:
-            ticket.denied_at = self.world.now.steady
-
     # What goes on by itself
 
     def look(self, line: Line) -> Server:
         """Observe a server and tell its goals what that means for them."""
         now, watch = self.world.now.steady, line.watch
-        gids = self.world.shown(line.action, line.node)
-        watch.observe(now, self.world.ready(line.action, line.node), gids)
+        self._observe(line)
         self._take_over(line)
         if watch.wants_probe(now):
-            watch.probe_sent(now, len(self._requests) + 1)
-            self._ask("probe", line, b"", "", None)
+            watch.probe_sent(now, len(self._askers) + 1)
+            self._ask("probe", line, b"", "")
         for ticket in list(line.tickets.values()):
             if ticket.goal.sent:
-                self._compare(ticket, watch, now)
+                self._pass_on(ticket, ticket.testimony.looked(watch, self._moment()))
         return watch.state(now)
+
+    def _moment(self) -> float:
+        """The time, a little later each time: what is asked next is asked later."""
+        self._moments += 1
+        return self.world.now.steady + self._moments * 1e-9
+
+    def _observe(self, line: Line) -> None:
+        shown = self.world.shown(line.action, line.node)
+        line.watch.observe(self.world.now.steady, self.world.ready(line.action, line.node), shown)
 
     def _take_over(self, line: Line) -> None:
         """Take lost goals of the other node whose server is in sight here."""
@@ -352,30 +402,10 @@ class Caller:
             if other is line or other.action != line.action:
                 continue
             for ticket in list(other.tickets.values()):
-                if ticket.goal.lost and ticket.sent_to & line.watch.gids:
+                if ticket.goal.lost and ticket.testimony.sent_to & line.watch.gids:
                     del other.tickets[ticket.goal.id]
-                    ticket.line, ticket.was_gone = line, True
+                    ticket.line, ticket.testimony.was_gone = line, True
                     line.tickets[ticket.goal.id] = ticket
-
-    def _compare(self, ticket: Ticket, watch: ServerWatch, now: float) -> None:
-        goal = ticket.goal
-        gone = watch.gone(now, ticket.sent_to)
-        was_gone, ticket.was_gone = ticket.was_gone, gone
-        if goal.lost:
-            if was_gone and not gone:
-                self.tell(ticket, Event.SERVER_RETURNED)
-        elif gone:
-            self.tell(ticket, Event.SERVER_LOST, "went away under the goal")
-        elif not watch.changed(ticket.sent_to):
-            ticket.denied_at = None
-        elif not ticket.goal.accepted or watch.state(now) is Server.AMBIGUOUS:
-            pass
-        elif ticket.denied_at is not None and watch.alone_since(now, ticket.denied_at):
-            self.tell(ticket, Event.SERVER_LOST, "restarted under the goal")
-            self.tell(ticket, Event.SERVER_RESTARTED)
-        elif now - ticket.asked_at > 0.5:
-            ticket.asked_at = now
-            self.tell(ticket, Event.SERVER_CHANGED)
 
     def attend(self) -> None:
         """What the alarm of ros/traffic.py does."""
@@ -384,7 +414,8 @@ class Caller:
                 self.look(line)
             for ticket in list(line.tickets.values()):
                 self.poll(ticket)
-                self.judge.polled(ticket)
+                if not ticket.twin:
+                    self.judge.polled(ticket)
         self.judge.nobody_waits_in_vain()
 
     def due_in(self) -> float:

@@ -57,6 +57,8 @@ UNUSUAL = {
     "mood": 3,
     "kill": 3,
     "leave": 2,
+    "crash": 4,
+    "calm": 2,
     "start": 6,
     "cut": 3,
     "lapse": 4,

@@ -16,7 +16,7 @@ from tests.machine.parts import Before, Leaf, Ledger, Ticket
 if TYPE_CHECKING:
     from bt_actions.attempts import AttemptRecord
     from tests.machine.callers import Caller
-    from tests.machine.world import Job
+    from tests.machine.world import Job, ModelServer
 
 JUST = 1e-6
 """Seconds by which sums of floats may differ."""
@@ -81,6 +81,11 @@ class Judge:
         if event is Event.CLOSED and before.state is not State.DONE:
             ledger.closed = True
             ledger.excuse = ledger.excuse or "its run, or the process, ended"
+        if event is Event.RESULT and before.state is not State.DONE and len(ledger.heard) > 1:
+            world, node = self.caller.world, ticket.line.node
+            known = [job for job in ledger.jobs if job.server.gid in ledger.heard]
+            runs = any(job.live and world.in_sight(job.server, node) for job in known)
+            self._hold(not runs, "an end is known when it has ended everywhere")
         if event is Event.CANCEL_ANSWERED:
             ledger.denied = detail == CANCEL_UNKNOWN_GOAL
         if goal.end is End.NEVER_STARTED is not before.end and event is None:
@@ -287,12 +292,17 @@ class Judge:
                     job.live and self.caller.world.in_sight(job.server, ticket.line.node)
                     for job in other.ledger.jobs
                 )
-                excused = other.ledger.excuse or other.ledger.crowded
+                excused = other.ledger.excuse
+                excused = excused or (other.ledger.crowded and len(other.ledger.heard) < 2)
                 excused = excused or (other.goal.waited_for and not other.goal.accepted)
                 rule = f"{other} was given up, and is canceled before {ticket} is sent there"
                 self._hold(not runs or excused, rule)
         if reached > 1:
             ticket.ledger.crowded = True
+
+    def hears_acceptance(self, ticket: Ticket, server: ModelServer) -> None:
+        """A server's acceptance has arrived, the first or one more."""
+        ticket.ledger.heard |= {server.gid}
 
     def accepted_on_server(self, job: Job) -> None:
         """A server begins to execute a goal: is it alone on its resources?"""

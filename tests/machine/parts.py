@@ -13,6 +13,7 @@ from bt_actions.goal import Goal
 from bt_actions.goal_terms import State
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.server import ServerWatch
+from bt_actions.testimony import Testimony
 
 if TYPE_CHECKING:
     from tests.machine.world import Job
@@ -57,6 +58,8 @@ class Ledger:
     """Why it may run beside another goal on its resource."""
     crowded: bool = False
     """Its request reached two live servers."""
+    heard: frozenset[bytes] = frozenset()
+    """Servers whose acceptance has been heard."""
     closed: bool = False
     beside: tuple[Ticket, ...] = ()
     """Lost goals whose server was out of sight when this one was sent: they may turn up again."""
@@ -70,11 +73,13 @@ class Ticket:
     goal: Goal
     name: str
     line: Line
-    sent_to: frozenset[bytes] = frozenset()
-    was_gone: bool = False
-    asked_at: float = float("-inf")
-    denied_at: float | None = None
+    twin: bool = False
+    """A goal that has ended, as a second server runs it."""
     ledger: Ledger = field(init=False)
+    testimony: Testimony = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.testimony = Testimony(self.goal)
 
     def __repr__(self) -> str:
         return self.name

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from bt_actions import testimony
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.deadlines import Deadlines
 from bt_actions.goal import TABLE, Goal, Row
@@ -302,6 +303,16 @@ def says_gone_for_every_end(patch: Patch) -> None:
         return state
 
     decide(patch, State.CANCELING, Event.RESULT, close)
+
+
+@mutation
+def believes_one_server_where_two_may_have_it(patch: Patch) -> None:
+    patch.setattr(testimony.Testimony, "_may_be_at_two", lambda self, watch: False)
+
+
+@mutation
+def hears_the_first_of_two_acceptances(patch: Patch) -> None:
+    patch.setattr(Caller, "_found_twice", lambda self, line, message: None)
 
 
 def forget(deadline: Event) -> Callable[[Patch], None]:

@@ -143,6 +143,7 @@ class World:
             "mood": (self._moods, lambda choice: setattr(choice[0], "mood", choice[1])),
             "kill": (self._alive, self._kill),
             "leave": (self._alive, self._leave),
+            "crash": (self._alive, self._crash),
             "start": (self._startable, self.start),
             "cut": (self._connected, lambda server: setattr(server, "cut", True)),
             "outage": (self._connected, self._outage),
@@ -152,6 +153,7 @@ class World:
             "notice": (lambda: sorted(self.overlooked), self.overlooked.discard),
             "heal": (lambda: [s for s in self.servers if s.cut and s.alive], self.heal),
             "wait": (lambda: (0.05, 0.3, 0.3, 0.9, 0.9, None, 3.1), self.wait),
+            "calm": (lambda: (None,), lambda _: self.calm()),
             "clock": (lambda: ("runs", "stops", "crawls", "back", "ahead"), self.set_clock),
         }
 
@@ -171,6 +173,14 @@ class World:
             seconds = getattr(self.client, "due_in", lambda: 0.5)()
         self.now = Now(self.now.steady + seconds, self.now.ros + seconds * self.pace)
         self.client.attend()
+
+    def calm(self) -> None:
+        """For some seconds all that is under way arrives, and nothing else happens."""
+        for _ in range(6):
+            for message in self._deliverable():
+                if message in self.air:
+                    self.deliver(message)
+            self.wait(0.9)
 
     def set_clock(self, what: str) -> None:
         """Do something to the node's clock; the client notices when it next looks."""
@@ -331,6 +341,12 @@ class World:
 
     def _kill(self, server: ModelServer) -> None:
         server.alive = server.cut = False  # its ghost stays in discovery until the lease runs out
+
+    def _crash(self, server: ModelServer) -> None:
+        """It dies, and what watches over it starts it anew; its ghost is shown beside it."""
+        self._kill(server)
+        if self._startable():
+            self.start(server.action)
 
     def _leave(self, server: ModelServer) -> None:
         self._kill(server)

@@ -17,9 +17,10 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import Gripper, MoveRobot
 from bt_actions.ros import action_client
-from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
+from bt_actions.ros.graph import servers
 from bt_actions.ros.traffic import Traffic
-from tests.support.processes import Host
+from tests.support.processes import Host, HostFactory
 from tests.support.waiting import holds_for, until
 
 TIMES = 20
@@ -36,15 +37,21 @@ class Heard:
         self.feedback: list[tuple[bytes, Any]] = []
         self.statuses: list[dict[bytes, int]] = []
         self.probes: list[int] = []
+        self.so_far: tuple[Any, ...] = ()
 
-    def goal_answered(self, goal_id: bytes, accepted: bool) -> None:
-        self.goals.append((goal_id, accepted))
+    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
+        self.goals.append((goal_id, answers[-1]))
+        self.so_far = answers
 
-    def result_came(self, goal_id: bytes, status: int, result: Any) -> None:
-        self.results.append((goal_id, status, result))
+    def result_came(
+        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    ) -> None:
+        self.results.append((goal_id, *answers[-1]))
+        self.so_far = answers
 
-    def cancel_answered(self, goal_id: bytes, code: int) -> None:
-        self.cancels.append((goal_id, code))
+    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
+        self.cancels.append((goal_id, answers[-1]))
+        self.so_far = answers
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         self.feedback.append((goal_id, feedback))
@@ -241,29 +248,57 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
 
 
 def test_what_is_forgotten_is_not_told_and_not_kept(client: ActionClient, heard: Heard) -> None:
-    for kind in KINDS:
+    for kind in ("result", "cancel"):
         client.forget(request(client, kind))
     client.probe(7, uuid.uuid4().bytes)
     client.forget(7)
     last = request(client, "cancel")
     until(lambda: heard.cancels, meanwhile=client.pump)
     assert heard.cancels == [(last, 2)]
-    assert not heard.goals
     assert not heard.results
     assert not heard.probes
+    client.forget(last)
     assert filed(client) == 0
+
+
+def test_a_goal_that_is_forgotten_may_still_be_accepted_by_another_server(
+    client: ActionClient, heard: Heard
+) -> None:
+    """So that is told; of the newest only."""
+    for _ in range(GOALS_KEPT + 3):
+        heard.goals.clear()
+        goal = request(client, "goal")
+        client.forget(goal)
+        until(lambda: heard.goals, meanwhile=client.pump)
+        assert heard.goals == [(goal, True)]
+    assert filed(client) == 0
+    assert len(client._past_requests) == GOALS_KEPT
+
+
+def test_what_each_of_two_servers_answers_is_told(
+    client: ActionClient, new_host: HostFactory, node: Node, name: str, heard: Heard
+) -> None:
+    new_host().open(name, "*:reject")
+    until(lambda: len(servers(node, name)) == 2)
+    for kind, answers in (("goal", [False, True]), ("cancel", [2, 2]), ("result", [0, 0])):
+        request(client, kind)
+        until(lambda: len(heard.so_far) == 2, meanwhile=client.pump)
+        words = [each[0] if kind == "result" else each for each in heard.so_far]
+        assert sorted(words) == answers
+        heard.so_far = ()
 
 
 def test_nothing_stays_filed_for_answered_requests(client: ActionClient, heard: Heard) -> None:
     goal_id = request(client, "goal")
     client.ask_result(goal_id)
-    client.cancel(uuid.uuid4().bytes)
+    unknown = request(client, "cancel")
     done = lambda: heard.goals and heard.cancels and any(s == 4 for _, s, _ in heard.results)  # noqa: E731
     until(
         done,
         meanwhile=lambda: (client.pump(), client.ask_result(goal_id) if heard.results else None),
     )
     client.forget(goal_id)
+    client.forget(unknown)
     assert filed(client) == 0
 
 
@@ -295,7 +330,7 @@ def test_a_refused_cancel_is_told_as_refused(
 def test_a_listener_that_raises_does_not_end_the_spin(
     client: ActionClient, node: Node, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(goal_id: bytes, code: int) -> None:
+    def fails(goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         raise RuntimeError("on purpose")
 
     with monkeypatch.context() as patch, single(node):

@@ -166,6 +166,47 @@ def test_a_second_sigint_leaves_at_once_and_cleanup_finishes_its_work(
         record.outcome += "; cleanup canceled it"
 
 
+STUCK = """\
+import threading
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+class Stuck(Behaviour):
+    ticks = 0
+
+    def update(self):
+        self.ticks += 1
+        if self.ticks == 10:
+            print("blocked", flush=True)
+            threading.Event().wait()
+        return Status.RUNNING
+"""
+
+
+def test_a_signal_while_a_behaviour_does_not_return_from_its_tick(
+    launch: Launch, serve: Serve, tree: Tree, name: str, tmp_path: Path, record: Record
+) -> None:
+    """A behaviour blocks its tick for ever beside a move; SIGTERM, and then again"""
+    journal = serve()
+    path = tree(name, distance=30.0)
+    (tmp_path / "stuck_here.py").write_text(STUCK)
+    text = path.read_text().replace("sequence: Work", "parallel: Work")
+    path.write_text(f"{text}    - python: stuck_here.Stuck\n")
+    run = launch("run", str(path), environment={"PYTHONPATH": f"{ROOT}:{tmp_path}"})
+    run.line("executing on")
+    run.line("blocked")
+    sent = run.send(signal.SIGTERM)
+    journal.wait_for("canceled", within=9.0)
+    record.took(time.monotonic() - sent, 3.0)
+    assert run.popen.poll() is None
+    run.send(signal.SIGTERM)
+    assert run.wait() == 3, run
+    assert any("Work/Stuck does not return from its tick" in line for line in run.errors), run
+    assert any("CANCELED" in line for line in run.lines), run
+    assert "not accounted for" not in str(run)
+    record.outcome = "CANCELED within its tick; exit code 3 at the second signal"
+
+
 # What goes wrong within
 
 

@@ -30,6 +30,9 @@ STOCK = 25.0
 RESTARTED = 5.0
 """The same from the appearance of its successor."""
 
+CANCELED = ["received", "accepted", "cancel_requested", "cancel_accepted", "canceled"]
+"""What the journal says of a goal that was canceled."""
+
 
 def stood(leaf: MoveRobot) -> tuple[Outcome | None, End | None]:
     return leaf.outcome, leaf.end
@@ -485,6 +488,52 @@ class TestTwice:
         assert journal.events() == []
         assert len(leaf.history) == 1
         record.outcome = "SERVER_AMBIGUOUS, end NEVER_STARTED"
+
+    def test_a_second_server_that_wakes_up_and_takes_the_goal_too(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """Two servers, one is stopped and looks dead; it goes on with the request in its queue"""
+        one, other = new_host(short_lease=False), new_host(short_lease=False)
+        one.open(name)
+        journal = other.open(name)
+        until_shown(node, name, 2)
+        other.send(signal.SIGSTOP)
+        leaf = MoveRobot("m", 40.0, action_name=name, timeout=Timeouts(server=20.0))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: leaf.progress().feedback is not None, 20.0)
+            woken = other.send(signal.SIGCONT)
+            assert runner.wait(15.0) is Status.FAILURE
+            record.took(time.monotonic() - woken, 5.0)
+        assert stood(leaf) == (Outcome.SERVER_AMBIGUOUS, End.CANCELED)
+        for each in (one, other):
+            assert of_process(journal, each.pid) == CANCELED
+        record.outcome = "SERVER_AMBIGUOUS, canceled at both"
+
+    def test_a_second_server_that_wakes_up_when_the_goal_has_ended(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """The same, and the first server has succeeded meanwhile; then one more goal is wanted"""
+        one, other = new_host(short_lease=False), new_host(short_lease=False)
+        one.open(name)
+        journal = other.open(name, "*:slow=100")
+        until_shown(node, name, 2)
+        other.send(signal.SIGSTOP)
+        leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=20.0))
+        more = MoveRobot("more", 0.3, action_name=name, timeout=Timeouts(server=20.0))
+        with TreeRunner(leaf, node=node) as runner:
+            assert runner.run(30.0) is Status.SUCCESS
+            woken = other.send(signal.SIGCONT)
+            until(lambda: "canceled" in of_process(journal, other.pid), 10.0)
+            record.took(time.monotonic() - woken, 5.0)
+            with TreeRunner(more, node=node) as second:
+                assert second.run(30.0) is Status.FAILURE
+            until(lambda: runner.unaccounted == [])
+        assert stood(leaf) == (Outcome.SUCCEEDED, End.SUCCEEDED)
+        assert of_process(journal, one.pid)[:3] == ["received", "accepted", "succeeded"]
+        assert of_process(journal, other.pid) == CANCELED
+        assert stood(more) == (Outcome.SERVER_AMBIGUOUS, End.NEVER_STARTED)
+        record.outcome = "SUCCEEDED; what the second server took is canceled"
 
     def test_a_ghost_is_not_a_second_server(
         self, new_host: HostFactory, name: str, node: Any, record: Record

@@ -1,0 +1,33 @@
+"""Which servers of an action the ROS graph shows to a node.
+
+A server is known by the GID of its reader of goal requests: who has one takes what is sent, from
+the moment on that it is shown, which is before the rest of the server is (3 to 20 ms measured).
+"""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+from rclpy.utilities import get_rmw_implementation_identifier
+
+
+def servers(node: Node, action: str) -> frozenset[bytes]:
+    """Return the GIDs of the servers of an action, as far as this node knows by now.
+
+    Raises InvalidHandle when the node was destroyed.
+    """
+    if _IN_DDS:
+        service = node.resolve_service_name(f"{action}/_action/send_goal")
+        infos = node.get_subscriptions_info_by_topic(f"rq{service}Request", no_mangle=True)
+    else:
+        infos = node.get_publishers_info_by_topic(f"{action}/_action/status")
+    return frozenset(bytes(info.endpoint_gid) for info in infos)
+
+
+_IN_DDS = get_rmw_implementation_identifier() in (
+    "rmw_fastrtps_cpp",
+    "rmw_fastrtps_dynamic_cpp",
+    "rmw_cyclonedds_cpp",
+    "rmw_connextdds",
+)
+"""Where services are pairs of DDS topics, as REP 2008's predecessors name them; elsewhere the graph
+shows no readers of requests, and the publisher of the status topic has to do."""

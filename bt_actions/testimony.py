@@ -1,0 +1,161 @@
+"""What servers say of one goal, and what of it is believed.
+
+One server's word does not speak for another's: where a second one opened, or woke up, when the
+request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
+other may run. So while more than one of the servers that the request went to may live, an ending
+is believed when a question was answered twice, or when it has turned out that one is a ghost.
+
+Told of answers and of looks at the server, it returns what the goal is to be told. What follows
+from that is the goal's (goal.py); who lives is known to the watch (server.py). No ROS, no thread,
+no clock of its own; it sends nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import CANCEL_UNKNOWN_GOAL, ENDS, STATUS_SUCCEEDED, Event
+from bt_actions.policy import End
+from bt_actions.server import GID, Server, ServerWatch
+
+Told = list[tuple[Event, Any]]
+NEVER = float("-inf")
+ASK_EVERY = 0.5
+"""Seconds between two questions for a goal while another server is in sight."""
+
+
+class Testimony:
+    """What is believed of what servers say of one goal.
+
+    `answers` are always all those that one question has had by now, the newest last, and `asked` is
+    when it was asked (seconds, steady clock).
+    """
+
+    def __init__(self, goal: Goal) -> None:
+        self.sent_to: frozenset[GID] = frozenset()
+        """Who was shown when the request went out, and may have taken it."""
+        self.was_gone = False
+        """When last looked at, none of these was there."""
+        self._goal = goal
+        self._refused = False
+        self._ended: tuple[int, Any] | None = None
+        self._denied_at: float | None = None  # by one that it was not sent to, maybe
+        self._asked_at = NEVER
+        self._crowd: frozenset[GID] = frozenset()  # when last looked at, and not known who lives
+        self._fresh_since = NEVER
+        """What was asked before may have been answered by who is gone, or did not have it yet."""
+
+    def sent(self, watch: ServerWatch) -> None:
+        """Take note of who is shown when the request goes out, just before and just after."""
+        self.sent_to |= watch.gids
+        if _is_crowded(watch):
+            self._crowd = watch.gids
+
+    def answered(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
+        """Take an answer to the goal request: accepted or not."""
+        if sum(answers) > 1:
+            if len(self.sent_to | watch.gids) == 1:
+                return []  # by one, twice
+            watch.two_answered()
+            self._fresh_since = now
+            return [(Event.SERVER_AMBIGUOUS, None)]
+        if answers[-1]:
+            return [(Event.ACCEPTED, None)]
+        if any(answers):
+            return []  # it is refused here, and runs there
+        if len(answers) == 1 and self._may_be_at_two(watch):
+            self._refused = True
+            return []
+        if len(answers) == 1 and self._fresh_since > NEVER and len(self.sent_to) > 1:
+            return [(Event.SERVER_AMBIGUOUS, None)]  # by the one that is gone?
+        return [(Event.REJECTED, None)]
+
+    def canceled(self, watch: ServerWatch, asked: float, answers: Sequence[int]) -> Told:
+        """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal."""
+        if answers[-1] == CANCEL_UNKNOWN_GOAL:
+            denied_by_all = all(code == CANCEL_UNKNOWN_GOAL for code in answers)
+            if not denied_by_all or (len(answers) == 1 and self._speaks_for_one(watch, asked)):
+                return []
+        return [(Event.CANCEL_ANSWERED, answers[-1])]
+
+    def finished(
+        self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
+    ) -> Told:
+        """Take an answer to a question for the result: status and result; status 0 is a denial."""
+        status = answers[-1][0]
+        ended = [answer for answer in answers if answer[0] in ENDS]
+        if ended:
+            done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), ended[-1])
+            if len(self.sent_to) > 1:
+                if asked < self._fresh_since:
+                    return []
+                if len(answers) == 1 and self._may_be_at_two(watch):
+                    self._ended = done
+                    return []
+            return [(Event.RESULT, done)]
+        if status != 0:  # answered too soon, by a server that is none of rclpy's or rclcpp's
+            return [(Event.STATUS, status)]
+        if watch.changed(self.sent_to):
+            if self._denied_at is None:  # by one of several; `looked` finds out what that means
+                self._denied_at = now
+            return []
+        by_all = len(answers) > 1 or watch.state(now) is Server.READY
+        return [(Event.RESULT_UNKNOWN, None)] if by_all and asked >= self._fresh_since else []
+
+    def looked(self, watch: ServerWatch, now: float) -> Told:
+        """Take what discovery shows now."""
+        goal, name = self._goal, self._goal.server
+        gone = watch.gone(now, self.sent_to)
+        returned = self.was_gone and not gone and watch.state(now) is not Server.ABSENT
+        self.was_gone = gone or (self.was_gone and not returned)
+        one_left = bool(self._crowd - watch.gids)
+        self._crowd = watch.gids if _is_crowded(watch) else frozenset()
+        if goal.lost:
+            if returned:
+                return [(Event.SERVER_RETURNED, None)]
+            if gone and goal.end is End.UNKNOWN:  # it was left, not lost
+                return [(Event.SERVER_LOST, f"{name} is gone")]
+            return []
+        if gone:
+            how = "was restarted" if watch.gids else "went away"
+            return [(Event.SERVER_LOST, f"{name} {how} under the goal")]
+        if one_left:
+            return self._ask_who_is_left(now)
+        if self._may_be_at_two(watch):
+            return [(Event.SERVER_AMBIGUOUS, None)] if watch.both_live else []
+        if self._ended is not None:
+            return [(Event.RESULT, self._ended)]
+        if self._refused:
+            return [(Event.REJECTED, None)]
+        if not watch.changed(self.sent_to):
+            self._denied_at = None
+        elif not goal.accepted or watch.state(now) is Server.AMBIGUOUS:
+            pass
+        elif self._denied_at is not None and watch.alone_since(now, self._denied_at):
+            how = f"{name} was restarted under the goal"
+            return [(Event.SERVER_LOST, how), (Event.SERVER_RESTARTED, None)]
+        elif now - self._asked_at > ASK_EVERY:
+            self._asked_at = now
+            return [(Event.SERVER_CHANGED, None)]
+        return []
+
+    def _ask_who_is_left(self, now: float) -> Told:
+        """One of several is gone: what was said before may have been its word."""
+        self._fresh_since = now
+        self._ended = self._denied_at = None
+        refused, self._refused = self._refused, False
+        return [(Event.SERVER_AMBIGUOUS if refused else Event.SERVER_CHANGED, None)]
+
+    def _may_be_at_two(self, watch: ServerWatch) -> bool:
+        """Whether two of the servers that it was sent to are there, as far as is known."""
+        return _is_crowded(watch) and len(self.sent_to & watch.gids) > 1
+
+    def _speaks_for_one(self, watch: ServerWatch, asked: float) -> bool:
+        """Whether a denial of one server may not be that of the one that has the goal."""
+        return _is_crowded(watch) or asked < self._fresh_since
+
+
+def _is_crowded(watch: ServerWatch) -> bool:
+    return len(watch.gids) > 1 and not watch.alone

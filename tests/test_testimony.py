@@ -1,0 +1,199 @@
+"""What is believed of what servers say of a goal, where there may be more than one."""
+
+from __future__ import annotations
+
+import pytest
+
+from bt_actions import testimony
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import Event, Now
+from bt_actions.policy import Timeouts
+from bt_actions.server import SETTLED_AFTER, SLOWEST_START, ServerWatch
+
+ONE, OTHER = b"one", b"other"
+BOTH = frozenset({ONE, OTHER})
+DENIED, CANCELED = 2, 0
+SUCCEEDED, ABORTED = (4, "done"), (6, "failed")
+CANCELED_END = (5, None)
+UNKNOWN = (0, None)
+
+
+def events(told: testimony.Told) -> list[Event]:
+    return [event for event, _ in told]
+
+
+@pytest.fixture
+def watch() -> ServerWatch:
+    seen = ServerWatch()
+    seen.observe(0.0, True, frozenset({ONE}))
+    return seen
+
+
+@pytest.fixture
+def said(watch: ServerWatch) -> testimony.Testimony:
+    """Of a goal that was sent while a second server opened."""
+    goal = Goal(b"1", "move", Timeouts(), Now(0.0, 0.0))
+    for event in (Event.GRANTED, Event.SERVER_READY):
+        goal.on(event, Now(0.0, 0.0))
+    said = testimony.Testimony(goal)
+    watch.observe(0.0, True, BOTH)
+    said.sent(watch)
+    return said
+
+
+def alone(watch: ServerWatch) -> float:
+    """Let one of the two be a ghost; return the time."""
+    watch.probe_sent(0.0, 1)
+    watch.probe_answered(0.0, 1)
+    now = SLOWEST_START + SETTLED_AFTER
+    watch.observe(now, True, BOTH)
+    assert watch.alone
+    return now
+
+
+def test_one_server_is_believed_at_once(said: testimony.Testimony, watch: ServerWatch) -> None:
+    watch.observe(0.0, True, frozenset({ONE}))
+    assert said.answered(watch, 0.0, [True]) == [(Event.ACCEPTED, None)]
+    assert said.answered(watch, 0.0, [False]) == [(Event.REJECTED, None)]
+    assert said.canceled(watch, 0.0, [DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
+    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
+    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == [(Event.RESULT_UNKNOWN, None)]
+    assert said.finished(watch, 0.0, 0.0, [(2, None)]) == [(Event.STATUS, 2)]
+
+
+def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert events(said.answered(watch, 0.0, [True])) == [Event.ACCEPTED]
+    assert events(said.answered(watch, 0.0, [True, True])) == [Event.SERVER_AMBIGUOUS]
+    assert watch.both_live
+
+
+def test_one_server_that_accepts_twice_is_one_server(watch: ServerWatch) -> None:
+    said = testimony.Testimony(Goal(b"1", "move", Timeouts(), Now(0.0, 0.0)))
+    said.sent_to = frozenset({ONE})
+    assert said.answered(watch, 0.0, [True, True]) == []
+    assert not watch.both_live
+
+
+def test_what_one_refuses_the_other_may_accept(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.answered(watch, 0.0, [False]) == []
+    assert events(said.answered(watch, 0.0, [False, True])) == [Event.ACCEPTED]
+    assert said.answered(watch, 0.0, [True, False]) == []
+    assert events(said.answered(watch, 0.0, [False, False])) == [Event.REJECTED]
+
+
+def test_a_refusal_counts_when_the_other_is_a_ghost(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.answered(watch, 0.0, [False]) == []
+    assert said.looked(watch, 0.0) == []
+    assert events(said.looked(watch, alone(watch))) == [Event.REJECTED]
+
+
+def test_what_one_has_ended_the_other_may_run(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
+    assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == [(Event.RESULT, ABORTED)]
+    assert said.finished(watch, 0.0, 0.0, [ABORTED, SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
+
+
+def test_an_end_counts_when_the_other_is_a_ghost(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
+    assert said.looked(watch, 0.0) == []
+    assert said.looked(watch, alone(watch)) == [(Event.RESULT, ABORTED)]
+
+
+def test_an_end_may_be_that_of_the_one_that_has_gone_since(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.looked(watch, 0.0) == []
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
+    watch.observe(1.0, True, frozenset({ONE}))
+    assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED], "ask whoever is left"
+    assert said.finished(watch, 1.1, 0.9, [ABORTED]) == [], "asked while both were there"
+    assert said.finished(watch, 1.2, 1.1, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
+
+
+def test_a_refusal_may_be_that_of_the_one_that_has_gone_since(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.looked(watch, 0.0)
+    said.answered(watch, 0.0, [False])
+    watch.observe(1.0, True, frozenset({ONE}))
+    assert events(said.looked(watch, 1.0)) == [Event.SERVER_AMBIGUOUS]
+    assert events(said.answered(watch, 1.1, [False])) == [Event.SERVER_AMBIGUOUS]
+
+
+def test_what_was_asked_before_both_had_it_does_not_count(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.answered(watch, 1.0, [True])
+    said.answered(watch, 2.0, [True, True])
+    assert said.finished(watch, 2.1, 1.5, [ABORTED, UNKNOWN]) == [], "it was still deciding"
+    assert said.finished(watch, 2.2, 2.1, [ABORTED]) == []
+    assert said.finished(watch, 2.2, 2.1, [ABORTED, CANCELED_END]) == [(Event.RESULT, CANCELED_END)]
+
+
+def test_what_one_denies_the_other_may_have(said: testimony.Testimony, watch: ServerWatch) -> None:
+    assert said.canceled(watch, 0.0, [DENIED]) == []
+    assert said.canceled(watch, 0.0, [DENIED, CANCELED]) == [(Event.CANCEL_ANSWERED, CANCELED)]
+    assert said.canceled(watch, 0.0, [CANCELED, DENIED]) == []
+    assert said.canceled(watch, 0.0, [DENIED, DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
+    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == []
+    assert events(said.finished(watch, 0.0, 0.0, [UNKNOWN, UNKNOWN])) == [Event.RESULT_UNKNOWN]
+
+
+def test_two_that_live_are_told_of_where_both_may_have_it(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.looked(watch, 0.0) == []
+    watch.two_answered()
+    assert events(said.looked(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
+    said.sent_to = frozenset({ONE})
+    assert Event.SERVER_AMBIGUOUS not in events(said.looked(watch, 0.0)), "it came later"
+
+
+def test_what_a_newcomer_denied_may_arrive_when_it_is_gone(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.sent_to = frozenset({ONE})
+    said.looked(watch, 1.0)
+    watch.observe(1.1, True, frozenset({ONE}))
+    assert events(said.looked(watch, 1.1)) == [Event.SERVER_CHANGED]
+    assert said.finished(watch, 1.2, 1.0, [UNKNOWN]) == []
+    assert said.canceled(watch, 1.0, [DENIED]) == []
+    assert events(said.finished(watch, 1.3, 1.2, [UNKNOWN])) == [Event.RESULT_UNKNOWN]
+    assert events(said.canceled(watch, 1.2, [DENIED])) == [Event.CANCEL_ANSWERED]
+
+
+def test_a_lost_server_is_back_only_when_it_can_be_talked_to(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(1.0, False, frozenset())
+    assert events(said.looked(watch, 1.0)) == [Event.SERVER_LOST]
+    said._goal.on(Event.SERVER_LOST, Now(1.0, 1.0))
+    watch.observe(2.0, False, BOTH)
+    assert said.looked(watch, 2.0) == []
+    watch.observe(2.1, True, BOTH)
+    assert events(said.looked(watch, 2.1)) == [Event.SERVER_RETURNED]
+    assert said.looked(watch, 2.2) == []
+
+
+def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_restarted(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.sent_to = frozenset({ONE})
+    said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
+    assert events(said.looked(watch, 0.0)) == [Event.SERVER_CHANGED]
+    assert said.finished(watch, 0.1, 0.0, [UNKNOWN]) == []
+    watch.probe_sent(0.2, 1)
+    watch.probe_answered(0.2, 1)
+    now = SLOWEST_START + SETTLED_AFTER
+    watch.observe(now, True, BOTH)
+    assert events(said.looked(watch, now)) == [Event.SERVER_LOST, Event.SERVER_RESTARTED]
