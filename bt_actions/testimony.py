@@ -73,10 +73,16 @@ class Testimony:
         return [(Event.REJECTED, None)]
 
     def canceled(self, watch: ServerWatch, asked: float, answers: Sequence[int]) -> Told:
-        """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal."""
+        """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal.
+
+        A denial by a newcomer counts at once: nothing is sent before it is known who lives, and
+        should the goal turn up all the same, it is canceled.
+        """
         if answers[-1] == CANCEL_UNKNOWN_GOAL:
-            denied_by_all = all(code == CANCEL_UNKNOWN_GOAL for code in answers)
-            if not denied_by_all or (len(answers) == 1 and self._speaks_for_one(watch, asked)):
+            if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
+                return []
+            by_one = len(answers) == 1 and len(self.sent_to) > 1
+            if by_one and (self._may_be_at_two(watch) or asked < self._fresh_since):
                 return []
         return [(Event.CANCEL_ANSWERED, answers[-1])]
 
@@ -151,10 +157,6 @@ class Testimony:
     def _may_be_at_two(self, watch: ServerWatch) -> bool:
         """Whether two of the servers that it was sent to are there, as far as is known."""
         return _is_crowded(watch) and len(self.sent_to & watch.gids) > 1
-
-    def _speaks_for_one(self, watch: ServerWatch, asked: float) -> bool:
-        """Whether a denial of one server may not be that of the one that has the goal."""
-        return _is_crowded(watch) or asked < self._fresh_since
 
 
 def _is_crowded(watch: ServerWatch) -> bool:

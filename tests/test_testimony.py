@@ -167,9 +167,7 @@ def test_what_a_newcomer_denied_may_arrive_when_it_is_gone(
     watch.observe(1.1, True, frozenset({ONE}))
     assert events(said.looked(watch, 1.1)) == [Event.SERVER_CHANGED]
     assert said.finished(watch, 1.2, 1.0, [UNKNOWN]) == []
-    assert said.canceled(watch, 1.0, [DENIED]) == []
     assert events(said.finished(watch, 1.3, 1.2, [UNKNOWN])) == [Event.RESULT_UNKNOWN]
-    assert events(said.canceled(watch, 1.2, [DENIED])) == [Event.CANCEL_ANSWERED]
 
 
 def test_a_lost_server_is_back_only_when_it_can_be_talked_to(

@@ -81,6 +81,8 @@ class Judge:
         if event is Event.CLOSED and before.state is not State.DONE:
             ledger.closed = True
             ledger.excuse = ledger.excuse or "its run, or the process, ended"
+        if event is Event.DRAINED and goal.end is End.UNKNOWN and not goal.accepted:
+            ledger.excuse = ledger.excuse or "its run ended, and has reported it as UNKNOWN"
         if event is Event.RESULT and before.state is not State.DONE and len(ledger.heard) > 1:
             world, node = self.caller.world, ticket.line.node
             known = [job for job in ledger.jobs if job.server.gid in ledger.heard]
