@@ -84,7 +84,7 @@ class Line:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.answered(self.watch, now, answers))
             elif answers[-1]:
-                self._found_twice(goal_id)
+                self._found_twice(goal_id, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
@@ -120,16 +120,18 @@ class Line:
                 self.tell(ticket, Event.REPLACED)  # this has overtaken the rival's acceptance
             self.tell(ticket, event, detail)
 
-    def _found_twice(self, goal_id: bytes) -> None:
+    def _found_twice(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
         """A second server has accepted a goal that has ended here: it is to cancel it."""
         past = next((past for past in self._past if past[1].goal.id == goal_id), None)
         if past is None:
             return
-        self._past.remove(past)
         owner, twin = past
-        twin.owner = owner()
         with contextlib.suppress(Exception):  # our node is gone; the next look tells
             self._observe(time.monotonic())
+        if sum(answers) > 1 and len(twin.testimony.sent_to | self.watch.gids) == 1:
+            return  # by one, twice
+        self._past.remove(past)
+        twin.owner = owner()
         self.watch.two_answered()
         twin.testimony.sent(self.watch)
         self.goals[goal_id] = twin
@@ -238,9 +240,10 @@ class Line:
         ticket = self.goals.pop(goal.id, None)
         if ticket is not None:
             self.client.forget(goal.id)
-            if goal.sent and goal.state is State.DONE:
+            if goal.sent and goal.state is State.DONE and ticket.owner is not None:
                 twin = goal.twin(self.traffic.clocks.now())
                 kept = dataclasses.replace(ticket, goal=twin, owner=None, feedback=deque())
+                kept.testimony.sent_to = ticket.testimony.sent_to
                 self._past.append((weakref.ref(ticket.owner), kept))
         if not self.goals:
             alarm.forget(self)

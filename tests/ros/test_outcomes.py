@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import time
+import uuid
 from collections.abc import Callable
 from typing import Any
 
@@ -245,6 +246,22 @@ class TestNoServer:
             until(lambda: leaf.progress().state == "WAITING_FOR_SERVER")
             serve()
             assert runner.wait(5.0) is Status.SUCCESS
+
+    def test_a_server_that_accepts_twice_is_one_server(
+        self, serve: Any, name: str, node: Any
+    ) -> None:
+        serve()
+        leaf = MoveRobot("m", 0.1, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            assert runner.run(9.0) is Status.SUCCESS
+            line, goal_id = leaf._line, bytes.fromhex(leaf.history[0].goal_id)
+            line.goal_answered(goal_id, (True, True))
+            assert not line.goals
+            line.goal_answered(uuid.uuid4().bytes, (True,))
+            assert not line.goals
+            line.goal_answered(goal_id, (False, True))
+            assert [ticket.goal.id for ticket in line.goals.values()] == [goal_id]
+            until(lambda: not line.goals)
 
     def test_two_servers_are_ambiguous_and_neither_gets_the_goal(
         self,
