@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
 
-from bt_actions.goal import Goal
 from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm
@@ -186,7 +185,7 @@ class Line:
         now = self.traffic.clocks.now()
         commands = step(now)
         if goal.state is State.DONE:
-            self.close_book(goal)
+            self.close_book(ticket)
         if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
             goal.reason += self._instead(ticket)
         if before != (goal.state, goal.outcome, goal.end):
@@ -235,10 +234,11 @@ class Line:
                 self._warned_take = True
                 log.error(f"{self.name}: something that arrived could not be taken: {error!r}")
 
-    def close_book(self, goal: Goal) -> None:
+    def close_book(self, ticket: Ticket) -> None:
         """Know nothing of this goal any more, and mind only what is left."""
-        ticket = self.goals.pop(goal.id, None)
-        if ticket is not None:
+        goal = ticket.goal
+        if self.goals.get(goal.id) is ticket:  # and not its twin
+            del self.goals[goal.id]
             self.client.forget(goal.id)
             if goal.sent and goal.state is State.DONE and ticket.owner is not None:
                 twin = goal.twin(self.traffic.clocks.now())
@@ -359,7 +359,7 @@ class Line:
                 if ticket.goal.lost and ticket.testimony.sent_to & self.watch.gids:
                     ticket.line, ticket.testimony.was_gone = self, True
                     self.goals[ticket.goal.id] = ticket
-                    line.close_book(ticket.goal)
+                    line.close_book(ticket)
                     alarm.mind(self)
 
     def shares_server_with(self, other: Line) -> bool:
@@ -375,7 +375,7 @@ class Line:
                 self.tell(ticket, Event.LEFT)
             if goal.lost:
                 self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
-                self.close_book(goal)
+                self.close_book(ticket)
 
     def _adopt(self) -> None:
         """Take over what was lost, or left, at this action before, to cancel it first."""

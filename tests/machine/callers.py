@@ -237,8 +237,8 @@ class Caller:
         goal = ticket.goal
         was_accepted = before.accepted
         self.judge.after(ticket, before, event, detail, commands)
-        if goal.state is State.DONE:
-            ticket.line.tickets.pop(goal.id, None)
+        if goal.state is State.DONE and ticket.line.tickets.get(goal.id) is ticket:
+            del ticket.line.tickets[goal.id]
         for command in commands:
             self._carry_out(ticket, command)
         if goal.accepted and not was_accepted and goal.busy is Busy.REPLACE:

@@ -28,6 +28,8 @@ from bt_actions import (
     Var,
 )
 from bt_actions.behaviours.variables import read, write
+from bt_actions.goal_terms import Event
+from bt_actions.ros.shared import lock
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.waiting import until
@@ -253,14 +255,19 @@ class TestNoServer:
         serve()
         leaf = MoveRobot("m", 0.1, action_name=name)
         with TreeRunner(leaf, node=node) as runner:
-            assert runner.run(9.0) is Status.SUCCESS
-            line, goal_id = leaf._line, bytes.fromhex(leaf.history[0].goal_id)
+            runner.start()
+            ticket = until(lambda: next(iter(leaf._line.goals.values()), None))
+            assert runner.wait(9.0) is Status.SUCCESS
+            line, goal_id = leaf._line, ticket.goal.id
             line.goal_answered(goal_id, (True, True))
             assert not line.goals
             line.goal_answered(uuid.uuid4().bytes, (True,))
             assert not line.goals
-            line.goal_answered(goal_id, (False, True))
-            assert [ticket.goal.id for ticket in line.goals.values()] == [goal_id]
+            with lock:
+                line.goal_answered(goal_id, (False, True))
+                twin = line.goals[goal_id]
+                line.tell(ticket, Event.INTERRUPTED)
+                assert line.goals == {goal_id: twin}, "the goal that has ended is not its twin"
             until(lambda: not line.goals)
 
     def test_two_servers_are_ambiguous_and_neither_gets_the_goal(
