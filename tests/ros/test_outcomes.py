@@ -256,7 +256,7 @@ class TestNoServer:
         leaf = MoveRobot("m", 0.1, action_name=name)
         with TreeRunner(leaf, node=node) as runner:
             runner.start()
-            ticket = until(lambda: next(iter(leaf._line.goals.values()), None))
+            ticket = until(lambda: leaf._line and next(iter(leaf._line.goals.values()), None))
             assert runner.wait(9.0) is Status.SUCCESS
             line, goal_id = leaf._line, ticket.goal.id
             line.goal_answered(goal_id, (True, True))
