@@ -20,8 +20,6 @@ from typing import Any
 
 from bt_actions.deadlines import Deadlines
 from bt_actions.goal_terms import (
-    CANCEL_ACCEPTED,
-    CANCEL_TERMINATED,
     CANCEL_UNKNOWN_GOAL,
     ENDS,
     OUTCOMES,
@@ -140,9 +138,10 @@ class Goal:
 
     @property
     def suspect(self) -> bool:
-        """Whether it counts as never started only because its server denies it, and not for long.
+        """Whether the request is still unanswered, though nobody wants it any more.
 
-        The server may still be deciding: the tree goes on, but must not end without asking again.
+        The server may still be deciding, also where it denies the goal by now: the tree goes on,
+        but must not end without asking again.
         """
         open_question = self._sent and not self._accepted and not self.lost
         return self.state is State.CANCELING and open_question and not self._never_came
@@ -283,9 +282,11 @@ class Goal:
         return State.CANCELING
 
     def _taken_by_two_while_canceling(self, now: Now, detail: Any) -> State:
-        """Whatever it was canceled for, it must not count as done, or be tried again."""
+        """Cancel, at both; it must not count as done, or be tried again."""
         if self.outcome is None and self._why not in _NEVER_DONE:
             self._plan(Outcome.SERVER_AMBIGUOUS, f"both of two servers may have it ({self.reason})")
+        if not self.lost:
+            self._ask(now)
         return State.CANCELING
 
     def _invalid(self, now: Now, detail: Any) -> State:
@@ -491,7 +492,7 @@ class Goal:
                 self._denied_since = now.steady
             if self.suspect and self._judged:
                 self._ask_once_more(now)
-        if detail in (CANCEL_ACCEPTED, CANCEL_TERMINATED) and not self._accepted:
+        if detail != CANCEL_UNKNOWN_GOAL and not self._accepted:
             return self._turned_up(now, detail)  # known to the server: it had been accepted
         return State.CANCELING
 
@@ -551,7 +552,7 @@ class Goal:
         if not self.lost:
             return self._drop(now, detail)
         self.lost = False
-        self._denied_since, self._asked = None, 0
+        self._denied_since, self._never_came, self._asked = None, False, 0
         if self.end is End.NEVER_STARTED:  # and this is the question whether that still holds
             self._ask(now)
             return State.CANCELING
@@ -562,10 +563,6 @@ class Goal:
             self._deadlines.arm(Event.ACCEPT_DUE, self._patience, now)
         self._ask(now)
         return State.CANCELING
-
-    def _server_restarted(self, now: Now, detail: Any) -> State:
-        """Forget what was lost with the old one."""
-        return State.DONE if self.lost else self._drop(now, detail)
 
     def _replaced_while_executing(self, now: Now, detail: Any) -> State:
         """Give it timeout.cancel to end by itself, as servers do that preempt."""
@@ -772,7 +769,6 @@ def _table() -> dict[tuple[State, Event], Row]:
         (canceling, Event.SERVER_AMBIGUOUS): (Goal._taken_by_two_while_canceling, {canceling}),
         (canceling, Event.REPLACED): (Goal._replaced_while_canceling, {canceling}),
         (canceling, Event.SERVER_RETURNED): (Goal._server_returned, {canceling}),
-        (canceling, Event.SERVER_RESTARTED): (Goal._server_restarted, {canceling, done}),
         (done, Event.INTERRUPTED): (Goal._stay, {done}),
         (done, Event.REPLACED): (Goal._stay, {done}),
         (done, Event.DRAINED): (Goal._stay, {done}),

@@ -51,14 +51,13 @@ class Event(Enum):
     ACCEPTED = "the server accepted the goal"
     REJECTED = "the server refused the goal"
     FEEDBACK = "feedback came"  # the message
-    STATUS = "the status topic shows the goal"  # GoalStatus number; terminal, or the first seen
+    STATUS = "the status topic shows the goal"  # GoalStatus number
     RESULT = "the result came"  # (GoalStatus number, message)
-    RESULT_UNKNOWN = "the only server, the one we sent to, does not know the goal"
+    RESULT_UNKNOWN = "whoever may have the goal does not know it"
     CANCEL_ANSWERED = "the server answered a cancel request"  # CancelGoal return code
     SERVER_CHANGED = "another server answers under the name; is the goal still known?"
     SERVER_LOST = "the server died or was restarted"  # reason
     SERVER_RETURNED = "the server we had lost is back, with whatever it still runs"
-    SERVER_RESTARTED = "in place of the server we had lost there is a new one"
     INTERRUPTED = "the tree no longer wants it"
     REPLACED = "a newer goal of this process was accepted in its place"
     DRAINED = "it was waited for long enough: what is not known stays so"
@@ -74,7 +73,7 @@ class Event(Enum):
 
 
 # GoalStatus and CancelGoal as ROS 2 numbers them (action_msgs).
-STATUS_SUCCEEDED, STATUS_CANCELED, STATUS_ABORTED = 4, 5, 6
+STATUS_EXECUTING, STATUS_SUCCEEDED, STATUS_CANCELED, STATUS_ABORTED = 2, 4, 5, 6
 CANCEL_ACCEPTED, CANCEL_REJECTED, CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED = 0, 1, 2, 3
 
 ENDS = {

@@ -193,7 +193,12 @@ class TreeRunner:
         self._outcome = None
         self._thread = threading.Thread(target=self._run_started, name="bt_actions-tree")
         self._thread.daemon = True  # the exit hook of ros/traffic.py drains what it leaves
-        self._thread.start()
+        try:
+            self._thread.start()
+        except RuntimeError:  # there can be no more threads
+            self._thread = None
+            self._running.release()
+            raise
 
     def _run_started(self) -> None:
         try:

@@ -16,7 +16,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from bt_actions.goal import Goal
-from bt_actions.goal_terms import CANCEL_UNKNOWN_GOAL, ENDS, STATUS_SUCCEEDED, Event
+from bt_actions.goal_terms import (
+    CANCEL_UNKNOWN_GOAL,
+    ENDS,
+    STATUS_EXECUTING,
+    STATUS_SUCCEEDED,
+    Event,
+)
 from bt_actions.policy import End
 from bt_actions.server import GID, Server, ServerWatch
 
@@ -36,14 +42,16 @@ class Testimony:
     def __init__(self, goal: Goal) -> None:
         self.sent_to: frozenset[GID] = frozenset()
         """Who was shown when the request went out, and may have taken it."""
-        self.was_gone = False
-        """When last looked at, none of these was there."""
         self._goal = goal
+        self._was_gone = False
+        """When last looked at, none of these was there."""
+        self._accepted_by = 0
         self._refused = False
         self._ended: tuple[int, Any] | None = None
         self._denied_at: float | None = None  # by one that it was not sent to, maybe
         self._asked_at = NEVER
         self._crowd: frozenset[GID] = frozenset()  # when last looked at, and not known who lives
+        self._told_of_two = False
         self._fresh_since = NEVER
         """What was asked before may have been answered by who is gone, or did not have it yet."""
 
@@ -53,16 +61,44 @@ class Testimony:
         if _is_crowded(watch):
             self._crowd = watch.gids
 
+    def is_at_another(self, watch: ServerWatch, now: float) -> None:
+        """The goal is a twin: it has ended at one of the servers that are shown."""
+        self.sent(watch)
+        self._accepted_by, self._fresh_since = 2, now
+
+    def is_elsewhere(self, gids: frozenset[GID]) -> None:
+        """The goal is a twin: it has ended, but for these servers, which are out of sight."""
+        self.sent_to = gids
+        self.taken_over()
+
+    def taken_over(self) -> None:
+        """Another node minds the goal from now on, and has not seen its server yet."""
+        self._was_gone = True
+        self._crowd = frozenset()
+
+    def may_run_at(self, watch: ServerWatch) -> frozenset[GID]:
+        """Return who may run it though it has ended here: who took it, perhaps, and has gone."""
+        doubtful = len(self.sent_to) > 1 and self._fresh_since > NEVER
+        return self.sent_to - watch.gids if doubtful else frozenset()
+
+    # Told by the servers
+
     def answered(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
         """Take an answer to the goal request: accepted or not."""
-        if sum(answers) > 1:
-            if len(self.sent_to | watch.gids) == 1:
-                return []  # by one, twice
+        if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:
+            return []  # by one, twice
+        self._accepted_by = sum(answers)
+        if self._accepted_by:
+            self._refused = False
+        if self._accepted_by > 1:
             watch.two_answered()
             self._fresh_since = now
             return [(Event.SERVER_AMBIGUOUS, None)]
         if answers[-1]:
-            return [(Event.ACCEPTED, None)]
+            if not self._goal.accepted or len(self.sent_to) == 1:
+                return [(Event.ACCEPTED, None)]
+            self._fresh_since = now  # one has shown it as accepted; this may be the other
+            return [(Event.SERVER_CHANGED, None)]
         if any(answers):
             return []  # it is refused here, and runs there
         if len(answers) == 1 and self._may_be_at_two(watch):
@@ -97,7 +133,7 @@ class Testimony:
             if len(self.sent_to) > 1:
                 if asked < self._fresh_since:
                     return []
-                if len(answers) == 1 and self._may_be_at_two(watch):
+                if len(answers) < max(2, self._accepted_by) and self._may_be_at_two(watch):
                     self._ended = done
                     return []
             return [(Event.RESULT, done)]
@@ -110,16 +146,32 @@ class Testimony:
         by_all = len(answers) > 1 or watch.state(now) is Server.READY
         return [(Event.RESULT_UNKNOWN, None)] if by_all and asked >= self._fresh_since else []
 
+    def shown(self, watch: ServerWatch, status: int) -> Told:
+        """Take the status that one server publishes of the goal."""
+        self.lives()
+        doubtful = self._may_be_at_two(watch) or self._fresh_since > NEVER
+        if status in ENDS and len(self.sent_to) > 1 and doubtful:
+            status = STATUS_EXECUTING  # it has ended at one; that it was accepted is sure
+        return [(Event.STATUS, status)]
+
+    def lives(self) -> None:
+        """Take feedback, or a status: who has the goal lives, whoever else denies it."""
+        if len(self.sent_to) == 1:
+            self._denied_at = None
+
+    # Told by discovery
+
     def looked(self, watch: ServerWatch, now: float) -> Told:
         """Take what discovery shows now."""
         goal, name = self._goal, self._goal.server
         gone = watch.gone(now, self.sent_to)
-        returned = self.was_gone and not gone and watch.state(now) is not Server.ABSENT
-        self.was_gone = gone or (self.was_gone and not returned)
+        returned = self._was_gone and not gone and watch.state(now) is not Server.ABSENT
+        self._was_gone = gone or (self._was_gone and not returned)
         one_left = bool(self._crowd - watch.gids)
         self._crowd = watch.gids if _is_crowded(watch) else frozenset()
         if goal.lost:
             if returned:
+                self._forget(now)
                 return [(Event.SERVER_RETURNED, None)]
             if gone and goal.end is End.UNKNOWN:  # it was left, not lost
                 return [(Event.SERVER_LOST, f"{name} is gone")]
@@ -127,10 +179,15 @@ class Testimony:
         if gone:
             how = "was restarted" if watch.gids else "went away"
             return [(Event.SERVER_LOST, f"{name} {how} under the goal")]
-        if one_left:
-            return self._ask_who_is_left(now)
+        if one_left:  # what was said before may have been its word: ask who is left
+            refused = self._refused
+            self._forget(now)
+            return [(Event.SERVER_AMBIGUOUS if refused else Event.SERVER_CHANGED, None)]
         if self._may_be_at_two(watch):
-            return [(Event.SERVER_AMBIGUOUS, None)] if watch.both_live else []
+            if not watch.both_live or self._told_of_two:
+                return []
+            self._told_of_two = True
+            return [(Event.SERVER_AMBIGUOUS, None)]
         if self._ended is not None:
             return [(Event.RESULT, self._ended)]
         if self._refused:
@@ -140,19 +197,16 @@ class Testimony:
         elif not goal.accepted or watch.state(now) is Server.AMBIGUOUS:
             pass
         elif self._denied_at is not None and watch.alone_since(now, self._denied_at):
-            how = f"{name} was restarted under the goal"
-            return [(Event.SERVER_LOST, how), (Event.SERVER_RESTARTED, None)]
+            return [(Event.SERVER_LOST, f"{name} was restarted under the goal")]
         elif now - self._asked_at > ASK_EVERY:
             self._asked_at = now
             return [(Event.SERVER_CHANGED, None)]
         return []
 
-    def _ask_who_is_left(self, now: float) -> Told:
-        """One of several is gone: what was said before may have been its word."""
+    def _forget(self, now: float) -> None:
         self._fresh_since = now
         self._ended = self._denied_at = None
-        refused, self._refused = self._refused, False
-        return [(Event.SERVER_AMBIGUOUS if refused else Event.SERVER_CHANGED, None)]
+        self._refused = False
 
     def _may_be_at_two(self, watch: ServerWatch) -> bool:
         """Whether two of the servers that it was sent to are there, as far as is known."""

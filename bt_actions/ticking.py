@@ -56,17 +56,17 @@ class Patience:
 
     def end_now(self) -> None:
         """The run is to end; safe in a signal handler."""
-        now = time.monotonic()
-        self._ends_at = now if self._ends_at is None else min(self._ends_at, now)
+        ends_at, now = self._ends_at, time.monotonic()
+        self._ends_at = now if ends_at is None else min(ends_at, now)
 
     def end(self) -> None:
         """The last tick is over, and so is all that a behaviour does when it is stopped."""
-        self._ends_at = self._ticks_on = None
+        self._ticks_on = None
 
     def gives_up(self) -> bool:
         """Whether the last tick should have been over for long."""
         ends_at = self._ends_at
-        if ends_at is None or time.monotonic() - ends_at < self.GRACE:
+        if self._ticks_on is None or ends_at is None or time.monotonic() - ends_at < self.GRACE:
             return False
         if not self.gave_up:
             self.gave_up = True

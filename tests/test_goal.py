@@ -224,7 +224,7 @@ def test_two_servers_are_sent_nothing() -> None:
 def test_what_two_servers_may_have_taken_is_canceled() -> None:
     life = executing()
     assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL, ASK]
-    assert life.on(Event.SERVER_AMBIGUOUS) == []
+    assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL, ASK], "a second acceptance: at once"
     life.on(Event.RESULT, SUCCEEDED)
     life.ended(Outcome.SERVER_AMBIGUOUS, End.SUCCEEDED)
     assert not life.goal.late
@@ -242,7 +242,7 @@ def test_what_two_servers_may_have_taken_unanswered_is_asked_for_and_canceled() 
 def test_what_two_servers_may_have_taken_is_no_late_success(why: Event) -> None:
     life = executing()
     life.on(why)
-    assert life.on(Event.SERVER_AMBIGUOUS) == []
+    assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL, ASK]
     life.on(Event.RESULT, SUCCEEDED)
     canceled = why is Event.INTERRUPTED
     life.ended(Outcome.CANCELED if canceled else Outcome.SERVER_AMBIGUOUS, End.SUCCEEDED)
@@ -666,20 +666,6 @@ def test_a_goal_lost_before_its_acceptance_is_judged_when_the_server_is_back() -
     assert not life.goal.live, "nothing is owed: others may be sent"
 
 
-def test_a_restart_ends_what_the_dead_server_ran() -> None:
-    life = executing()
-    life.on(Event.SERVER_LOST, "restarted")
-    life.on(Event.SERVER_RESTARTED)
-    life.ended(Outcome.SERVER_LOST, End.SERVER_GONE)
-
-
-def test_a_restart_of_a_server_that_is_not_lost_means_nothing() -> None:
-    life = executing()
-    life.on(Event.INTERRUPTED)
-    life.on(Event.SERVER_RESTARTED)
-    assert life.goal.state is State.CANCELING
-
-
 def test_a_suspect_judged_never_started_is_kept_in_mind_when_its_server_is_lost() -> None:
     """Its acceptance may have been under way when the link was cut."""
     life = suspect()
@@ -931,17 +917,33 @@ def test_a_suspect_that_is_denied_for_good_need_not_be_waited_for() -> None:
     assert life.goal.end is End.UNKNOWN
 
 
-def test_only_denials_count_towards_denied_for_good_and_only_as_long_as_nothing_else_came() -> None:
+def test_only_denials_count_towards_denied_for_good() -> None:
     life = denied_suspect()
-    life.pass_time(DENIED_FOR_GOOD)
-    life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED)
-    assert life.pass_time(ASK_AGAIN) == [CANCEL]
-    denied(life)
-    assert life.goal.suspect, "denied anew, and not for long"
     life.pass_time(DENIED_FOR_GOOD)
     assert life.goal.suspect, "silence is no denial"
     denied(life)
     assert not life.goal.suspect
+
+
+def test_a_server_that_refuses_to_cancel_it_has_accepted_it() -> None:
+    life = denied_suspect()
+    assert life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED) == [CANCEL, ASK]
+    assert life.goal.accepted
+    assert life.goal.end is End.UNKNOWN
+
+
+def test_a_server_that_is_back_is_not_asked_for_ever_for_what_it_has_denied_for_good() -> None:
+    life = denied_suspect()
+    life.pass_time(DENIED_FOR_GOOD)
+    denied(life)
+    life.on(Event.SERVER_LOST, "gone")
+    life.on(Event.SERVER_RETURNED)
+    for _ in range(60):
+        life.pass_time(1.0)
+        life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.sent.clear()
+    life.pass_time(60.0)
+    assert life.sent == []
 
 
 def test_a_suspect_that_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_good() -> (

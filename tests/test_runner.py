@@ -862,33 +862,3 @@ class TestTicks:
         timer = py_trees.timers.Timer("timer", duration=0.2)
         with TreeRunner(timer, node=node) as runner:
             assert runner.run(timeout=5.0) is Status.SUCCESS
-
-
-def open_files() -> int:
-    return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - as many as there are, no paths
-
-
-def test_fifty_cycles_leave_no_thread_and_no_file(
-    journal: Journal, name: str, executor: str, capfd: pytest.CaptureFixture[str]
-) -> None:
-    def cycle() -> None:
-        with TreeRunner(
-            together(MoveRobot("m", 0.0, action_name=name), py_trees.behaviours.Success("ok")),
-            executor=executor,
-        ) as runner:
-            runner.start()
-            runner.interrupt()
-            runner.wait(5.0)
-
-    warm_up: Callable[[], None] = cycle
-    for _ in range(3):
-        warm_up()
-    gc.collect()
-    capfd.readouterr()  # rclpy tells of what another test raised when its task is collected
-    threads, files = threading.active_count(), open_files()
-    for _ in range(25):
-        cycle()
-    gc.collect()
-    until(lambda: threading.active_count() <= threads)
-    until(lambda: open_files() <= files + 1)
-    assert capfd.readouterr().err == ""

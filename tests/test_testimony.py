@@ -194,4 +194,69 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
     watch.probe_answered(0.2, 1)
     now = SLOWEST_START + SETTLED_AFTER
     watch.observe(now, True, BOTH)
-    assert events(said.looked(watch, now)) == [Event.SERVER_LOST, Event.SERVER_RESTARTED]
+    assert events(said.looked(watch, now)) == [Event.SERVER_LOST]
+
+
+def test_the_status_of_one_of_two_shows_no_end(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.shown(watch, 5) == [(Event.STATUS, 2)]
+    said.looked(watch, 0.0)
+    watch.observe(1.0, True, frozenset({ONE}))
+    said.looked(watch, 1.0)
+    assert said.shown(watch, 5) == [(Event.STATUS, 2)], "it may be that of the one that has gone"
+    said.sent_to = frozenset({ONE})
+    assert said.shown(watch, 5) == [(Event.STATUS, 5)]
+
+
+def test_who_gives_feedback_lives_whoever_denies_the_goal(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.sent_to = frozenset({ONE})
+    said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
+    said.looked(watch, 0.0)
+    said.finished(watch, 0.1, 0.0, [UNKNOWN])
+    watch.probe_sent(0.2, 1)
+    watch.probe_answered(0.2, 1)
+    said.lives()
+    now = SLOWEST_START + SETTLED_AFTER
+    watch.observe(now, True, BOTH)
+    assert events(said.looked(watch, now)) == [Event.SERVER_CHANGED]
+
+
+def test_what_ended_at_one_may_run_at_the_other_that_has_gone(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert not said.may_run_at(watch)
+    said.answered(watch, 0.1, [True, True])
+    assert not said.may_run_at(watch), "both are there, and both have to tell"
+    watch.observe(1.0, True, frozenset({ONE}))
+    assert said.may_run_at(watch) == {OTHER}
+
+
+def test_three_that_accept_it_have_to_tell_three_ends(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.answered(watch, 0.1, [True, True, True])
+    assert said.finished(watch, 0.3, 0.2, [ABORTED, ABORTED]) == []
+    assert said.finished(watch, 0.3, 0.2, [ABORTED, ABORTED, ABORTED]) == [(Event.RESULT, ABORTED)]
+
+
+def test_what_was_said_before_a_loss_is_of_no_account_after_it(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == []
+    watch.observe(1.0, False, frozenset())
+    said._goal.on(*said.looked(watch, 1.0)[0][:1], Now(1.0, 1.0), "gone")
+    watch.observe(2.0, True, frozenset({OTHER}))
+    assert events(said.looked(watch, 2.0)) == [Event.SERVER_RETURNED]
+    said._goal.on(Event.SERVER_RETURNED, Now(2.0, 2.0))
+    assert said.looked(watch, 2.1) == [], "and not the end that the other told"
+
+
+def test_an_acceptance_that_follows_a_status_may_be_the_others(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said._goal.on(Event.STATUS, Now(0.0, 0.0), 2)
+    assert events(said.answered(watch, 1.0, [True])) == [Event.SERVER_CHANGED]
+    assert said.finished(watch, 1.1, 0.5, [UNKNOWN, ABORTED]) == [], "asked before it accepted"

@@ -41,6 +41,8 @@ TAKE_AT_MOST = 200
 DEPTH = 100
 """Of our end of the services; with the default of 10 a burst of answers is lost silently."""
 
+ASKED_KEPT = 10
+"""Questions of one kind about one goal whose answers are waited for: the newest."""
 GOALS_KEPT = 20
 """Goal requests, of those that are forgotten, of which a further acceptance is told all the same: a
 server that wakes up has the last ten in its queue."""
@@ -149,7 +151,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request.goal_info.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
             number = self._client_handle.send_cancel_request(request)
-            self._cancel_requests[number] = _Question(goal_id)
+            self._keep(self._cancel_requests, number, _Question(goal_id))
 
     def probe(self, probe: int, random_id: bytes) -> None:
         """Ask for a goal that nobody knows: each live server answers once, with status 0."""
@@ -160,7 +162,14 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
             number = self._client_handle.send_result_request(request)
-            self._result_requests[number] = _Question(about)
+            self._keep(self._result_requests, number, _Question(about))
+
+    @staticmethod
+    def _keep(filed: dict[int, _Question], number: int, question: _Question) -> None:
+        filed[number] = question
+        same = [other for other, asked in filed.items() if asked.about == question.about]
+        for oldest in same[:-ASKED_KEPT]:
+            del filed[oldest]
 
     def forget(self, goal: bytes | int) -> None:
         """Drop what is still filed for a goal (its id) or a probe (its number)."""

@@ -28,7 +28,7 @@ from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for
 from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
-from bt_actions.server import Server, ServerWatch
+from bt_actions.server import PROBES_KEPT, Server, ServerWatch
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
 
@@ -43,7 +43,6 @@ PUMP_EVERY = 0.01
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
-PROBES_KEPT = 20
 FEEDBACK = "/_action/feedback"
 
 _probes = itertools.count(1)
@@ -65,9 +64,10 @@ class Line:
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
-        self._past: deque[tuple[Any, Ticket]] = deque(maxlen=GOALS_KEPT)  # owners, by weakref
+        self._past: deque[tuple[Any, bool, Ticket]] = deque(maxlen=GOALS_KEPT)
+        """Of goals that are DONE: owner (a weakref), whether they were accepted, and their twin."""
         self._warned_crowd = False
-        self._warned_take = False
+        self._warned_of: set[str] = set()
         self._adopt()
 
     def __repr__(self) -> str:
@@ -91,6 +91,7 @@ class Line:
             ticket = self.goals.get(goal_id)
             if ticket is None:
                 return
+            ticket.testimony.lives()
             self.tell(ticket, Event.FEEDBACK, feedback)
             if ticket.keeps_feedback:
                 ticket.feedback.append(feedback)
@@ -121,18 +122,19 @@ class Line:
 
     def _found_twice(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
         """A second server has accepted a goal that has ended here: it is to cancel it."""
-        past = next((past for past in self._past if past[1].goal.id == goal_id), None)
+        past = next((past for past in self._past if past[2].goal.id == goal_id), None)
         if past is None:
             return
-        owner, twin = past
+        owner, was_accepted, twin = past
         with contextlib.suppress(Exception):  # our node is gone; the next look tells
             self._observe(time.monotonic())
-        if sum(answers) > 1 and len(twin.testimony.sent_to | self.watch.gids) == 1:
-            return  # by one, twice
+        alone = len(twin.testimony.sent_to | self.watch.gids) == 1
+        if alone and (was_accepted or sum(answers) > 1):
+            return  # the acceptance was overtaken by the result, or came twice
         self._past.remove(past)
         twin.owner = owner()
         self.watch.two_answered()
-        twin.testimony.sent(self.watch)
+        twin.testimony.is_at_another(self.watch, time.monotonic())
         self.goals[goal_id] = twin
         alarm.mind(self)
         self.tell(twin, Event.SERVER_RETURNED)
@@ -148,7 +150,8 @@ class Line:
         with lock:
             for goal_id in self.goals.keys() & statuses.keys():
                 if statuses[goal_id] > 0:
-                    self.tell(self.goals[goal_id], Event.STATUS, statuses[goal_id])
+                    ticket = self.goals[goal_id]
+                    self._pass_on(ticket, ticket.testimony.shown(self.watch, statuses[goal_id]))
 
     def probe_answered(self, probe: int) -> None:
         """Pass on the answer to a probe."""
@@ -161,6 +164,8 @@ class Line:
     def tell(self, ticket: Ticket, event: Event, detail: Any = None, message: Any = None) -> None:
         """Tell a goal what happened and do what it says; `message` is the goal to be sent."""
         with lock:
+            if event is Event.GRANTED and ticket.paused_at is not None:
+                ticket.paused_at = time.monotonic()  # its next deadline begins in the pause
             self._apply(ticket, lambda now: ticket.goal.on(event, now, detail), message)
 
     def poll(self, ticket: Ticket) -> None:
@@ -223,16 +228,19 @@ class Line:
             if command is Command.SEND:
                 self.tell(ticket, Event.SEND_FAILED, error)
             else:
-                log.warning(f"{self.name}: {command.name} could not be sent: {error!r}")
+                self._warn_once(f"{command.name} could not be sent: {error!r}")
 
     def pump(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
         try:
             self.client.pump()
         except Exception as error:  # noqa: BLE001 - the middleware's: any
-            if not self._warned_take:
-                self._warned_take = True
-                log.error(f"{self.name}: something that arrived could not be taken: {error!r}")
+            self._warn_once(f"something that arrived could not be taken: {error!r}")
+
+    def _warn_once(self, what: str) -> None:
+        if what not in self._warned_of:
+            self._warned_of.add(what)
+            log.error(f"{self.name}: {what}")
 
     def close_book(self, ticket: Ticket) -> None:
         """Know nothing of this goal any more, and mind only what is left."""
@@ -241,13 +249,27 @@ class Line:
             del self.goals[goal.id]
             self.client.forget(goal.id)
             if goal.sent and goal.state is State.DONE and ticket.owner is not None:
-                twin = goal.twin(self.traffic.clocks.now())
-                kept = dataclasses.replace(ticket, goal=twin, owner=None, feedback=deque())
-                kept.testimony.sent_to = ticket.testimony.sent_to
-                self._past.append((weakref.ref(ticket.owner), kept))
+                self._keep_in_mind(ticket)
         if not self.goals:
             alarm.forget(self)
             self.traffic.drop_if_unused(self)
+
+    def _keep_in_mind(self, ticket: Ticket) -> None:
+        """A goal is DONE, but a second server may have taken it: it may turn up there."""
+        twin = dataclasses.replace(
+            ticket,
+            goal=ticket.goal.twin(self.traffic.clocks.now()),
+            keeps_feedback=False,
+            feedback=deque(maxlen=1),
+        )
+        elsewhere = ticket.testimony.may_run_at(self.watch)
+        if elsewhere and not ticket.goal.lost:
+            twin.testimony.is_elsewhere(elsewhere)
+            self.goals[twin.goal.id] = twin
+            return
+        twin.owner = None
+        twin.testimony.sent_to = ticket.testimony.sent_to
+        self._past.append((weakref.ref(ticket.owner), ticket.goal.accepted, twin))
 
     def _instead(self, ticket: Ticket) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
@@ -357,7 +379,8 @@ class Line:
                 continue
             for ticket in list(line.goals.values()):
                 if ticket.goal.lost and ticket.testimony.sent_to & self.watch.gids:
-                    ticket.line, ticket.testimony.was_gone = self, True
+                    ticket.line = self
+                    ticket.testimony.taken_over()
                     self.goals[ticket.goal.id] = ticket
                     line.close_book(ticket)
                     alarm.mind(self)
@@ -380,7 +403,8 @@ class Line:
     def _adopt(self) -> None:
         """Take over what was lost, or left, at this action before, to cancel it first."""
         for ticket in self.traffic.domain.take_lost(self.name, self.action_type):
-            ticket.line, ticket.traffic, ticket.testimony.was_gone = self, self.traffic, True
+            ticket.line, ticket.traffic = self, self.traffic
+            ticket.testimony.taken_over()
             self.goals[ticket.goal.id] = ticket
             alarm.mind(self)
 
@@ -441,8 +465,9 @@ class Line:
     def _come_home(self) -> None:
         """The participant that we moved to is gone, if we did; our node is not."""
         if self._sight is None:
-            self._orphan()
-            return
+            if not is_valid(self.traffic.node):
+                self._orphan()
+            return  # else the next look may see more
         try:
             client = ActionClient(self.traffic.node, self.action_type, self.name, self)
         except Exception:  # noqa: BLE001 - or it is gone by now, too

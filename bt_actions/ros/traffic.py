@@ -57,8 +57,7 @@ class Traffic:
         """Since when the node's context is known here; a new one is blind to nothing."""
         self._lines: dict[str, Line] = {}
         self._observers: list[Observer] = []
-        self.unaccounted: list[Ticket] = []
-        """Goals that nobody waits for any more, though their end is UNKNOWN; some may still end."""
+        self._unaccounted: set[Ticket] = set()  # told of in the log; some may still end
 
     @classmethod
     def of(cls, node: Node) -> Traffic:
@@ -231,12 +230,14 @@ class Traffic:
         """Report a goal's change to the log and the observers."""
         goal = ticket.goal
         unknown = goal.outcome is not None and goal.end is End.UNKNOWN
-        if unknown and ticket not in self.unaccounted:
-            self.unaccounted.append(ticket)
+        known_of = ticket in self._unaccounted
+        if unknown and not known_of:
+            self._unaccounted.add(ticket)
             log.error(f"{goal!r}: not accounted for, it may still be running: {goal.reason}")
-        elif not unknown and ticket in self.unaccounted:
-            self.unaccounted.remove(ticket)
+        elif not unknown and known_of:
             log.info(f"{goal!r}: accounted for at last")
+        if not unknown or goal.state is State.DONE:
+            self._unaccounted.discard(ticket)
         now = self.clocks.now().ros
         self.notify(Change(now, ticket, goal.state, goal.outcome, goal.end, goal.reason))
 

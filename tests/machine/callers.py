@@ -12,7 +12,7 @@ from typing import Any
 
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.goal import Goal
-from bt_actions.goal_terms import ENDS, STATUS_SUCCEEDED, Command, Event, State
+from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.resources import Answer, Resources
 from bt_actions.server import Server
@@ -133,7 +133,8 @@ class Caller:
             line = self.lines[key] = Line(*key)
             for ticket in list(before.tickets.values()):
                 if ticket.goal.lost:
-                    ticket.line, ticket.testimony.was_gone = line, True
+                    ticket.line = line
+                    ticket.testimony.taken_over()
                     line.tickets[ticket.goal.id] = ticket
                 else:
                     self.tell(ticket, Event.CLOSED)
@@ -239,6 +240,8 @@ class Caller:
         self.judge.after(ticket, before, event, detail, commands)
         if goal.state is State.DONE and ticket.line.tickets.get(goal.id) is ticket:
             del ticket.line.tickets[goal.id]
+            self._keep_in_mind(ticket)
+            self.judge.is_done(ticket, event)
         for command in commands:
             self._carry_out(ticket, command)
         if goal.accepted and not was_accepted and goal.busy is Busy.REPLACE:
@@ -248,8 +251,8 @@ class Caller:
                 self.tell(older, Event.REPLACED)
 
     def _follow_twin(self, twin: Ticket, commands: tuple[Command, ...]) -> None:
-        if twin.goal.state is State.DONE:
-            twin.line.tickets.pop(twin.goal.id, None)
+        if twin.goal.state is State.DONE and twin.line.tickets.get(twin.goal.id) is twin:
+            del twin.line.tickets[twin.goal.id]
         for command in commands:
             self._carry_out(twin, command)
 
@@ -305,21 +308,21 @@ class Caller:
                 if line.action == message.server.action
                 and self.world.in_sight(message.server, line.node)
             ]
-        if message.kind == "answer" and message.detail and asker in self.lines.values():
-            self.judge.hears_acceptance(self.tickets[int(message.goal_id)], message.server)
         for line in hearing:
             ticket = self.addressee(line, message)
             if ticket is None and message.kind == "answer" and message.detail:
                 self._found_twice(line, message)
             elif ticket is not None:
                 self._take(ticket, message)
+        if message.kind == "answer" and message.detail and asker in self.lines.values():
+            self.judge.hears_acceptance(self.tickets[int(message.goal_id)], message.server)
 
     def _take(self, ticket: Ticket, message: Message) -> None:
         if message.kind == "feedback":
+            ticket.testimony.lives()
             self.tell(ticket, Event.FEEDBACK, message.detail)
         elif message.kind == "status":
-            if message.detail in ENDS or not ticket.goal.accepted:
-                self.tell(ticket, Event.STATUS, message.detail)
+            self._pass_on(ticket, ticket.testimony.shown(ticket.line.watch, message.detail))
         else:
             self._answered(ticket, message)
 
@@ -347,14 +350,25 @@ class Caller:
             return  # the same one again; or its run is over
         if past.goal.state is State.DONE and line in self.lines.values():
             known[message.server.gid] = True
-            twin = Ticket(past.goal.twin(self.world.now), f"{past.name}'", line, twin=True)
-            twin.ledger = Ledger(0.0, 0.0)
-            twin.testimony.was_gone = True
-            line.tickets[twin.goal.id] = twin
             self._observe(line)
+            if len(past.testimony.sent_to | line.watch.gids) == 1 and past.goal.accepted:
+                return
+            twin = self._twin(past)
             line.watch.two_answered()
-            twin.testimony.sent(line.watch)
+            twin.testimony.is_at_another(line.watch, self._moment())
             self.tell(twin, Event.SERVER_RETURNED)
+
+    def _twin(self, past: Ticket) -> Ticket:
+        twin = Ticket(past.goal.twin(self.world.now), f"{past.name}'", past.line, twin=True)
+        twin.ledger = Ledger(0.0, 0.0)
+        past.line.tickets[twin.goal.id] = twin
+        return twin
+
+    def _keep_in_mind(self, ticket: Ticket) -> None:
+        """A second server may have taken it, and has gone."""
+        elsewhere = ticket.testimony.may_run_at(ticket.line.watch)
+        if elsewhere and ticket.goal.sent and not ticket.goal.lost:
+            self._twin(ticket).testimony.is_elsewhere(elsewhere)
 
     def _pass_on(self, ticket: Ticket, told: Told) -> None:
         for event, detail in told:
@@ -404,7 +418,8 @@ class Caller:
             for ticket in list(other.tickets.values()):
                 if ticket.goal.lost and ticket.testimony.sent_to & line.watch.gids:
                     del other.tickets[ticket.goal.id]
-                    ticket.line, ticket.testimony.was_gone = line, True
+                    ticket.line = line
+                    ticket.testimony.taken_over()
                     line.tickets[ticket.goal.id] = ticket
 
     def attend(self) -> None:

@@ -83,11 +83,6 @@ class Judge:
             ledger.excuse = ledger.excuse or "its run, or the process, ended"
         if event is Event.DRAINED and goal.end is End.UNKNOWN and not goal.accepted:
             ledger.excuse = ledger.excuse or "its run ended, and has reported it as UNKNOWN"
-        if event is Event.RESULT and before.state is not State.DONE and len(ledger.heard) > 1:
-            world, node = self.caller.world, ticket.line.node
-            known = [job for job in ledger.jobs if job.server.gid in ledger.heard]
-            runs = any(job.live and world.in_sight(job.server, node) for job in known)
-            self._hold(not runs, "an end is known when it has ended everywhere")
         if event is Event.CANCEL_ANSWERED:
             ledger.denied = detail == CANCEL_UNKNOWN_GOAL
         if goal.end is End.NEVER_STARTED is not before.end and event is None:
@@ -302,9 +297,25 @@ class Judge:
         if reached > 1:
             ticket.ledger.crowded = True
 
+    def is_done(self, ticket: Ticket, event: Event | None) -> None:
+        """A goal is DONE, and its line has put it away."""
+        if event is Event.CLOSED or len(ticket.ledger.heard) < 2:
+            return
+        world, line = self.caller.world, ticket.line
+        known = [job for job in ticket.ledger.jobs if job.server.gid in ticket.ledger.heard]
+        runs = any(job.live and world.in_sight(job.server, line.node) for job in known)
+        rule = "an end is known when it has ended everywhere, or a twin is kept in mind"
+        self._hold(not runs or ticket.goal.id in line.tickets, rule)
+
     def hears_acceptance(self, ticket: Ticket, server: ModelServer) -> None:
-        """A server's acceptance has arrived, the first or one more."""
-        ticket.ledger.heard |= {server.gid}
+        """A server's acceptance has been taken in, the first or one more."""
+        news, ledger = server.gid not in ticket.ledger.heard, ticket.ledger
+        ledger.heard |= {server.gid}
+        runs = any(job.live and job.server is server for job in ledger.jobs)
+        several = len(ticket.testimony.sent_to | ticket.line.watch.gids) > 1
+        if news and runs and ticket.goal.state is State.DONE and several:
+            minded = ledger.closed or ticket.goal.id in ticket.line.tickets
+            self._hold(minded, "what a second server accepts of a goal that has ended is minded")
 
     def accepted_on_server(self, job: Job) -> None:
         """A server begins to execute a goal: is it alone on its resources?"""

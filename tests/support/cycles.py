@@ -61,6 +61,15 @@ def on_a_node_of_its_own(cycle: int) -> None:
         check(runner.run(timeout=20.0) is Status.SUCCESS, f"cycle {cycle}: {leaf.outcome}")
 
 
+def interrupted(cycle: int) -> None:
+    """Interrupted before anything has begun; there is no server."""
+    leaf = MoveRobot("move", 0.0, action_name=NAME)
+    with TreeRunner(leaf, executor="single" if cycle % 2 else "multi") as runner:
+        runner.start()
+        runner.interrupt()
+        check(runner.wait(20.0) is Status.INVALID, f"cycle {cycle}: {leaf.outcome}")
+
+
 class User:
     """A user's own context, node and executor, in which trees are run."""
 
@@ -99,7 +108,8 @@ def main() -> None:
     """Run the cycles."""
     how, cycles = sys.argv[1], int(sys.argv[2])
     user = User() if how == "user" else None
-    one: Callable[[int], None] = user.cycle if user else on_a_node_of_its_own
+    alone = interrupted if how == "interrupted" else on_a_node_of_its_own
+    one: Callable[[int], None] = user.cycle if user else alone
     told = []
     longest = 0.0
     for cycle in range(1, cycles + 1):
