@@ -451,11 +451,18 @@ class TreeRunner:
 
         Between two runs only of those that a run of ours has left.
         """
-        if self._runs_on is None and (change is None or change.ticket not in self._tickets):
-            return
+        if self._runs_on is None:
+            if change is None or not self._has_left(change.ticket):
+                return
+            self._tickets.add(change.ticket)  # a twin is news
         if change is not None:
             self._changes.append(change)
         self._wake()
+
+    def _has_left(self, ticket: Ticket) -> bool:
+        return ticket in self._tickets or (
+            ticket.begun_by is self._patience and not ticket.accounted_for
+        )
 
     def _flush(self) -> None:
         while True:

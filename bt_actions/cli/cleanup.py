@@ -76,7 +76,10 @@ def sweep(look: float, patience: float) -> Exit:
             "container, where it cannot be seen whether it is alive (see BT_ACTIONS_MACHINE)"
         )
     for goal in goals:
-        write(f"{goal.action}  {goal.goal_id.hex()}  {goal.end}\n")
+        crowd = f": {goal.servers} servers of this name, and each may run it"
+        write(
+            f"{goal.action}  {goal.goal_id.hex()}  {goal.end}{crowd if goal.servers > 1 else ''}\n"
+        )
     if any(goal.end is End.UNKNOWN for goal in goals):
         note("not all of them have ended; they may still be running")
         return Exit.UNKNOWN

@@ -24,6 +24,7 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions.goal_ids import author_of
 from bt_actions.goal_terms import ENDS
 from bt_actions.policy import End
+from bt_actions.ros.graph import servers
 
 STATUS = "/_action/status"
 ASK_AGAIN = 1.0
@@ -35,13 +36,23 @@ client was just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers 
 
 @dataclass(slots=True)
 class LeftBehind:
-    """A goal whose orchestrator is dead. `end` is UNKNOWN until the server tells."""
+    """A goal whose orchestrator is dead. `end` is UNKNOWN until the server tells.
+
+    Where `servers` of one name are shown, and not one, it stays UNKNOWN: either may run it, and a
+    status does not tell whose it is.
+    """
 
     action: str
     goal_id: bytes
     pid: int
-    end: End = End.UNKNOWN
+    shown: End = End.UNKNOWN
+    servers: int = 1
     asked_at: float = float("-inf")
+
+    @property
+    def end(self) -> End:
+        """How it ended, as far as is known."""
+        return self.shown if self.servers <= 1 else End.UNKNOWN
 
 
 def cleanup(
@@ -129,7 +140,7 @@ class _Sweep:
             goal_id = bytes(entry.goal_info.goal_id.uuid)
             left = self.left.get(goal_id)
             if left is not None:
-                left.end = ENDS.get(entry.status, End.UNKNOWN)
+                left.shown = ENDS.get(entry.status, End.UNKNOWN)
                 continue
             author = author_of(goal_id)
             if entry.status in ENDS or author is None:
@@ -146,6 +157,7 @@ class _Sweep:
         """Ask the servers to cancel what has not ended, again every second."""
         now = time.monotonic()
         for left in self.left.values():
+            left.servers = len(servers(self._node, left.action))
             if left.end is not End.UNKNOWN or now - left.asked_at < ASK_AGAIN:
                 continue
             client = self._clients.get(left.action)

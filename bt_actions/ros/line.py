@@ -41,6 +41,8 @@ LOOK_WHILE_LOST = 1.0
 PUMP_EVERY = 0.01
 """Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
+STALE = 2.0
+"""Seconds after a goal's end within which an older word of its server may still arrive."""
 TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
 FEEDBACK = "/_action/feedback"
@@ -64,8 +66,8 @@ class Line:
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
         self._last_probes: deque[int] = deque()
-        self._past: deque[tuple[Any, bool, Ticket]] = deque(maxlen=GOALS_KEPT)
-        """Of goals that are DONE: owner (a weakref), whether they were accepted, and their twin."""
+        self._past: dict[bytes, tuple[Any, bool, float, Ticket]] = {}
+        """Of goals that are DONE: owner (a weakref), was it accepted, since when, and its twin."""
         self._warned_crowd = False
         self._warned_of: set[str] = set()
         self._adopt()
@@ -90,6 +92,7 @@ class Line:
         with lock:
             ticket = self.goals.get(goal_id)
             if ticket is None:
+                self._runs_on(goal_id)
                 return
             ticket.testimony.lives()
             self.tell(ticket, Event.FEEDBACK, feedback)
@@ -122,22 +125,28 @@ class Line:
 
     def _found_twice(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
         """A second server has accepted a goal that has ended here: it is to cancel it."""
-        past = next((past for past in self._past if past[2].goal.id == goal_id), None)
+        past = self._past.get(goal_id)
         if past is None:
             return
-        owner, was_accepted, twin = past
+        owner, was_accepted, _, twin = past
         with contextlib.suppress(Exception):  # our node is gone; the next look tells
             self._observe(time.monotonic())
         alone = len(twin.testimony.sent_to | self.watch.gids) == 1
         if alone and (was_accepted or sum(answers) > 1):
             return  # the acceptance was overtaken by the result, or came twice
-        self._past.remove(past)
+        del self._past[goal_id]
         twin.owner = owner()
         self.watch.two_answered()
         twin.testimony.is_at_another(self.watch, time.monotonic())
         self.goals[goal_id] = twin
         alarm.mind(self)
         self.tell(twin, Event.SERVER_RETURNED)
+
+    def _runs_on(self, goal_id: bytes) -> None:
+        """A server runs a goal that has ended here, unless this is older than the end."""
+        past = self._past.get(goal_id)
+        if past is not None and time.monotonic() - past[2] > STALE:
+            self._found_twice(goal_id, (True,))
 
     def _rival_sent(self, ticket: Ticket) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
@@ -148,6 +157,9 @@ class Line:
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
         with lock:
+            for goal_id in self._past.keys() & statuses.keys() - self.goals.keys():
+                if 0 < statuses[goal_id] < STATUS_SUCCEEDED:
+                    self._runs_on(goal_id)
             for goal_id in self.goals.keys() & statuses.keys():
                 if statuses[goal_id] > 0:
                     ticket = self.goals[goal_id]
@@ -269,7 +281,10 @@ class Line:
             return
         twin.owner = None
         twin.testimony.sent_to = ticket.testimony.sent_to
-        self._past.append((weakref.ref(ticket.owner), ticket.goal.accepted, twin))
+        past = (weakref.ref(ticket.owner), ticket.goal.accepted, time.monotonic(), twin)
+        self._past[twin.goal.id] = past
+        if len(self._past) > GOALS_KEPT:
+            del self._past[next(iter(self._past))]
 
     def _instead(self, ticket: Ticket) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""

@@ -250,7 +250,7 @@ class TestNoServer:
             assert runner.wait(5.0) is Status.SUCCESS
 
     def test_a_server_that_accepts_twice_is_one_server(
-        self, serve: Any, name: str, node: Any
+        self, serve: Any, new_host: HostFactory, name: str, node: Any
     ) -> None:
         serve()
         leaf = MoveRobot("m", 0.1, action_name=name)
@@ -261,10 +261,13 @@ class TestNoServer:
             line, goal_id = leaf._line, ticket.goal.id
             line.goal_answered(goal_id, (True, True))
             assert not line.goals
+            line.goal_answered(goal_id, (True,))
             line.goal_answered(uuid.uuid4().bytes, (True,))
             assert not line.goals
+            new_host().open(name)
+            until_two_are_seen(node, name)
             with lock:
-                line.goal_answered(goal_id, (False, True))
+                line.goal_answered(goal_id, (True, True))
                 twin = line.goals[goal_id]
                 line.tell(ticket, Event.INTERRUPTED)
                 assert line.goals == {goal_id: twin}, "the goal that has ended is not its twin"
