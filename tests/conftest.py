@@ -6,13 +6,15 @@ Nothing of ROS is imported before a test asks for it, so the other tests stay fa
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import fcntl
 import itertools
 import os
 import signal
+import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +30,25 @@ DOMAINS = range(70, 90)
 OUR_OWN = ("bt_actions-alarm", "bt_actions-log", "bt_actions-lookout")
 """Threads that outlive what they were started for, and end by themselves or with the process."""
 _names = itertools.count(1)
+STUCK = 900.0
+"""Seconds after which a test hangs where no Python runs any more, nor pytest's own timeout:
+with several participants in one process Fast DDS was seen not to return from destroying a node."""
+_STDERR = pytest.StashKey[int]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    assert sys.__stderr__ is not None
+    config.stash[_STDERR] = os.dup(sys.__stderr__.fileno())  # the real one, while none is captured
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """End the process, telling where each thread is, when a test hangs for good."""
+    faulthandler.dump_traceback_later(STUCK, exit=True, file=item.config.stash[_STDERR])
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 @pytest.fixture(scope="session", autouse=True)
