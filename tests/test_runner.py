@@ -292,8 +292,9 @@ class TestStart:
         runners: list[TreeRunner] = []
 
         def callback() -> None:
-            runners.append(TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node))
-            runners[0].start()
+            runner = TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node)
+            runner.start()
+            runners.append(runner)
 
         with spun(node) as executor:
             executor.create_task(callback)

@@ -17,6 +17,8 @@ from py_trees.common import Status
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
 from bt_actions.goal import State
+from bt_actions.ros.shared import lock
+from bt_actions.server import Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import Host, HostFactory, Journal
 from tests.support.reliability import Record
@@ -42,6 +44,20 @@ def until_shown(node: Any, name: str, servers: int) -> None:
     """Wait until discovery shows the node of the tests so many servers."""
     topic = f"{name}/_action/status"
     until(lambda: len(node.get_publishers_info_by_topic(topic)) == servers, 6.0, what=topic)
+
+
+def until_both_hear(leaf: MoveRobot, node: Any) -> None:
+    """Set the leaf up, and wait until two servers answer its client, and so will hear it later."""
+    leaf.setup(node=node)
+    line = leaf._line
+    assert line is not None
+
+    def state_now() -> Server:
+        with lock:
+            return line.look(time.monotonic())
+
+    until(lambda: state_now() is Server.AMBIGUOUS, 9.0, meanwhile=line.pump)
+    line.watch = ServerWatch()  # and then it is as if they were seen for the first time
 
 
 class TestKilled:
@@ -496,9 +512,9 @@ class TestTwice:
         one, other = new_host(short_lease=False), new_host(short_lease=False)
         one.open(name)
         journal = other.open(name)
-        until_shown(node, name, 2)
-        other.send(signal.SIGSTOP)
         leaf = MoveRobot("m", 40.0, action_name=name, timeout=Timeouts(server=20.0))
+        until_both_hear(leaf, node)
+        other.send(signal.SIGSTOP)
         with TreeRunner(leaf, node=node) as runner:
             runner.start()
             until(lambda: leaf.progress().feedback is not None, 20.0)
@@ -519,9 +535,9 @@ class TestTwice:
         one.open(name)
         lost = ["*:drop_accept"] if answer == "lost" else []
         journal = other.open(name, "*:slow=100", *lost)
-        until_shown(node, name, 2)
-        other.send(signal.SIGSTOP)
         leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=20.0))
+        until_both_hear(leaf, node)
+        other.send(signal.SIGSTOP)
         more = MoveRobot("more", 0.3, action_name=name, timeout=Timeouts(server=20.0))
         with TreeRunner(leaf, node=node) as runner:
             assert runner.run(30.0) is Status.SUCCESS
