@@ -1,7 +1,8 @@
 """Which servers of an action the ROS graph shows to a node.
 
 A server is known by the GID of its reader of goal requests: who has one takes what is sent, from
-the moment on that it is shown, which is before the rest of the server is (up to 18 ms, in 12 openings).
+the moment on that it is shown; the rest of a server that opens follows (within 18 ms, in 12
+openings).
 """
 
 from __future__ import annotations
