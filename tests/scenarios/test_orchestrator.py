@@ -175,8 +175,9 @@ class Stuck(Behaviour):
     ticks = 0
 
     def update(self):
-        self.ticks += 1
-        if self.ticks == 10:
+        move = self.parent.children[0]
+        self.ticks += move.progress().state == "EXECUTING"
+        if self.ticks == 3:
             print("blocked", flush=True)
             threading.Event().wait()
         return Status.RUNNING
@@ -193,7 +194,6 @@ def test_a_signal_while_a_behaviour_does_not_return_from_its_tick(
     text = path.read_text().replace("sequence: Work", "parallel: Work")
     path.write_text(f"{text}    - python: stuck_here.Stuck\n")
     run = launch("run", str(path), environment={"PYTHONPATH": f"{ROOT}:{tmp_path}"})
-    run.line("executing on")
     run.line("blocked")
     sent = run.send(signal.SIGTERM)
     journal.wait_for("canceled", within=9.0)
