@@ -240,19 +240,19 @@ class Line:
             if command is Command.SEND:
                 self.tell(ticket, Event.SEND_FAILED, error)
             else:
-                self._warn_once(f"{command.name} could not be sent: {error!r}")
+                self._warn_once(f"{command.name} could not be sent", error)
 
     def pump(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
         try:
             self.client.pump()
         except Exception as error:  # noqa: BLE001 - the middleware's: any
-            self._warn_once(f"something that arrived could not be taken: {error!r}")
+            self._warn_once("something that arrived could not be taken", error)
 
-    def _warn_once(self, what: str) -> None:
+    def _warn_once(self, what: str, error: Exception) -> None:
         if what not in self._warned_of:
             self._warned_of.add(what)
-            log.error(f"{self.name}: {what}")
+            log.error(f"{self.name}: {what}: {error!r}")
 
     def close_book(self, ticket: Ticket) -> None:
         """Know nothing of this goal any more, and mind only what is left."""
