@@ -30,6 +30,7 @@ test: lint types ## check the code and run every test
 
 docs: dev ## remake the pages and pictures that come from the code; `make test` fails when one is stale
 	$(BIN)/python scripts/goal_doc.py
+	$(BIN)/python scripts/python_doc.py
 	$(BIN)/python scripts/yaml_doc.py
 	$(BIN)/python scripts/pictures.py
 

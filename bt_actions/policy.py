@@ -18,11 +18,13 @@ class Outcome(StrEnum):
     """Why a leaf stopped."""
 
     SUCCEEDED = "SUCCEEDED"
+    """The server succeeded, and ``expect`` holds."""
     UNEXPECTED_RESULT = "UNEXPECTED_RESULT"
     """The server succeeded, but ``expect`` does not hold."""
     REJECTED = "REJECTED"
     """The server refused the goal."""
     ABORTED = "ABORTED"
+    """The server gave up; its result is kept."""
     CANCELED = "CANCELED"
     """This process stopped it, whatever status it ended with."""
     CANCELED_BY_OTHER = "CANCELED_BY_OTHER"
@@ -36,6 +38,7 @@ class Outcome(StrEnum):
     ACCEPT_TIMEOUT = "ACCEPT_TIMEOUT"
     """The goal request was not answered within ``Timeouts.accept``; it may have been executed."""
     RESULT_TIMEOUT = "RESULT_TIMEOUT"
+    """Not finished within ``Timeouts.result``."""
     STALLED = "STALLED"
     """No feedback for ``Timeouts.feedback``."""
     SERVER_LOST = "SERVER_LOST"
@@ -48,11 +51,15 @@ class End(StrEnum):
     """How a goal stands on its server."""
 
     SUCCEEDED = "SUCCEEDED"
+    """The server said so, as for the next two."""
     ABORTED = "ABORTED"
     CANCELED = "CANCELED"
     NEVER_STARTED = "NEVER_STARTED"
+    """Not sent, refused, or denied by its server for good."""
     SERVER_GONE = "SERVER_GONE"
+    """The server went away with it; should it come back, the goal is canceled first."""
     UNKNOWN = "UNKNOWN"
+    """It may still be running."""
 
 
 class Busy(StrEnum):

@@ -25,6 +25,20 @@ __all__ = ["read_document", "read_root"]
 _CHILDREN = ("child", "children")
 _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
+_MEMORY = "with 'memory: false'"
+_OTHER_NAMES = {
+    "selector": "'fallback'",
+    "reactivesequence": f"'sequence' {_MEMORY}",
+    "reactivefallback": f"'fallback' {_MEMORY}",
+    "reactiveselector": f"'fallback' {_MEMORY}",
+    "oneshot": "'run_once'",
+    "loop": "'repeat', 'while' or 'for_each'",
+    "condition": "'check'",
+    "sleep": "'wait'",
+    "delay": "'wait'",
+    "include": "'subtree'",
+}
+"""What behaviour trees elsewhere call it, in small letters, and what it is called here."""
 
 
 def read_document(source: Source, *, library: bool = False) -> Document | None:
@@ -187,8 +201,10 @@ class _Reader:
         if any(self._doubts.declares(word.text) for word in words):
             return
         known = [*KINDS, *self._actions]
-        key = next((word for word in words if closest(word.text, known)), words[0])
-        near = did_you_mean(key.text, known)
+        meant = (word for word in words if _other_name(word) or closest(word.text, known))
+        key = next(meant, words[0])
+        other = _other_name(key)
+        near = f"; here it is {other}" if other else did_you_mean(key.text, known)
         own = listing(self._actions)
         hint = f"this tree's actions are {own}" if own else "this tree declares no actions"
         message = f"no kind of node and no action is called {key.text!r}{near}"
@@ -286,3 +302,7 @@ _ACTION_NAME = KINDS["sequence"]
 _ACTION_NEEDS = required_in(ACTION_KEYS)
 _NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
 """The keys that must be there."""
+
+
+def _other_name(word: Scalar) -> str | None:
+    return _OTHER_NAMES.get(word.text.casefold().replace("_", ""))

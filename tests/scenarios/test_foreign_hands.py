@@ -122,7 +122,7 @@ def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
 
 
 @pytest.mark.parametrize(
-    ("name", "number"), zip(RUNNERS, (signal.SIGTERM, signal.SIGINT), strict=True)
+    ("name", "number"), list(zip(RUNNERS, (signal.SIGTERM, signal.SIGINT), strict=True))
 )
 def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
     programs: dict[str, Program], name: str, number: signal.Signals
