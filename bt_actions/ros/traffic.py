@@ -288,7 +288,7 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
             for line in {ticket.line for ticket in waits}:
                 line.pump()
             for ticket in waits:
-                ticket.line.poll(ticket)
+                ticket.line.mind(ticket)
             waits = [ticket for ticket in waits if not ticket.accounted_for]
             if waits:
                 changed.wait(0.005)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import End, MoveRobot, Outcome
+from bt_actions.ros.traffic import drain
 from tests.support.processes import Host
 from tests.support.waiting import until
 
@@ -59,4 +61,38 @@ def test_a_process_that_ends_begins_nothing_any_more(
     assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.NEVER_STARTED)
     assert journal.count("received") == 0
     tree.shutdown()
+    host.close_server(name)
+
+
+def test_a_goal_that_cannot_be_minded_keeps_no_other_from_its_deadline(
+    host: Host, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = host.open(name)
+    broken = MoveRobot("a", 50.0, action_name=name, busy="share")
+    sound = MoveRobot("b", 50.0, action_name=name, busy="share", timeout=0.5)
+    leaves = [broken, sound]
+    for leaf in leaves:
+        leaf.setup(node=node)
+
+    def both_execute() -> bool:
+        for leaf in leaves:
+            leaf.tick_once()
+        return all(leaf.progress().state == "EXECUTING" for leaf in leaves)
+
+    until(both_execute, 20.0)
+
+    def fails(now: Any) -> None:
+        raise AssertionError("a mistake")
+
+    (ticket,) = broken.open_tickets()
+    with monkeypatch.context() as patched:
+        patched.setattr(ticket.goal, "poll", fails)
+        until(lambda: sound.drained, what="the other's deadline takes effect")
+    assert journal.count("canceled") == 1
+    for leaf in leaves:
+        leaf.stop(Status.INVALID)
+    drain(broken.open_tickets())
+    assert journal.count("canceled") == 2
+    for leaf in leaves:
+        leaf.shutdown()
     host.close_server(name)
