@@ -95,6 +95,8 @@ class TreeRunner:
         self._pause_wanted = False
         self._paused = False
         self._spin_error: BaseException | None = None
+        self._leaving: BaseException | None = None
+        """What an observer, or a terminate(), raised to end the program: after the drain."""
         self._thread: threading.Thread | None = None
         self._outcome: Status | BaseException | None = None
         self._running = threading.Lock()
@@ -137,7 +139,11 @@ class TreeRunner:
         ]
 
     def observe(self, callback: Observer) -> None:
-        """Call `callback` with each event of a run, on the ticking thread."""
+        """Call `callback` with each event of a run, on the ticking thread.
+
+        One that raises is removed, and the run goes on; SystemExit and the like end it, and are
+        raised again when its goals have been drained.
+        """
         self._observers.append(callback)
 
     def on_close(self, callback: Callable[[], None]) -> None:
@@ -328,10 +334,14 @@ class TreeRunner:
             status = self._tick_until(deadline)
         except BaseException:
             self._end(Status.INVALID)
+            self._leaving = None
             raise
         finally:
             self.tree.visitors.remove(self._visitor)
         self._end(status)
+        leaving, self._leaving = self._leaving, None
+        if leaving is not None:
+            raise leaving
         if status is Status.INVALID and not self._stop_wanted:
             raise TimeoutError(f"{self.tree.root.name} did not finish within {timeout:g} s")
         return status
@@ -410,7 +420,8 @@ class TreeRunner:
         if any(node.status is Status.RUNNING for node in root.iterate()):  # not the root, then
             try:
                 root.stop(Status.INVALID)
-            except Exception:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
+            except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
+                self._leave_with(error)
                 for node in root.iterate():
                     if isinstance(node, ActionBehaviour):
                         node.terminate(Status.INVALID)
@@ -499,9 +510,16 @@ class TreeRunner:
         for observer in list(self._observers):
             try:
                 observer(event)
-            except Exception as error:  # noqa: BLE001 - the run goes on without it
+            except BaseException as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
                 self.node.get_logger().error(f"an observer raised and was removed: {error!r}")
+                self._leave_with(error)
+
+    def _leave_with(self, error: BaseException) -> None:
+        """End the run, and then raise what is meant to end the program, as SystemExit is."""
+        if not isinstance(error, Exception):
+            self._leaving, self._stop_wanted = error, True
+            self._wake()
 
 
 def _past(deadline: float | None) -> bool:

@@ -657,6 +657,49 @@ class TestEvents:
         assert len(calls) == 1
         assert isinstance(events[-1], TreeFinished)
 
+    def test_an_observer_that_ends_the_program_does_so_after_the_drain(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        calls: list[Event] = []
+
+        def leaves(event: Event) -> None:
+            if getattr(event, "state", "") == "EXECUTING" or calls:
+                calls.append(event)
+                raise SystemExit(7)
+
+        events: list[Event] = []
+        leaf = MoveRobot("m", 50.0, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.observe(leaves)
+            runner.observe(events.append)
+            with pytest.raises(SystemExit, match="7"):
+                runner.run(timeout=9.0)
+            assert (leaf.end, journal.count("canceled")) == (End.CANCELED, 1)
+        assert len(calls) == 1
+        assert isinstance(events[-1], TreeFinished)
+
+    def test_a_terminate_that_ends_the_program_does_so_after_the_drain(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        class Leaves(py_trees.behaviours.Running):
+            armed = True
+
+            def terminate(self, new_status: Status) -> None:
+                if self.armed:
+                    self.armed = False  # it is called again at shutdown
+                    raise SystemExit(7)
+
+        def interrupts(event: Event) -> None:
+            if getattr(event, "state", "") == "EXECUTING":
+                runner.interrupt()
+
+        leaf = MoveRobot("m", 50.0, action_name=name)
+        with TreeRunner(together(Leaves("leaves"), leaf), node=node) as runner:
+            runner.observe(interrupts)
+            with pytest.raises(SystemExit, match="7"):
+                runner.run(timeout=9.0)
+            assert (leaf.end, journal.count("canceled")) == (End.CANCELED, 1)
+
     def test_an_observer_is_called_on_the_ticking_thread(
         self, journal: Journal, name: str, node: Any
     ) -> None:
