@@ -565,7 +565,10 @@ class Goal:
         return State.CANCELING
 
     def _replaced_while_executing(self, now: Now, detail: Any) -> State:
-        """Give it timeout.cancel to end by itself, as servers do that preempt."""
+        """Give it timeout.cancel to be preempted; where another server has the newer, cancel."""
+        if detail is not None and detail != self.server:
+            self._replaced = True
+            return self._cancel(now, Outcome.CANCELED, f"replaced by a newer goal on {detail}")
         if self._replaced:
             return State.EXECUTING  # by a newer one still, which gives it no more time
         self._replaced = True
@@ -751,7 +754,7 @@ def _table() -> dict[tuple[State, Event], Row]:
         (executing, Event.FEEDBACK_DUE): (Goal._feedback_due, {canceling}),
         (executing, Event.INTERRUPTED): (Goal._interrupted, {canceling}),
         (executing, Event.SERVER_AMBIGUOUS): (Goal._taken_by_two, {canceling}),
-        (executing, Event.REPLACED): (Goal._replaced_while_executing, {executing}),
+        (executing, Event.REPLACED): (Goal._replaced_while_executing, {executing, canceling}),
         (executing, Event.CANCEL_DUE): (Goal._replaced_too_long, {canceling}),
         (canceling, Event.SEND_FAILED): (Goal._send_failed, {done}),
         (canceling, Event.ACCEPTED): (Goal._turned_up, {canceling}),

@@ -59,7 +59,7 @@ class Event(Enum):
     SERVER_LOST = "the server died or was restarted"  # reason
     SERVER_RETURNED = "the server we had lost is back, with whatever it still runs"
     INTERRUPTED = "the tree no longer wants it"
-    REPLACED = "a newer goal of this process was accepted in its place"
+    REPLACED = "a newer goal of this process was accepted in its place"  # by which server
     DRAINED = "it was waited for long enough: what is not known stays so"
     LEFT = "its node goes, and the process stays: somebody else has to see to it"
     CLOSED = "the process ends: give up"

@@ -787,7 +787,8 @@ def test_a_process_that_ends_before_sending_has_nothing_to_account_for() -> None
 
 def replaced() -> Life:
     life = executing()
-    assert life.on(Event.REPLACED) == [], "servers that preempt end it by themselves"
+    its_own = life.goal.server
+    assert life.on(Event.REPLACED, its_own) == [], "servers that preempt end it by themselves"
     return life
 
 
@@ -801,6 +802,14 @@ def test_what_was_replaced_is_canceled_whatever_it_ended_with() -> None:
 def test_what_was_replaced_is_canceled_when_it_does_not_end_in_time() -> None:
     life = replaced()
     assert life.pass_time(4.0) == [CANCEL, ASK]
+    life.on(Event.RESULT, CANCELED)
+    life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+@pytest.mark.parametrize("already", [False, True])
+def test_what_was_replaced_on_another_server_is_canceled_at_once(already: bool) -> None:
+    life = replaced() if already else executing()
+    assert life.on(Event.REPLACED, "/another") == [CANCEL, ASK]
     life.on(Event.RESULT, CANCELED)
     life.ended(Outcome.CANCELED, End.CANCELED)
 

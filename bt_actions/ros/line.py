@@ -226,7 +226,7 @@ class Line:
             for older in self.traffic.domain.resources.holders(goal.resources):
                 if older is ticket:
                     break
-                older.line.tell(older, Event.REPLACED)
+                older.line.tell(older, Event.REPLACED, goal.server)
 
     def _carry_out(self, ticket: Ticket, command: Command, message: Any) -> None:
         goal = ticket.goal

@@ -248,7 +248,7 @@ class Caller:
             for older in self.resources.holders(goal.resources):
                 if older is ticket:
                     break
-                self.tell(older, Event.REPLACED)
+                self.tell(older, Event.REPLACED, goal.server)
 
     def _follow_twin(self, twin: Ticket, commands: tuple[Command, ...]) -> None:
         if twin.goal.state is State.DONE and twin.line.tickets.get(twin.goal.id) is twin:

@@ -377,6 +377,24 @@ class TestBusy:
         assert len(older.history) == 1
         assert journal.ends()[0] == str(end).lower()
 
+    def test_replace_cancels_the_older_at_once_where_another_server_has_it(
+        self, serve: Any, name: str, node: Any
+    ) -> None:
+        """A server cannot preempt what it does not know of."""
+        journals = [serve(name=f"{name}{letter}") for letter in "ab"]
+        patient = Timeouts(cancel=60.0)
+        older = MoveRobot("a", 50.0, action_name=f"{name}a", resources=["base"], timeout=patient)
+        newer = MoveRobot("b", 50.0, action_name=f"{name}b", resources=["base"], busy="replace")
+        starts = Gate()
+        with TreeRunner(together(older, in_sequence(starts, newer)), node=node) as runner:
+            runner.start()
+            until(lambda: executing(older))
+            starts.passed = True
+            journals[0].wait_for("canceled")
+            runner.wait(20.0)
+        assert stood(older) == (Outcome.CANCELED, End.CANCELED)
+        assert older.reason == f"replaced by a newer goal on {newer.server}"
+
     def test_a_resource_is_shared_by_two_servers(self, serve: Any, name: str, run: Run) -> None:
         """NavigateToPose and BackUp both move the base."""
         journals = [serve(name=f"{name}{letter}") for letter in "ab"]
