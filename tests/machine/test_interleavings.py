@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pytest
 from hypothesis import note, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
@@ -70,5 +71,5 @@ class Interleavings(RuleBasedStateMachine):
         locals()[_kind] = _make(_kind)
 
 
-TestInterleavings = Interleavings.TestCase
+TestInterleavings = pytest.mark.timeout(600)(Interleavings.TestCase)
 TestInterleavings.settings = settings.get_profile("machine-ci" if THOROUGH else "machine")
