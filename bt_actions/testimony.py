@@ -133,7 +133,8 @@ class Testimony:
             if len(self.sent_to) > 1:
                 if asked < self._fresh_since:
                     return []
-                if len(answers) < max(2, self._accepted_by) and self._may_be_at_two(watch):
+                all_asked = max(2, self._accepted_by, len(watch.gids))  # also newcomers answer
+                if len(answers) < all_asked and self._may_be_at_two(watch):
                     self._ended = done
                     return []
             return [(Event.RESULT, done)]

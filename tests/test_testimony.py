@@ -101,6 +101,15 @@ def test_what_one_has_ended_the_other_may_run(
     assert said.finished(watch, 0.0, 0.0, [ABORTED, SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
 
 
+def test_a_denial_by_a_newcomer_is_no_word_of_the_other(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(0.0, True, BOTH | {b"newcomer"})
+    assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == []
+    answers = [ABORTED, UNKNOWN, SUCCEEDED]
+    assert said.finished(watch, 0.0, 0.0, answers) == [(Event.RESULT, SUCCEEDED)]
+
+
 def test_an_end_counts_when_the_other_is_a_ghost(
     said: testimony.Testimony, watch: ServerWatch
 ) -> None:

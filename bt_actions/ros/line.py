@@ -184,14 +184,16 @@ class Line:
         """Let the goal's deadlines take effect, unless its tree is paused before sending.
 
         What has arrived by now is taken in first: an answer that came in time is in time, though
-        the executor, or this whole process, was too busy to look.
+        the executor, or this whole process, was too busy to look. One moment decides whether to do
+        so, and what is due.
         """
         with lock:
-            goal = ticket.goal
+            goal, now = ticket.goal, self.traffic.clocks.now()
             if ticket.paused_at is None or goal.sent:
-                if goal.sent and goal.due_in(self.traffic.clocks.now()) == 0.0:
+                if goal.sent and goal.due_in(now) == 0.0:
                     self.pump()
-                self._apply(ticket, goal.poll, None)
+                    now = self.traffic.clocks.now()
+                self._apply(ticket, lambda _: goal.poll(now), None)
 
     def mind(self, ticket: Ticket) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""

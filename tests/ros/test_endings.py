@@ -9,6 +9,8 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import End, MoveRobot, Outcome
+from bt_actions.goal_terms import Now, State
+from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import drain
 from tests.support.processes import Host
 from tests.support.waiting import until
@@ -95,4 +97,26 @@ def test_a_goal_that_cannot_be_minded_keeps_no_other_from_its_deadline(
     assert journal.count("canceled") == 2
     for leaf in leaves:
         leaf.shutdown()
+    host.close_server(name)
+
+
+def test_a_deadline_that_passes_while_it_is_looked_at_is_judged_at_the_next_look(
+    host: Host, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or what has arrived in time, and was not taken in yet, would come too late."""
+    host.open(name)
+    leaf = MoveRobot("m", 50.0, action_name=name, timeout=30.0)
+    leaf.setup(node=node)
+    until(lambda: leaf.progress().state == "EXECUTING", 20.0, meanwhile=leaf.tick_once)
+    (ticket,) = leaf.open_tickets()
+    with lock:  # the alarm does not look meanwhile
+        now = ticket.traffic.clocks.now()
+        due = Now(now.steady + 31.0, now.ros + 31.0)
+        moments = [now]
+        with monkeypatch.context() as patched:
+            patched.setattr(ticket.traffic.clocks, "now", lambda: moments.pop() if moments else due)
+            ticket.line.poll(ticket)
+        assert ticket.goal.state is State.EXECUTING
+    leaf.stop(Status.INVALID)
+    leaf.shutdown()
     host.close_server(name)
