@@ -5,7 +5,7 @@ The rules this file lives by:
   what to do (`Command`). The caller carries it out, in order, and tells what came of it.
 - Every (state, event) pair is decided in one table, `TABLE`; docs/goal.md is made from it.
 - An outcome is decided once. An end that is UNKNOWN may still become known.
-- After DONE nothing is sent.
+- After what comes with DONE nothing is sent.
 
 A leaf is free to go on as soon as `outcome` is set. The goal itself may live on in CANCELING:
 somebody (ros/traffic.py) keeps feeding it events until it is DONE. Whether to try again is not
@@ -145,6 +145,12 @@ class Goal:
         """
         open_question = self._sent and not self._accepted and not self.lost
         return self.state is State.CANCELING and open_question and not self._never_came
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether its request may lie in its server's queue."""
+        unanswered = self.suspect and self._denied_since is None
+        return self.state is State.SENDING or unanswered
 
     @property
     def owed(self) -> bool:

@@ -127,7 +127,7 @@ class TreeRunner:
         """The goals of this tree whose end is UNKNOWN, by now."""
         return [
             GoalReport(
-                ticket.owner.name,
+                ticket.name,
                 ticket.goal.server,
                 ticket.goal.id.hex(),
                 ticket.goal.outcome,
@@ -295,6 +295,8 @@ class TreeRunner:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
+            if isinstance(self._outcome, BaseException):  # and nobody has called wait()
+                self.node.get_logger().error(f"the tree that was started raised {self._outcome!r}")
         try:
             self.tree.shutdown()
         except Exception as error:  # noqa: BLE001 - the user's: any
@@ -481,24 +483,25 @@ class TreeRunner:
                 change = self._changes.popleft()
             except IndexError:
                 return
-            leaf = change.ticket.owner
-            if leaf is None or not self._is_ours(change.ticket):
+            ticket = change.ticket
+            if not self._is_ours(ticket):
                 continue  # another tree on the same node
-            self._tickets.add(change.ticket)
-            self._emit(
-                GoalChanged(
-                    time.monotonic(),
-                    leaf,
-                    change.state.value,
-                    change.ticket.attempt,
-                    change.outcome,
-                    change.end,
-                    change.reason,
-                    change.ticket.goal.id.hex(),
+            self._tickets.add(ticket)
+            if ticket.owner is not None:  # else its leaf was thrown away since
+                self._emit(
+                    GoalChanged(
+                        time.monotonic(),
+                        ticket.owner,
+                        change.state.value,
+                        ticket.attempt,
+                        change.outcome,
+                        change.end,
+                        change.reason,
+                        ticket.goal.id.hex(),
+                    )
                 )
-            )
-            if change.ticket.accounted_for:
-                self._tickets.discard(change.ticket)
+            if ticket.accounted_for:
+                self._tickets.discard(ticket)
 
     def _is_ours(self, ticket: Ticket) -> bool:
         """Whether the goal is this tree's: begun in a tick of it, wherever its leaf is by now."""

@@ -321,6 +321,15 @@ class TestStart:
             with pytest.raises(TreeError, match="culprit"):
                 runner.wait(5.0)
 
+    def test_what_nobody_waited_for_is_told_at_shutdown(
+        self, node: Any, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        runner = TreeRunner(Raises("culprit", "update"), node=node)
+        runner.start()
+        until(lambda: not runner._running.locked())
+        runner.shutdown()
+        assert "the tree that was started raised TreeError('culprit: tick" in capfd.readouterr().err
+
     def test_shutdown_ends_a_run_on_another_thread(
         self, journal: Journal, name: str, node: Any
     ) -> None:

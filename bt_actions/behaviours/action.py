@@ -295,8 +295,13 @@ class ActionBehaviour(Behaviour):
         self._leave_line()
 
     def open_tickets(self) -> list[Ticket]:
-        """Return the goals of this leaf that nobody can account for yet, left behind ones too."""
+        """Return the goals of this leaf that nobody can account for yet, left behind ones too.
+
+        Also those that a second server has taken when they had ended here.
+        """
         tickets = [*self._left_behind, *([self._ticket] if self._ticket is not None else [])]
+        if self._line is not None:
+            tickets += [ticket for ticket in self._line.goals_of(self) if ticket not in tickets]
         return [ticket for ticket in tickets if not ticket.accounted_for]
 
     def file_interrupted(self) -> None:

@@ -58,7 +58,7 @@ class TopicValue:
 
     def read(self) -> object:
         """The latest message. Raises ExpressionError when there is none, or it is too old."""
-        message, age, _ = (None, 0.0, 0) if self._latest is None else self._latest.get()
+        message, age = (None, 0.0) if self._latest is None else self._latest.get()
         topic = self._topic if self._latest is None else self._latest.topic
         if message is None:
             raise ExpressionError(f"nothing has come on {topic} yet (${self.name})")
@@ -102,7 +102,6 @@ class WaitForMessage(Behaviour):
         self._countdown = Countdown(self._clock)
         self._node: Any = None
         self._latest: Latest | None = None
-        self._seen = 0
 
     def setup(self, **kwargs: Any) -> None:
         node = node_in(kwargs, self)
@@ -114,22 +113,19 @@ class WaitForMessage(Behaviour):
         self._clock.setup(node)
         self._latest = Latest(node, _class(self._type), self._topic, self._qos)
         self._node = node
+        if self.status is Status.RUNNING:  # shut down in its visit, and set up again
+            self._latest.keep()
 
     def initialise(self) -> None:
-        if self._latest is not None:
-            self._seen = self._latest.get()[2]
+        if self._latest is not None:  # what a latched topic delivered before is as good as new
+            self._latest.keep(with_latest=self._qos == "latched")
         if self._timeout is not None:
             self._countdown.start(self._timeout)
-        # What a latched topic delivered before is as good as new.
-        if self._qos == "latched":
-            self._seen = 0
 
     def update(self) -> Status:
         assert self._latest is not None, "not set up"
-        message, _, count = self._latest.get()
         self.feedback_message = f"waiting for a message on {self._topic}"
-        if count > self._seen:
-            self._seen = count
+        for message in self._latest.take():
             try:
                 if self._until is None or self._until(message):
                     if self._save is not None:
@@ -143,6 +139,10 @@ class WaitForMessage(Behaviour):
             self.feedback_message = f"no such message on {self._topic} within {self._timeout:g} s"
             return Status.FAILURE
         return Status.RUNNING
+
+    def terminate(self, new_status: Status) -> None:
+        if self._latest is not None:
+            self._latest.keep_no_more()
 
     def due_in(self) -> float | None:
         """Seconds until it fails."""

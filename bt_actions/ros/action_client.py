@@ -43,6 +43,8 @@ DEPTH = 100
 
 ASKED_KEPT = 10
 """Questions of one kind about one goal whose answers are waited for: the newest."""
+ANSWERS_KEPT = 10
+"""Answers to one question that are told: more servers of one name answer nothing new."""
 GOALS_KEPT = 20
 """Goal requests, of those that are forgotten, of which a further acceptance is told all the same: a
 server that wakes up has the last ten in its queue."""
@@ -198,10 +200,13 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
 
     # Answers
 
-    def pump(self) -> None:
-        """Take and deliver what has arrived, here and now, whether or not somebody spins."""
+    def pump(self) -> bool:
+        """Take and deliver what has arrived, here and now, whether or not somebody spins.
+
+        Returns whether there was anything.
+        """
         self.take_data()
-        self._deliver()
+        return self._deliver()
 
     def take_data(self) -> None:
         """Take all that has arrived into the inbox. Called by the executor, and by `pump`."""
@@ -251,7 +256,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
 
     def _file(self, kind: str, question: _Question | None, answer: Any) -> None:
         """Put an answer into the inbox, with those before it; none that nobody waits for."""
-        if question is None:
+        if question is None or len(question.answers) >= ANSWERS_KEPT:
             return
         if isinstance(question.about, int):
             self._inbox.append(("probe", question.about, None))
@@ -263,14 +268,16 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         """Deliver what the executor has had taken."""
         self._deliver()
 
-    def _deliver(self) -> None:
+    def _deliver(self) -> bool:
         with lock:
+            any_came = bool(self._inbox)
             while self._inbox:
                 kind, about, detail = self._inbox.popleft()
                 try:
                     self._tell(kind, about, detail)
                 except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
                     log.error(f"{self._action_name}: {kind} was not taken in: {error!r}")
+            return any_came
 
     def _tell(self, kind: str, about: Any, detail: Any) -> None:
         tell = self._listener

@@ -43,6 +43,9 @@ PUMP_EVERY = 0.01
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
+SILENT_FOR = 25.0
+"""Seconds without any answer, though asked at least every ten, until goals whose node is gone are
+left to whoever can see whether their server is there: as long as a ghost is shown."""
 TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
 FEEDBACK = "/_action/feedback"
@@ -62,6 +65,7 @@ class Line:
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
         self.orphaned = False
+        self._heard_at = time.monotonic()  # of an orphan: when somebody last answered
         self._sight: Sight | None = None  # where the client lives if our node was blind to it
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
@@ -212,14 +216,14 @@ class Line:
         was_accepted = goal.accepted
         now = self.traffic.clocks.now()
         commands = step(now)
-        if goal.state is State.DONE:
-            self.close_book(ticket)
         if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
             goal.reason += self._instead(ticket)
         if before != (goal.state, goal.outcome, goal.end):
             ticket.traffic.note(ticket)
         for command in commands:
             self._carry_out(ticket, command, message)
+        if goal.state is State.DONE:
+            self.close_book(ticket)
         due = goal.due_in(now)
         if due is not None:
             alarm.wake_by(now.steady + due)
@@ -256,7 +260,8 @@ class Line:
     def pump(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
         try:
-            self.client.pump()
+            if self.client.pump():
+                self._heard_at = time.monotonic()
         except Exception as error:  # noqa: BLE001 - the middleware's: any
             self._warn_once("something that arrived could not be taken", error)
 
@@ -377,10 +382,9 @@ class Line:
         lines = [line for line in alarm.minded() if isinstance(line, Line)]
         return [line for line in lines if line.traffic.domain is domain]
 
-    def look_for_lost(self, ticket: Ticket) -> None:
-        """See whether goals are back that were lost here, and that `ticket` could run beside."""
-        if any(other.goal.lost for other in self._near(ticket)):
-            self.look(time.monotonic())
+    def has_lost(self, ticket: Ticket) -> bool:
+        """Whether goals were lost here that `ticket` might run beside."""
+        return any(other.goal.lost for other in self._near(ticket))
 
     def in_the_way_of(self, ticket: Ticket) -> bool:
         """Whether a goal that was given up here may still run where `ticket` wants to."""
@@ -392,8 +396,14 @@ class Line:
         return [t for t in self.goals.values() if same or t.goal.resources & wanted]
 
     def in_flight(self) -> int:
-        """Count the goal requests that wait for their answer."""
-        return sum(ticket.goal.state is State.SENDING for ticket in self.goals.values())
+        """Count the goal requests at the server that wait for their answer, of all nodes."""
+        lines = [line for line in self.neighbors() if line.shares_server_with(self)]
+        return sum(ticket.goal.in_flight for line in lines for ticket in line.goals.values())
+
+    def goals_of(self, owner: Any) -> list[Ticket]:
+        """Return the goals of a leaf that are open here, also what a second server took."""
+        with lock:
+            return [ticket for ticket in self.goals.values() if ticket.owner is owner]
 
     def _take_over(self) -> None:
         """Take lost goals of other nodes whose server is in sight here: it is to cancel them first.
@@ -513,12 +523,15 @@ class Line:
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""
         if not self.orphaned:
-            self.orphaned = True
+            self.orphaned, self._heard_at = True, time.monotonic()
             if any(not ticket.accounted_for for ticket in self.goals.values()):
                 log.warning(f"{self.name}: the node is gone; canceling what it left")
         for ticket in list(self.goals.values()):  # also one that was begun since
             if ticket.goal.outcome is None:
                 self.tell(ticket, Event.INTERRUPTED)
+        patience = max((each.goal.drains_within for each in self.goals.values()), default=0.0)
+        if time.monotonic() - self._heard_at > max(SILENT_FOR, patience):
+            self.put_away(all_of_them=True)  # from here nobody can see whether the server is gone
 
     def attend(self, now: float) -> float:
         """Do what is due at this line, on the alarm; return the seconds until it wants to again."""

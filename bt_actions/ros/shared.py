@@ -99,6 +99,8 @@ class Ticket:
     """Of the node that it was begun on, which is told of its changes."""
     owner: Any
     """The leaf; None where it is gone, and a second server has taken its goal, too."""
+    name: str
+    """The leaf's."""
     begun_by: Beginner | None = None
     """What `Traffic.begun_by` said at the time; None where nobody did."""
     attempt: int = 1

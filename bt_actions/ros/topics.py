@@ -6,6 +6,7 @@ Callbacks only store a message and wake whoever ticks; nothing of the tree runs 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -23,6 +24,9 @@ from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
 
 __all__ = ["Latest", "qos_profile", "wake"]
+
+KEPT = 100
+"""Messages kept for who waits for one of them; older ones are dropped."""
 
 
 def qos_profile(name: str) -> QoSProfile:
@@ -60,7 +64,7 @@ class Latest:
         self._message: Any = None
         self._age = 0.0
         self._aged_at = 0.0
-        self.count = 0
+        self._kept: deque[Any] | None = None
         self._subscription = closable(
             node.create_subscription(
                 message_type,
@@ -73,13 +77,33 @@ class Latest:
         self.topic: str = self._subscription.topic_name
         """The topic's full name."""
 
-    def get(self) -> tuple[Any, float, int]:
-        """The message (None before the first), its age in seconds, and how many came so far."""
+    def get(self) -> tuple[Any, float]:
+        """The message (None before the first), and its age in seconds."""
         now = self._clocks.now().ros
         with self._lock:
             self._age += max(0.0, now - self._aged_at)
             self._aged_at = now
-            return self._message, self._age, self.count
+            return self._message, self._age
+
+    def keep(self, *, with_latest: bool = False) -> None:
+        """From now on keep each message for `take`, the newest hundred."""
+        with self._lock:
+            self._kept = deque(maxlen=KEPT)
+            if with_latest and self._message is not None:
+                self._kept.append(self._message)
+
+    def take(self) -> list[Any]:
+        """What came since `keep`, or the last `take`, in its order."""
+        with self._lock:
+            taken = list(self._kept or ())
+            if self._kept is not None:
+                self._kept.clear()
+            return taken
+
+    def keep_no_more(self) -> None:
+        """Nobody waits any longer."""
+        with self._lock:
+            self._kept = None
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -90,5 +114,6 @@ class Latest:
         with self._lock:
             self._message = message
             self._age, self._aged_at = 0.0, now
-            self.count += 1
+            if self._kept is not None:
+                self._kept.append(message)
         wake(self._node)

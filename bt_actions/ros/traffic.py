@@ -39,7 +39,8 @@ from bt_actions.server import Server
 JUST_PAST = 0.1
 """Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
 IN_FLIGHT = 8
-"""Goal requests under way at a server; its queue holds 10, and drops what is over silently."""
+"""Goal requests of this process under way at a server; its queue holds 10, and drops what is over
+silently."""
 _ON_NODE = "_bt_actions_traffic"
 _begins = threading.local()
 _contexts: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
@@ -131,7 +132,8 @@ class Traffic:
         with lock:
             now = self.clocks.now()
             goal = Goal(new_goal_id(), line.name, timeouts, now, resources=resources, busy=busy)
-            ticket = Ticket(goal, line, self, owner, _who_begins(), attempt, keeps_feedback)
+            who = _who_begins()
+            ticket = Ticket(goal, line, self, owner, owner.name, who, attempt, keeps_feedback)
             line.goals[goal.id] = ticket
             alarm.mind(line)
             answer = self.domain.resources.request(ticket, goal.resources, busy)
@@ -186,14 +188,20 @@ class Traffic:
 
         One that was lost holds nothing any more; should its server be back, it is canceled first.
         """
+        lines = ticket.line.neighbors()
+        left = {(line.name, line.action_type) for line in lines if line.has_lost(ticket)}
         if ticket.goal.busy in (Busy.WAIT, Busy.FAIL):
-            for action, action_type in self.domain.lost_with(ticket.goal.resources):
+            remembered = self.domain.lost_with(ticket.goal.resources)
+            left.update(remembered)
+            for action, action_type in remembered:
                 if action not in self._lines:  # another's server, which nobody speaks to any more
                     self._lines[action] = Line(self, action_type, action)
-        lines = ticket.line.neighbors()
-        for line in lines:
-            line.look_for_lost(ticket)  # all of them first: one may take over another's
-        return any(line.in_the_way_of(ticket) for line in lines)
+        now = time.monotonic()
+        ours = [line for line in self._lines.values() if (line.name, line.action_type) in left]
+        for line in {*lines, *ours}:  # all of them first: one may see what another has lost
+            if line.has_lost(ticket) or line in ours:
+                line.look(now)
+        return any(line.in_the_way_of(ticket) for line in ticket.line.neighbors())
 
     def interrupt(self, ticket: Ticket) -> None:
         """The tree no longer wants it. Returns at once; the goal is drained."""

@@ -237,6 +237,53 @@ def test_a_message_is_waited_for_and_kept(load: Load, run: Run, name: str) -> No
     assert (root.status, tree_outputs(root)) == (Status.SUCCESS, {"n": 2})
 
 
+def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_tick(
+    node: Any, name: str
+) -> None:
+    from rclpy.executors import SingleThreadedExecutor
+    from std_msgs.msg import Int32
+
+    from bt_actions.behaviours.topics import WaitForMessage
+    from bt_actions.ros.topics import KEPT, Latest
+
+    waits = WaitForMessage("w", Int32, name, until=lambda message: message.data == 2)
+    waits.setup(node=node)
+    seen = Latest(node, Int32, name, "default")
+    publisher = node.create_publisher(Int32, name, 10)
+    until(lambda: publisher.get_subscription_count() == 2)
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+
+    def publish(number: int) -> None:
+        publisher.publish(Int32(data=number))
+        until(
+            lambda: all(
+                getattr(topic.get()[0], "data", None) == number for topic in (seen, waits._latest)
+            ),
+            meanwhile=lambda: executor.spin_once(timeout_sec=0.01),
+        )
+
+    publish(2)  # before it waits
+    waits.tick_once()
+    for number in (1, 2, 3):
+        publish(number)
+    assert waits.status is Status.RUNNING
+    waits.tick_once()
+    assert waits.status is Status.SUCCESS
+    publish(4)
+    assert waits._latest is not None
+    assert waits._latest.take() == [], "nobody waits any longer"
+    seen.keep()
+    for number in range(KEPT + 2):
+        publish(number)
+    assert [message.data for message in seen.take()] == list(range(2, KEPT + 2))
+    executor.shutdown()
+    node.executor = None
+    seen.close()
+    waits.shutdown()
+    node.destroy_publisher(publisher)
+
+
 def test_a_message_that_does_not_come_fails_in_time(load: Load, run: Run, name: str) -> None:
     text = (
         "tree: t\nroot: {wait_for_message: W, topic: %s, type: std_msgs/msg/Bool, timeout: 50 ms}"

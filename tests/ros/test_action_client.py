@@ -17,7 +17,7 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import Gripper, MoveRobot
 from bt_actions.ros import action_client
-from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
+from bt_actions.ros.action_client import ANSWERS_KEPT, GOALS_KEPT, ActionClient
 from bt_actions.ros.graph import servers
 from bt_actions.ros.traffic import Traffic
 from tests.support.processes import Host, HostFactory
@@ -292,6 +292,15 @@ def test_what_each_of_two_servers_answers_is_told(
         words = [each[0] if kind == "result" else each for each in heard.so_far]
         assert sorted(words) == answers
         heard.so_far = ()
+
+
+def test_of_answers_without_end_to_one_question_the_first_are_kept(client: ActionClient) -> None:
+    client.ask_result(uuid.uuid4().bytes)
+    (question,) = client._result_requests.values()
+    for number in range(ANSWERS_KEPT + 5):
+        client._file("result", question, (0, number))
+    assert [each for _, each in question.answers] == list(range(ANSWERS_KEPT))
+    client.forget(question.about)
 
 
 def test_nothing_stays_filed_for_answered_requests(client: ActionClient, heard: Heard) -> None:

@@ -23,10 +23,12 @@ from py_trees.common import Status
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.shared import lock
+from bt_actions.ros.traffic import IN_FLIGHT
+from bt_actions.server import Server
 from tests.support.processes import PATIENCE, Host, Journal, Process
 from tests.support.reliability import Record
 from tests.support.trees import state, together
-from tests.support.waiting import until
+from tests.support.waiting import holds_for, until
 
 END_BY_THEMSELVES = [
     "shut_down_and_destroy_on_the_next_line",
@@ -426,6 +428,43 @@ def test_an_action_shared_by_twenty_leaves(
     assert journal.executed_twice == []
     assert (journal.max_live == 1) == (busy == "wait")
     tree.shutdown()
+
+
+def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_nodes(
+    host: Host, name: str, node: Any
+) -> None:
+    """Sixteen goals of two runners; SIGSTOP before they are sent, SIGCONT afterwards"""
+    journal = host.open(name)
+    patient = Timeouts(server=20.0, accept=20.0, queue=20.0)
+    leaves = [
+        MoveRobot(f"m{i}", 0.05, action_name=name, busy="share", timeout=patient) for i in range(16)
+    ]
+    trees = [together(*leaves[:8]), together(*leaves[8:])]
+
+    def sees(leaf: MoveRobot) -> bool:
+        with lock:
+            assert leaf._line is not None
+            return leaf._line.look(time.monotonic()) is Server.READY
+
+    def count(what: str) -> int:
+        return [state(leaf) for leaf in leaves].count(what)
+
+    with TreeRunner(trees[0], node=node) as one, TreeRunner(trees[1]) as other:
+        for leaf in leaves:
+            leaf.setup(node=(one if leaf in leaves[:8] else other).node)
+        until(lambda: sees(leaves[0]) and sees(leaves[-1]))
+        host.send(signal.SIGSTOP)
+        try:
+            one.start()
+            other.start()
+            until(lambda: count("SENDING") == IN_FLIGHT)
+            rest = len(leaves) - IN_FLIGHT
+            assert holds_for(lambda: count("WAITING_FOR_SERVER") == rest, 0.3)
+        finally:
+            host.send(signal.SIGCONT)
+        assert one.wait(20.0) is other.wait(20.0) is Status.SUCCESS
+    assert journal.ends() == ["succeeded"] * 16
+    assert journal.executed_twice == []
 
 
 def test_nobody_ticks_any_more_and_the_goal_is_drained_by_its_deadline(

@@ -6,6 +6,7 @@ is decided by the lease that the *server's* process announces.
 
 from __future__ import annotations
 
+import gc
 import signal
 import time
 from typing import Any
@@ -296,6 +297,71 @@ class TestStopped:
         assert [journal.ends() for journal in journals] == [["canceled"], ["succeeded"]]
         record.outcome = "SERVER_LOST; back: canceled, though nobody speaks to its server any more"
 
+    def test_left_behind_and_remembered_by_a_node_whose_client_lies_idle(
+        self, host: Host, name: str, record: Record
+    ) -> None:
+        """A goal takes 3 s to be canceled, its runner waits 0.5 s; another server of its arm"""
+        journals = [host.open(f"{name}_0", "1:delay_cancel=3"), host.open(f"{name}_1")]
+        arm, timeouts = {"arm"}, Timeouts(server=20.0, cancel=0.5)
+        first, idle, second = (
+            MoveRobot(letter, 40.0 if letter == "first" else 0.3, action_name=f"{name}_{which}",
+                      resources=arm, timeout=timeouts)
+            for letter, which in (("first", 0), ("idle", 0), ("second", 1))
+        )  # fmt: skip
+        with TreeRunner(in_turn(second, idle)) as other:
+            for leaf in (idle, second):
+                leaf.setup(node=other.node)
+            until_shown(other.node, f"{name}_0", 1)
+            with TreeRunner(first) as runner:
+                runner.start()
+                until(lambda: state(first) == "EXECUTING", 20.0)
+            assert first.end is End.UNKNOWN
+            assert other.run(30.0) is Status.SUCCESS
+        canceled, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
+        assert canceled.t <= received.t
+        record.outcome = "UNKNOWN; canceled before the goal on the other server is sent"
+
+    def test_a_node_that_is_destroyed_gives_up_the_resource_of_a_server_that_dies(
+        self,
+        new_host: HostFactory,
+        name: str,
+        node: Any,
+        domain: int,
+        record: Record,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """A cancel is refused, the node is destroyed, then SIGKILL; another server of the arm"""
+        from rclpy.context import Context
+        from rclpy.node import Node
+
+        monkeypatch.setattr("bt_actions.ros.line.SILENT_FOR", 3.0)
+        victim, host = new_host(), new_host()
+        victim.open(f"{name}_0", "1:reject_cancel")
+        journal = host.open(f"{name}_1")
+        first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
+        first.timeouts = Timeouts(server=20.0, cancel=0.5)
+        context = Context()
+        context.init(domain_id=domain)
+        gone = Node("gone", context=context)
+        first.setup(node=gone)
+        line = first._line
+        assert line is not None
+        ticking = lambda: (line.pump(), first.tick_once())  # noqa: E731
+        until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
+        first.shutdown()
+        assert first.end is End.UNKNOWN
+        gone.destroy_node()
+        context.shutdown()
+        killed = victim.kill()
+        second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
+        second.timeouts = Timeouts(server=20.0, queue=None)
+        with TreeRunner(second, node=node) as runner:
+            assert runner.run(30.0) is Status.SUCCESS
+        record.took(time.monotonic() - killed, 20.0)
+        assert first.end is End.SERVER_GONE
+        assert journal.ends() == ["succeeded"]
+        record.outcome = "the other server of the arm is used as soon as nobody has it"
+
     @pytest.mark.chaos
     def test_stopped_and_back_while_another_server_has_its_resource(
         self, new_host: HostFactory, name: str, node: Any, record: Record
@@ -553,6 +619,55 @@ class TestTwice:
         assert of_process(journal, other.pid)[:5] == CANCELED
         assert stood(more) == (Outcome.SERVER_AMBIGUOUS, End.NEVER_STARTED)
         record.outcome = "SUCCEEDED; what the second server took is canceled"
+
+    @pytest.mark.parametrize("loop", ["our runner", "a foreign loop"])
+    def test_shutdown_waits_for_what_the_second_server_took(
+        self, new_host: HostFactory, name: str, node: Any, loop: str, record: Record
+    ) -> None:
+        """The second server wakes up when the run is over, and takes 2 s to cancel; shutdown"""
+        one, other = new_host(short_lease=False), new_host(short_lease=False)
+        one.open(name)
+        journal = other.open(name, "*:slow=100", "*:delay_cancel=2")
+        leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=20.0))
+        until_both_hear(leaf, node)
+        other.send(signal.SIGSTOP)
+        runner = TreeRunner(leaf, node=node)
+        assert runner.run(30.0) is Status.SUCCESS
+        other.send(signal.SIGCONT)
+        until(lambda: not leaf.drained, 10.0)
+        if loop == "our runner":
+            runner.shutdown()
+        else:
+            runner.tree.shutdown()
+        assert of_process(journal, other.pid)[-1] == "canceled"
+        assert leaf.drained
+        assert runner.unaccounted == []
+        runner.shutdown()
+        record.outcome = "SUCCEEDED; what the second server took is canceled before it returns"
+
+    def test_a_goal_that_turns_up_when_its_leaf_is_gone_is_reported_by_name(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """A leaf leaves the tree between runs; then a second server wakes, and refuses to cancel"""
+        one, other = new_host(short_lease=False), new_host(short_lease=False)
+        one.open(name)
+        other.open(name, "*:slow=100", "*:reject_cancel")
+        leaf = MoveRobot("first", 0.3, action_name=name, timeout=Timeouts(server=20.0))
+        stays = MoveRobot("stays", 0.3, action_name=name, timeout=Timeouts(server=20.0))
+        until_both_hear(leaf, node)
+        other.send(signal.SIGSTOP)
+        root = in_sequence(leaf)
+        with TreeRunner(root, node=node) as runner:
+            assert runner.run(30.0) is Status.SUCCESS
+            root.remove_child(leaf)
+            root.add_child(stays)
+            del leaf
+            assert runner.run(30.0) is Status.SUCCESS
+            gc.collect()
+            other.send(signal.SIGCONT)
+            names = {"first", "stays"}
+            until(lambda: {report.name for report in runner.unaccounted} == names, 10.0)
+        record.outcome = "told as unaccounted for, by its name"
 
     def test_a_ghost_is_not_a_second_server(
         self, new_host: HostFactory, name: str, node: Any, record: Record
