@@ -59,4 +59,5 @@ class TreeFinished:
 
 Event: TypeAlias = TreeStarted | NodeChanged | GoalChanged | TreeFinished
 Observer: TypeAlias = Callable[[Event], None]
-"""Called on the ticking thread; one that raises is removed, and the run goes on."""
+"""Called on the ticking thread, or by who leaves a tick that does not return; one that raises is
+removed, and the run goes on."""

@@ -405,6 +405,7 @@ class Goal:
         """The silence is over; timeout.feedback begins anew."""
         self.feedback = detail
         self._doubts = 0
+        self._runs_after_all()
         if not self._replaced and self._seen_status is None:
             self._deadlines.arm(Event.FEEDBACK_DUE, self.timeouts.feedback, now)
         return State.EXECUTING
@@ -413,12 +414,19 @@ class Goal:
         """Only a goal that runs has feedback: if that is news, cancel it at once."""
         if not self._accepted:
             return self._turned_up(now, detail)
+        self._runs_after_all()
         return self._server_returned(now, detail) if self.lost else State.CANCELING
+
+    def _runs_after_all(self) -> None:
+        """Feedback long after a terminal status shows that the status was somebody else's word."""
+        if self._asked_since > 0:
+            self._seen_status, self._asked_since = None, 0
 
     def _terminal_status_seen(self, now: Now, detail: Any) -> State:
         """The result is due; if its message was lost, it has to be asked for again."""
         if detail not in ENDS:
             self._doubts = 0  # whatever it was asked for, and denied: it has the goal
+            self._seen_status, self._asked_since = None, 0
         elif self._seen_status is None:
             self._seen_status = detail
             self._deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended

@@ -27,7 +27,6 @@ from py_trees.trees import BehaviourTree
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.policy import End, Outcome
-from bt_actions.signals import ended_by_signals
 from bt_actions.ticking import ChangeVisitor, Patience, culprit_of, path_of, root_of, tick_once
 
 if TYPE_CHECKING:
@@ -35,6 +34,8 @@ if TYPE_CHECKING:
 
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
+LONGEST_WAIT = 3600.0
+"""Seconds, at most, between two looks at the tree, whatever `heartbeat` is."""
 PATIENCE_AT_EXIT = 30.0
 """Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
 
@@ -188,7 +189,10 @@ class TreeRunner:
         """With a node of the user's, its context's signal handling is the user's as well."""
         if not self._spinner.owns_context:
             return contextlib.nullcontext()
-        return ended_by_signals(lambda again: self.interrupt(abandon=again))
+        from bt_actions.ros.signals import ended_by_signals
+        from bt_actions.ros.traffic import close_process
+
+        return ended_by_signals(lambda again: self.interrupt(abandon=again), close_process)
 
     def start(self) -> None:
         """Run the tree on a thread of its own; see `wait`. For use inside a running node."""
@@ -324,6 +328,8 @@ class TreeRunner:
     def _run(self, timeout: float | None) -> Status:
         if self._closed:
             raise RuntimeError("this runner has been shut down")
+        if timeout is not None and timeout != timeout:
+            raise ValueError(f"timeout must be a number of seconds, not {timeout!r}")
         deadline = None if timeout is None else time.monotonic() + timeout
         self._visitor.forget()
         self.tree.visitors.append(self._visitor)
@@ -365,14 +371,14 @@ class TreeRunner:
                 return Status.INVALID
             self._flush()
             if self._held():
-                wait = self.heartbeat
+                wait = min(self.heartbeat, LONGEST_WAIT)
             else:
                 status = self._tick(deadline)
                 if self._patience.gave_up:
                     return Status.INVALID
                 if status in (Status.SUCCESS, Status.FAILURE):
                     return status
-                wait = min([self.heartbeat, *self._dues()])
+                wait = min([self.heartbeat, LONGEST_WAIT, *self._dues()])
             if deadline is not None:
                 wait = min(wait, max(0.0, deadline - time.monotonic()))
 

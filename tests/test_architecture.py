@@ -29,7 +29,6 @@ TOOLS = {
     "expression",
     "expression_text",
     "expression_values",
-    "signals",
     "streams",
     "suggest",
     "ticking",

@@ -31,6 +31,7 @@ from bt_actions.goal_terms import (
     CANCEL_UNKNOWN_GOAL,
     STATUS_ABORTED,
     STATUS_CANCELED,
+    STATUS_EXECUTING,
     STATUS_SUCCEEDED,
     Command,
     Event,
@@ -111,8 +112,12 @@ def suspect(timeouts: Timeouts = LIMITS) -> Life:
 # The table
 
 
-def test_every_pair_of_state_and_event_is_decided() -> None:
-    assert set(TABLE) == {(state, event) for state in State for event in Event}
+def test_a_wish_to_stop_means_something_in_every_state_and_each_event_in_some() -> None:
+    for state in State:
+        for event in (Event.INTERRUPTED, Event.CLOSED):
+            assert not TABLE[state, event].drops, f"{event} in {state}"
+    for event in Event:
+        assert not all(TABLE[state, event].drops for state in State), event
 
 
 def test_after_done_nothing_is_sent_whatever_comes() -> None:
@@ -780,6 +785,30 @@ def test_a_process_that_ends_before_sending_has_nothing_to_account_for() -> None
     life = waiting()
     life.on(Event.CLOSED)
     life.ended(Outcome.CANCELED, End.NEVER_STARTED)
+
+
+# Somebody else's word
+
+
+@pytest.mark.parametrize("canceling", [False, True])
+def test_a_terminal_status_is_not_believed_against_feedback_that_goes_on(canceling: bool) -> None:
+    life = executing()
+    if canceling:
+        life.on(Event.INTERRUPTED)
+    life.on(Event.STATUS, STATUS_SUCCEEDED)
+    for _ in range(2 * RESULT_QUESTIONS):
+        life.pass_time(ASK_AGAIN)
+        life.on(Event.FEEDBACK, "moving")
+    assert life.goal.state is not State.DONE
+    assert life.goal.end is End.UNKNOWN
+
+
+def test_a_terminal_status_is_taken_back_by_one_that_is_not() -> None:
+    life = executing()
+    life.on(Event.STATUS, STATUS_SUCCEEDED)
+    life.on(Event.STATUS, STATUS_EXECUTING)
+    life.on(Event.SERVER_LOST, "gone")
+    assert life.goal.end is End.SERVER_GONE
 
 
 # Replaced

@@ -133,6 +133,15 @@ class TestRun:
             runner.shutdown()
         assert "start()" in told[0]
 
+    def test_a_timeout_that_is_no_number_is_refused(self, node: Any) -> None:
+        with TreeRunner(Gate(), node=node) as runner, pytest.raises(ValueError, match="seconds"):
+            runner.run(timeout=float("nan"))
+
+    def test_a_heartbeat_may_be_endless(self, journal: Journal, name: str, node: Any) -> None:
+        leaf = MoveRobot("m", 0.1, action_name=name)
+        with TreeRunner(leaf, node=node, heartbeat=float("inf")) as runner:
+            assert runner.run() is Status.SUCCESS
+
     def test_after_shutdown_it_raises(self, node: Any) -> None:
         runner = TreeRunner(Gate(), node=node)
         runner.shutdown()

@@ -256,6 +256,8 @@ class ActionBehaviour(Behaviour):
                 message = ticket.feedback.popleft()
                 if self.on_feedback is not None:
                     self.on_feedback(message)
+                if self._outcome is not None:
+                    return Status.FAILURE  # stopped, or shut down, by its own callback
             if ticket.goal.outcome is None:
                 self.feedback_message = self._in_words(ticket)
                 return Status.RUNNING

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import Exit, note, seconds, write
+from bt_actions.suggest import listing
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -53,8 +55,11 @@ def run(args: argparse.Namespace) -> int:
     return sweep(args.look, args.patience)
 
 
-def sweep(look: float, patience: float) -> Exit:
-    """Clean up, saying what is found and how it ended."""
+def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace: str = "") -> Exit:
+    """Clean up, saying what is found and how it ended.
+
+    Where one of the `wanted` actions does not come in sight, nobody can say: UNKNOWN.
+    """
     from bt_actions.policy import End
     from bt_actions.ros.cleanup import cleanup
 
@@ -63,13 +68,24 @@ def sweep(look: float, patience: float) -> Exit:
 
     actions: list[str] = []
     foreign: list[str] = []
+    unseen: list[str] = []
+
+    def missing(names: list[str]) -> None:
+        if not unseen:
+            note(f"waiting for {listing(names)}, where something may have been left")
+        unseen[:] = names
+
     goals = cleanup(
         look=look,
         patience=patience,
         found=found,
         sighted=actions.append,
         elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
+        wanted=wanted,
+        namespace=namespace,
+        missing=missing,
     )
+    unseen = [name for name in unseen if name not in actions]
     if foreign:
         note(
             f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in another "
@@ -82,6 +98,12 @@ def sweep(look: float, patience: float) -> Exit:
         )
     if any(goal.end is End.UNKNOWN for goal in goals):
         note("not all of them have ended; they may still be running")
+        return Exit.UNKNOWN
+    if unseen:
+        note(
+            f"no server of {listing(unseen)} is in sight: nobody can see what was left there; "
+            "start it, or run without --cleanup-first"
+        )
         return Exit.UNKNOWN
     if not goals:
         count = "1 action" if len(actions) == 1 else f"{len(actions)} actions"

@@ -15,6 +15,8 @@ from bt_actions.cli.common import BadInput, Exit, load, metres, namespace, secon
 from bt_actions.cli.ros_arguments import parameters
 
 if TYPE_CHECKING:
+    from py_trees.behaviour import Behaviour
+
     from bt_actions.cli.parser import Subparsers
     from bt_actions.simulation.faults import Fault
 
@@ -70,7 +72,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--cleanup-first",
         action="store_true",
-        help="cancel what a killed orchestrator of this machine left, before the tree starts",
+        help="cancel what a killed orchestrator of this machine left, before the tree starts; "
+        "waits 30 s for the tree's servers, and does not run where it cannot see what was left",
     )
     parser.add_argument(
         "--no-python",
@@ -132,8 +135,10 @@ def run(args: argparse.Namespace) -> int:
 
     from bt_actions.cli.session import Session, SimulationWish
 
-    if args.cleanup_first and (code := _clean_up()) is not Exit.SUCCESS:
-        return code
+    if args.cleanup_first:
+        wanted = set[str]() if args.sim else _actions(root)
+        if (code := _clean_up(wanted, args.namespace)) is not Exit.SUCCESS:
+            return code
     wish = SimulationWish(args.speed or 1.0, faults, args.seed) if args.sim else None
     with Session(
         root, executor=args.executor, namespace=args.namespace, simulation=wish
@@ -142,12 +147,19 @@ def run(args: argparse.Namespace) -> int:
         return session.run(view, timeout=args.timeout, part_at=args.check_part)
 
 
-def _clean_up() -> Exit:
+def _actions(root: Behaviour) -> set[str]:
+    """Return the names of the actions that a tree uses, as they are given."""
+    from bt_actions.behaviours.action import ActionBehaviour
+
+    return {leaf.action_name for leaf in root.iterate() if isinstance(leaf, ActionBehaviour)}
+
+
+def _clean_up(wanted: set[str], namespace: str) -> Exit:
     """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
     from bt_actions.cli.cleanup import sweep
 
     with contextlib.redirect_stdout(sys.stderr):
-        return sweep(look=5.0, patience=5.0)
+        return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace)
 
 
 def _refuse_without_sim(args: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ action type is needed for any of it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,12 @@ from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.qos import qos_profile_action_status_default
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions.goal_ids import author_of
+from bt_actions.goal_ids import Author, author_of
 from bt_actions.goal_terms import ENDS
 from bt_actions.policy import End
 from bt_actions.ros.graph import servers
@@ -32,6 +33,10 @@ ASK_AGAIN = 1.0
 SETTLE = 4.0
 """Seconds after an action came in sight within which its status must have been received; where a
 client was just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
+
+LOOK_LONGEST = 30.0
+"""Seconds for which actions are looked for that are wanted, and not in sight: a ghost of a killed
+server is shown for 20."""
 
 
 @dataclass(slots=True)
@@ -62,6 +67,9 @@ def cleanup(
     found: Callable[[LeftBehind], None] = lambda left: None,
     sighted: Callable[[str], None] = lambda action: None,
     elsewhere: Callable[[str, bytes], None] = lambda action, goal_id: None,
+    wanted: Collection[str] = (),
+    namespace: str = "",
+    missing: Callable[[list[str]], None] = lambda actions: None,
     context: Context | None = None,
 ) -> list[LeftBehind]:
     """Cancel what dead orchestrators of this machine left; return it with its ends.
@@ -70,7 +78,10 @@ def cleanup(
     seconds more for the goals that it canceled to end. `found` is called with each at once,
     `sighted` with the name of each action in sight, and `elsewhere` with the action and the id of
     each unfinished goal of a bt_actions process on another machine, or in another container, of
-    which nobody here can tell whether it is alive. Blocks.
+    which nobody here can tell whether it is alive. Of the actions in `wanted`, whose relative names
+    belong to `namespace`, those that are not in sight by then are looked for up to LOOK_LONGEST
+    seconds, and `missing` is called with them, in the beginning of that, and in the end if it was
+    in vain. Blocks.
     """
     own = Context() if context is None else context
     if context is None:
@@ -80,16 +91,25 @@ def cleanup(
     executor.add_node(node)
     sweep = _Sweep(node, found, sighted, elsewhere)
     try:
-        began = time.monotonic()
+        names = {expand_topic_name(name, node.get_name(), namespace or "/") for name in wanted}
+        began, waits = time.monotonic(), False
         while True:
             now = time.monotonic()
             looked = max(began + look, sweep.newest + SETTLE)
+            lacks = sweep.lacks(names)
+            if lacks and now >= looked and not waits:
+                waits = True
+                missing(lacks)
+            if lacks and now < began + LOOK_LONGEST:
+                looked = max(looked, now + 1.0)
             if now < looked:
                 sweep.discover(now)
             elif sweep.over or now >= looked + patience:
                 break
             sweep.ask()
             executor.spin_once(timeout_sec=0.05)
+        if lacks:
+            missing(lacks)
     finally:
         executor.shutdown()
         node.destroy_node()
@@ -111,6 +131,7 @@ class _Sweep:
         self._sighted = sighted
         self._elsewhere = elsewhere
         self._foreign: set[bytes] = set()
+        self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
         self._subscriptions: dict[str, Any] = {}
         self._clients: dict[str, Any] = {}
         self.left: dict[bytes, LeftBehind] = {}
@@ -144,18 +165,31 @@ class _Sweep:
                 continue
             author = author_of(goal_id)
             if entry.status in ENDS or author is None:
-                continue
-            if author.alive:
-                if not author.here and goal_id not in self._foreign:
+                self._minded.pop(goal_id, None)
+            elif author.alive and not author.here:
+                if goal_id not in self._foreign:
                     self._foreign.add(goal_id)
                     self._elsewhere(action, goal_id)
-                continue
-            left = self.left[goal_id] = LeftBehind(action, goal_id, author.pid)
-            self._found(left)
+            else:
+                self._minded[goal_id] = action, author
+        self._find()
+
+    def _find(self) -> None:
+        """See who of those that left goals is dead by now: a status comes at a change only."""
+        for goal_id, (action, author) in list(self._minded.items()):
+            if not author.alive:
+                del self._minded[goal_id]
+                left = self.left[goal_id] = LeftBehind(action, goal_id, author.pid)
+                self._found(left)
+
+    def lacks(self, wanted: Collection[str]) -> list[str]:
+        """Return those of the wanted actions that never came in sight."""
+        return sorted(action for action in wanted if action + STATUS not in self._subscriptions)
 
     def ask(self) -> None:
         """Ask the servers to cancel what has not ended, again every second."""
         now = time.monotonic()
+        self._find()
         for left in self.left.values():
             left.servers = len(servers(self._node, left.action))
             if left.end is not End.UNKNOWN or now - left.asked_at < ASK_AGAIN:

@@ -21,7 +21,7 @@ from rclpy.exceptions import InvalidHandle
 
 from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
-from bt_actions.ros import alarm
+from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
 from bt_actions.ros.graph import servers
 from bt_actions.ros.interfaces import interface_name
@@ -61,6 +61,7 @@ class Line:
         self.action_type = action_type
         self.name = name
         self.users = 0
+        self._generation = shared.generation
         self.goals: dict[bytes, Ticket] = {}
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
@@ -177,9 +178,16 @@ class Line:
 
     # What the goals want
 
+    @property
+    def is_parents(self) -> bool:
+        """Whether this was made before a fork, and we are the child: the goals are not ours."""
+        return self._generation != shared.generation
+
     def tell(self, ticket: Ticket, event: Event, detail: Any = None, message: Any = None) -> None:
         """Tell a goal what happened and do what it says; `message` is the goal to be sent."""
         with lock:
+            if self.is_parents:
+                return
             if event is Event.GRANTED and ticket.paused_at is not None:
                 ticket.paused_at = time.monotonic()  # its next deadline begins in the pause
             self._apply(ticket, lambda now: ticket.goal.on(event, now, detail), message)
@@ -193,6 +201,8 @@ class Line:
         """
         with lock:
             goal, now = ticket.goal, self.traffic.clocks.now()
+            if self.is_parents:
+                return
             if ticket.paused_at is None or goal.sent:
                 if goal.sent and goal.due_in(now) == 0.0:
                     self.pump()
@@ -259,6 +269,8 @@ class Line:
 
     def pump(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
+        if self.is_parents:
+            return
         try:
             if self.client.pump():
                 self._heard_at = time.monotonic()

@@ -75,8 +75,14 @@ def domain_of(number: int) -> Domain:
         return domain
 
 
+generation = 0
+"""Forks between the first process and this one: what an older one made is not ours."""
+
+
 def disown() -> None:
     """In the child of a fork: the goals are the parent's, and nobody is here who has the lock."""
+    global generation
+    generation += 1
     lock._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001 - as threading itself does
     _domains.clear()
 
@@ -96,7 +102,7 @@ class Ticket:
     line: Line
     """Where it is sent; should it be lost, the line that sees its server again takes it over."""
     traffic: Traffic
-    """Of the node that it was begun on, which is told of its changes."""
+    """Of the node that is told of its changes: where it was begun, or was adopted later."""
     owner: Any
     """The leaf; None where it is gone, and a second server has taken its goal, too."""
     name: str

@@ -285,7 +285,11 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     waited for a second time. Returns the goals whose end is UNKNOWN.
     """
     with lock:
-        wanted = [ticket for ticket in tickets if ticket.goal.state is not State.DONE]
+        wanted = [
+            ticket
+            for ticket in tickets
+            if ticket.goal.state is not State.DONE and not ticket.line.is_parents
+        ]
         for ticket in wanted:
             ticket.line.tell(ticket, Event.INTERRUPTED)
         waits = [t for t in wanted if not t.accounted_for and not t.goal.waited_for]
@@ -310,25 +314,29 @@ def _who_begins() -> Beginner | None:
 
 
 @atexit.register
-def _close_at_exit() -> None:
-    """Close what a loop that crashed, or never called shutdown, has left; send nothing more."""
+def close_process(hurry: Callable[[], bool] = lambda: False) -> None:
+    """Close what a loop that crashed, or never called shutdown, has left; send nothing more.
+
+    For a process that ends; `hurry` as in `drain`.
+    """
     global _closing
     with lock:
         _closing = True
         lines = [line for line in alarm.minded() if isinstance(line, Line)]
         left = [ticket for line in lines for ticket in line.goals.values() if not ticket.goal.lost]
     try:
-        drain(left)
+        drain(left, hurry)
     except KeyboardInterrupt:
         log.warning("interrupted while the goals are canceled: not waiting for them any more")
     for ticket in left:
         if not ticket.accounted_for:
             log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
+    log.flush()
 
 
 def _disown() -> None:
     """In the child of a fork: the goals are the parent's, and so is what guards them."""
-    atexit.unregister(_close_at_exit)
+    atexit.unregister(close_process)
     alarm.disown()
     shared.disown()
 

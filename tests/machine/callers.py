@@ -1,7 +1,7 @@
 """Leaves and traffic as ros/traffic.py drives them, in a model world.
 
-It carries out what goals and resources decide. It reports each step to a judge, and decides
-nothing that traffic does not.
+It carries out what goals and resources decide, and reports each step to a judge. For who is in the
+way, takes over, or replaces it is a copy of ros/line.py and ros/traffic.py, kept by hand.
 """
 
 from __future__ import annotations

@@ -409,6 +409,23 @@ class TestBusy:
         assert began >= ended
 
 
+class TestFeedback:
+    @pytest.mark.parametrize("how", ["stop", "shutdown"])
+    def test_a_leaf_that_its_own_callback_ends_is_over(
+        self, serve: Any, name: str, node: Any, how: str
+    ) -> None:
+        journal = serve()
+
+        def ends(message: Any) -> None:
+            leaf.stop(Status.INVALID) if how == "stop" else leaf.shutdown()
+
+        leaf = MoveRobot("m", 5.0, action_name=name, on_feedback=ends)
+        with TreeRunner(leaf, node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.FAILURE
+        assert stood(leaf) == (Outcome.CANCELED, End.CANCELED)
+        assert journal.count("received") == 1
+
+
 class TestDeadlines:
     def test_a_request_that_is_never_answered(
         self, serve: Any, name: str, node: Any, executor: str

@@ -310,7 +310,7 @@ def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
         patch.setattr(traffic, "_closing", False)
         patch.setattr(traffic, "drain", interrupted)
         patch.setattr(traffic.log, "error", said.append)
-        traffic._close_at_exit()
+        traffic.close_process()
     [line] = said
     assert "cannot account for it" in line
     host.cancel_all(name)

@@ -21,7 +21,7 @@ from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from tests.scenarios.conftest import Launch
-from tests.support.processes import PATIENCE, ROOT, Journal, Process
+from tests.support.processes import PATIENCE, ROOT, HostFactory, Journal, Process
 from tests.support.reliability import Record
 from tests.support.simulated_time import SimulatedTime
 from tests.support.trees import state
@@ -544,6 +544,74 @@ def test_cleanup_first_cancels_before_the_tree_starts(
     assert journal.ends() == ["canceled", "succeeded"]
     assert journal.max_live == 1
     record.outcome = "the old goal CANCELED, then the new one SUCCEEDED; exit code 0"
+
+
+def test_cleanup_first_waits_for_a_server_that_is_stopped(
+    launch: Launch, new_host: HostFactory, tree: Tree, name: str, node: Any, record: Record
+) -> None:
+    """SIGKILL to the orchestrator, SIGSTOP to the server until nobody sees it; SIGCONT later"""
+    host = new_host()
+    journal = host.open(name, "1:slow=10")
+    run = launch("run", str(tree(name, distance=9.0)))
+    run.line("executing on")
+    journal.wait_for("accepted")
+    run.send(signal.SIGKILL)
+    run.wait()
+    host.send(signal.SIGSTOP)
+    topic = f"{name}/_action/status"
+    until(lambda: not node.get_publishers_info_by_topic(topic), 20.0, what="it is out of sight")
+    again = launch("run", str(tree(name, distance=0.5)), "--cleanup-first")
+    until(lambda: "waiting for" in "\n".join(again.errors), 20.0, what="it says what it waits for")
+    host.send(signal.SIGCONT)
+    assert again.wait(60.0) == 0, again
+    assert journal.ends() == ["canceled", "succeeded"]
+    assert journal.max_live == 1
+    record.outcome = "waits; the old goal CANCELED, then the new one SUCCEEDED; exit code 0"
+
+
+@pytest.mark.chaos
+def test_cleanup_first_runs_nothing_where_a_server_cannot_be_seen(
+    launch: Launch, tree: Tree, name: str, record: Record
+) -> None:
+    """`run --cleanup-first` of a tree whose server is not there"""
+    run = launch("run", str(tree(name, distance=0.5)), "--cleanup-first")
+    assert run.wait(60.0) == 3, run
+    assert f"no server of {name} is in sight" in "\n".join(run.errors)
+    record.outcome = "nothing is run; exit code 3"
+
+
+def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
+    launch: Launch, serve: Serve, tree: Tree, name: str, domain: int, record: Record
+) -> None:
+    """SIGKILL to the orchestrator while cleanup looks, and has seen its goal"""
+    from rclpy.context import Context
+
+    from bt_actions.ros.cleanup import LeftBehind, cleanup
+
+    journal = serve("1:slow=10")
+    run = launch("run", str(tree(name, distance=9.0)))
+    run.line("executing on")
+    journal.wait_for("accepted")
+    context, sighted, left = Context(), threading.Event(), list[LeftBehind]()
+    context.init(domain_id=domain)
+    sweeps = threading.Thread(
+        target=lambda: left.extend(
+            cleanup(
+                look=8.0,
+                sighted=lambda action: sighted.set() if action == name else None,
+                context=context,
+            )
+        )
+    )
+    sweeps.start()
+    assert sighted.wait(6.0)
+    assert holds_for(lambda: journal.count("cancel_requested") == 0, 3.0), "its author is alive"
+    run.send(signal.SIGKILL)
+    run.wait()
+    sweeps.join()
+    context.shutdown()
+    assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
+    record.outcome = "CANCELED"
 
 
 @pytest.mark.chaos

@@ -1,0 +1,165 @@
+"""Programs of the user's own around our runners: signals, and forks.
+
+Here `run()` or `wait()` is on the main thread, and the runners' contexts are their own.
+"""
+
+from __future__ import annotations
+
+import signal
+import textwrap
+from collections.abc import Callable
+
+import pytest
+
+from tests.support.processes import Host, Process
+from tests.support.reliability import Record
+
+Start = Callable[..., Process]
+
+HEAD = """
+import os, sys, threading
+import py_trees, rclpy
+from bt_actions import MoveRobot, Timeouts, TreeRunner
+T = Timeouts(server=30.0, cancel=3.0)
+name = {name!r}
+def said(event):
+    if getattr(event, "state", "") == "EXECUTING":
+        print("executing", flush=True)
+"""
+
+
+@pytest.fixture
+def program(start_program: Start, name: str) -> Callable[[str], Process]:
+    """Start a program that knows its action's name."""
+
+    def start(body: str) -> Process:
+        return start_program("-c", HEAD.format(name=name) + textwrap.dedent(body))
+
+    return start
+
+
+LOOP_AFTER_A_RUN = """
+    rclpy.init()
+    node = rclpy.create_node("user")
+    with TreeRunner(MoveRobot("first", 0.1, action_name=name, timeout=T)) as runner:
+        runner.run(60.0)
+    leaf = MoveRobot("second", 9.0, action_name=name, timeout=T)
+    tree = py_trees.trees.BehaviourTree(leaf)
+    tree.setup(node=node)
+    told = False
+    try:
+        while rclpy.ok():
+            rclpy.spin_once(node, timeout_sec=0.02)
+            tree.tick()
+            if leaf.progress().state == "EXECUTING" and not told:
+                told = True
+                print("executing", flush=True)
+    finally:
+        tree.shutdown()
+"""
+
+
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.chaos)]
+)
+def test_rclpys_signal_handlers_are_in_force_again_after_a_run(
+    host: Host, name: str, program: Callable[[str], Process], number: signal.Signals, record: Record
+) -> None:
+    """rclpy.init(), a run to its end, then a loop of the user's; a signal in mid-goal"""
+    journal = host.open(name)
+    process = program(LOOP_AFTER_A_RUN)
+    process.line("executing", within=60.0)
+    process.send(number)
+    process.wait()
+    assert journal.ends() == ["succeeded", "canceled"], process
+    record.outcome = "canceled, by the loop that rclpy's handler ended"
+
+
+TWO_RUNNERS = """
+    leaves = [MoveRobot(x, 9.0, action_name=name + x, timeout=T) for x in ("", "_b")]
+    runners = [TreeRunner(leaf) for leaf in leaves]
+    for runner in runners:
+        runner.observe(said)
+    runners[1].start()
+    runners[0].run()
+"""
+
+
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.chaos)]
+)
+def test_a_signal_that_ends_a_process_ends_the_goals_of_all_its_runners(
+    host: Host, name: str, program: Callable[[str], Process], number: signal.Signals, record: Record
+) -> None:
+    """One runner in run() on the main thread, one more that was started; SIGTERM or SIGHUP"""
+    journals = [host.open(name), host.open(f"{name}_b")]
+    process = program(TWO_RUNNERS)
+    for _ in journals:
+        process.line("executing", within=60.0)
+    process.send(number)
+    assert process.wait() == -number
+    assert [journal.ends() for journal in journals] == [["canceled"]] * 2, process
+    record.outcome = "both canceled, then the process ends by the signal"
+
+
+ONE_RUNNER = """
+    leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(server=30.0, cancel=CANCEL))
+    with TreeRunner(leaf) as runner:
+        runner.observe(said)
+        runner.run()
+"""
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_goal_that_is_left_running_is_named_before_a_signal_ends_the_process(
+    host: Host, name: str, program: Callable[[str], Process], times: int, record: Record
+) -> None:
+    """A server that refuses to cancel; SIGTERM, and one more where it would take too long"""
+    journal = host.open(name, "*:reject_cancel")
+    process = program(ONE_RUNNER.replace("CANCEL", "0.5" if times == 1 else "60.0"))
+    process.line("executing", within=60.0)
+    process.send(signal.SIGTERM)
+    if times == 2:
+        journal.wait_for("cancel_requested")
+        process.send(signal.SIGTERM)
+    assert process.wait() == -signal.SIGTERM
+    goal_id = str(journal.wait_for("accepted").goal)
+    errors = "\n".join(process.errors)
+    assert "not accounted for" in errors or "cannot account for it" in errors, process
+    assert goal_id[:8] in errors, process
+    host.cancel_all(name)
+    record.outcome = "named on standard error, then the process ends by the signal"
+
+
+A_FORK = """
+    leaf = MoveRobot("m", 1.0, action_name=name, timeout=T)
+    parent = os.getpid()
+
+    class Forks(py_trees.behaviour.Behaviour):
+        def update(self):
+            if leaf.progress().feedback is None:
+                return py_trees.common.Status.RUNNING
+            if os.fork() == 0:
+                HOW
+            os.wait()  # Fast DDS takes the parent's participant away in a child that ends so
+            return py_trees.common.Status.SUCCESS
+
+    every = py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=True)
+    root = py_trees.composites.Parallel("both", policy=every, children=[leaf, Forks("forks")])
+    with TreeRunner(root) as runner:
+        runner.run()
+"""
+
+
+@pytest.mark.parametrize(
+    "how", ["sys.exit(0)", pytest.param("raise ValueError", marks=pytest.mark.chaos)]
+)
+def test_a_child_that_ends_leaves_its_parents_goal_alone(
+    host: Host, name: str, program: Callable[[str], Process], how: str, record: Record
+) -> None:
+    """A behaviour forks in its tick beside a running goal; the child ends while it runs"""
+    journal = host.open(name)
+    process = program(A_FORK.replace("HOW", how))
+    journal.wait_for("succeeded", within=60.0)
+    assert journal.events() == ["received", "accepted", "succeeded"], process
+    record.outcome = "SUCCEEDED; the child has canceled nothing"
