@@ -457,9 +457,9 @@ def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_no
         try:
             one.start()
             other.start()
-            until(lambda: count("SENDING") == IN_FLIGHT)
-            rest = len(leaves) - IN_FLIGHT
-            assert holds_for(lambda: count("WAITING_FOR_SERVER") == rest, 0.3)
+            full = lambda: (count("SENDING"), count("WAITING_FOR_SERVER")) == (IN_FLIGHT, 8)  # noqa: E731
+            until(full)
+            assert holds_for(full, 0.3)
         finally:
             host.send(signal.SIGCONT)
         assert one.wait(20.0) is other.wait(20.0) is Status.SUCCESS
