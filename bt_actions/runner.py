@@ -331,6 +331,7 @@ class TreeRunner:
         if timeout is not None and timeout != timeout:
             raise ValueError(f"timeout must be a number of seconds, not {timeout!r}")
         deadline = None if timeout is None else time.monotonic() + timeout
+        self._leaving = None
         self._visitor.forget()
         self.tree.visitors.append(self._visitor)
         self._runs_on = threading.get_ident()

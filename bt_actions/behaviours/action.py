@@ -410,6 +410,8 @@ class ActionBehaviour(Behaviour):
 
     def _leave_line(self) -> None:
         if self._traffic is not None:
+            open_here = self.open_tickets()  # a second server's share, too
+            self._left_behind = [each for each in open_here if each is not self._ticket]
             self._traffic.leave(self._line)
         self._traffic = self._line = None
 

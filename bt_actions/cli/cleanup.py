@@ -70,10 +70,11 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
     foreign: list[str] = []
     unseen: list[str] = []
 
-    def missing(names: list[str]) -> None:
-        if not unseen:
+    def missing(names: list[str], in_vain: bool) -> None:
+        if in_vain:
+            unseen.extend(names)
+        else:
             note(f"waiting for {listing(names)}, where something may have been left")
-        unseen[:] = names
 
     goals = cleanup(
         look=look,
@@ -85,7 +86,6 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
         namespace=namespace,
         missing=missing,
     )
-    unseen = [name for name in unseen if name not in actions]
     if foreign:
         note(
             f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in another "
@@ -101,7 +101,7 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
         return Exit.UNKNOWN
     if unseen:
         note(
-            f"no server of {listing(unseen)} is in sight: nobody can see what was left there; "
+            f"no server of {listing(unseen)} answers: nobody can see what was left there; "
             "start it, or run without --cleanup-first"
         )
         return Exit.UNKNOWN

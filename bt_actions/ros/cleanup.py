@@ -9,6 +9,7 @@ action type is needed for any of it.
 from __future__ import annotations
 
 import time
+import uuid
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
@@ -69,7 +70,7 @@ def cleanup(
     elsewhere: Callable[[str, bytes], None] = lambda action, goal_id: None,
     wanted: Collection[str] = (),
     namespace: str = "",
-    missing: Callable[[list[str]], None] = lambda actions: None,
+    missing: Callable[[list[str], bool], None] = lambda actions, in_vain: None,
     context: Context | None = None,
 ) -> list[LeftBehind]:
     """Cancel what dead orchestrators of this machine left; return it with its ends.
@@ -79,29 +80,31 @@ def cleanup(
     `sighted` with the name of each action in sight, and `elsewhere` with the action and the id of
     each unfinished goal of a bt_actions process on another machine, or in another container, of
     which nobody here can tell whether it is alive. Of the actions in `wanted`, whose relative names
-    belong to `namespace`, those that are not in sight by then are looked for up to LOOK_LONGEST
-    seconds, and `missing` is called with them, in the beginning of that, and in the end if it was
-    in vain. Blocks.
+    belong to `namespace`, those of which no server has answered by then (one that is shown may be
+    stopped, or a ghost) are waited for up to LOOK_LONGEST seconds, and `missing` is called with
+    them, in the beginning of that, and in the end if it was in vain, as it is told. Blocks.
     """
     own = Context() if context is None else context
     if context is None:
         own.init()
-    node = Node("bt_actions_cleanup", context=own)
+    node = Node("bt_actions_cleanup", context=own, namespace=namespace)
     executor = SingleThreadedExecutor(context=own)
     executor.add_node(node)
     sweep = _Sweep(node, found, sighted, elsewhere)
     try:
-        names = {expand_topic_name(name, node.get_name(), namespace or "/") for name in wanted}
+        here = node.get_name(), node.get_namespace()  # remapped, as that of the run will be
+        sweep.unanswered = {expand_topic_name(name, *here) for name in wanted}
         began, waits = time.monotonic(), False
+        looked = began + look
         while True:
             now = time.monotonic()
-            looked = max(began + look, sweep.newest + SETTLE)
-            lacks = sweep.lacks(names)
+            looked = max(looked, sweep.newest + SETTLE)
+            lacks = sorted(sweep.unanswered)
             if lacks and now >= looked and not waits:
                 waits = True
-                missing(lacks)
-            if lacks and now < began + LOOK_LONGEST:
-                looked = max(looked, now + 1.0)
+                missing(lacks, False)
+            if waits and lacks and now < began + LOOK_LONGEST:
+                looked = now + 1.0
             if now < looked:
                 sweep.discover(now)
             elif sweep.over or now >= looked + patience:
@@ -109,7 +112,7 @@ def cleanup(
             sweep.ask()
             executor.spin_once(timeout_sec=0.05)
         if lacks:
-            missing(lacks)
+            missing(lacks, True)
     finally:
         executor.shutdown()
         node.destroy_node()
@@ -134,8 +137,12 @@ class _Sweep:
         self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
         self._subscriptions: dict[str, Any] = {}
         self._clients: dict[str, Any] = {}
+        self._asked_at = float("-inf")
         self.left: dict[bytes, LeftBehind] = {}
+        self.unanswered: set[str] = set()
+        """Wanted actions of which no server has answered."""
         self.newest = float("-inf")
+        """When the last action came in sight, or a server answered first."""
 
     @property
     def over(self) -> bool:
@@ -182,10 +189,6 @@ class _Sweep:
                 left = self.left[goal_id] = LeftBehind(action, goal_id, author.pid)
                 self._found(left)
 
-    def lacks(self, wanted: Collection[str]) -> list[str]:
-        """Return those of the wanted actions that never came in sight."""
-        return sorted(action for action in wanted if action + STATUS not in self._subscriptions)
-
     def ask(self) -> None:
         """Ask the servers to cancel what has not ended, again every second."""
         now = time.monotonic()
@@ -194,13 +197,27 @@ class _Sweep:
             left.servers = len(servers(self._node, left.action))
             if left.end is not End.UNKNOWN or now - left.asked_at < ASK_AGAIN:
                 continue
-            client = self._clients.get(left.action)
-            if client is None:
-                client = self._clients[left.action] = self._node.create_client(
-                    CancelGoal, f"{left.action}/_action/cancel_goal"
-                )
-            if client.service_is_ready():
+            if self._cancel(left.action, left.goal_id):
                 left.asked_at = now
-                request = CancelGoal.Request()
-                request.goal_info.goal_id = UUID(uuid=list(left.goal_id))
-                client.call_async(request)
+        if now - self._asked_at >= ASK_AGAIN:
+            self._asked_at = now
+            for action in sorted(self.unanswered):
+                self._cancel(action, uuid.uuid4().bytes)  # nobody's: any answer shows that it lives
+
+    def _cancel(self, action: str, goal_id: bytes) -> bool:
+        client = self._clients.get(action)
+        if client is None:
+            client = self._clients[action] = self._node.create_client(
+                CancelGoal, f"{action}/_action/cancel_goal"
+            )
+        if not client.service_is_ready():
+            return False
+        request = CancelGoal.Request()
+        request.goal_info.goal_id = UUID(uuid=list(goal_id))
+        client.call_async(request).add_done_callback(lambda _: self._answered(action))
+        return True
+
+    def _answered(self, action: str) -> None:
+        if action in self.unanswered:
+            self.unanswered.remove(action)
+            self.newest = time.monotonic()  # its status may be under way

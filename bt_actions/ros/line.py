@@ -43,9 +43,9 @@ PUMP_EVERY = 0.01
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
-SILENT_FOR = 25.0
-"""Seconds without any answer, though asked at least every ten, until goals whose node is gone are
-left to whoever can see whether their server is there: as long as a ghost is shown."""
+SILENT_FOR = 40.0
+"""Seconds without any answer until goals whose node is gone are left to whoever can see whether
+their server is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
 TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
 FEEDBACK = "/_action/feedback"
@@ -491,7 +491,10 @@ class Line:
         self._take_over()
         if self.watch.wants_probe(now):
             self._probe()
+        is_new = self._sight is None and now - self.traffic.seen_since < TOO_NEW
         for ticket in list(self.goals.values()):
+            if is_new and ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to):
+                continue  # left by another; its server may not have been discovered yet
             if ticket.goal.sent:
                 if not ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to):
                     self.pump()  # its last words

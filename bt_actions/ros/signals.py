@@ -24,10 +24,13 @@ _ENDING = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
-_RCLPYS: dict[int, tuple[SignalHandlerOptions, ...]] = {
-    signal.SIGINT: (SignalHandlerOptions.ALL, SignalHandlerOptions.SIGINT),
-    signal.SIGTERM: (SignalHandlerOptions.ALL, SignalHandlerOptions.SIGTERM),
+_OPTIONS = {
+    frozenset({signal.SIGINT, signal.SIGTERM}): SignalHandlerOptions.ALL,
+    frozenset({signal.SIGINT}): SignalHandlerOptions.SIGINT,
+    frozenset({signal.SIGTERM}): SignalHandlerOptions.SIGTERM,
+    frozenset[signal.Signals](): SignalHandlerOptions.NO,
 }
+"""What rclpy calls its handlers for these signals."""
 
 
 @contextmanager
@@ -60,25 +63,33 @@ def ended_by_signals(
     try:
         yield
     finally:
-        put_on_since = _take_off()  # by an rclpy.init() meanwhile
-        if put_on_since != SignalHandlerOptions.NO:
-            theirs = put_on_since
-        elif had_contexts and not rclpy.ok():
-            theirs = SignalHandlerOptions.NO  # rclpy.shutdown() would have taken them off
+        if had_contexts and not rclpy.ok():
+            theirs = frozenset()  # rclpy.shutdown() would have taken them off
+        theirs |= _take_off()  # and what an rclpy.init() has put on meanwhile
         first = received[0] if received else 0
-        if first and before[first] is signal.SIG_DFL and theirs not in _RCLPYS.get(first, ()):
-            last_words(lambda: len(received) > 1)
-        for number in ours:
-            signal.signal(number, before[number])
-        if theirs != SignalHandlerOptions.NO:
-            install_signal_handlers(theirs)
-        if first:
-            signal.raise_signal(first)
+        try:
+            if first and before[first] is signal.SIG_DFL and first not in theirs:
+                last_words(lambda: len(received) > 1)
+        finally:
+            for number in ours:
+                signal.signal(number, before[number])
+            if theirs:
+                install_signal_handlers(_OPTIONS[theirs])
+            if first:
+                signal.raise_signal(first)
 
 
-def _take_off() -> SignalHandlerOptions:
-    """Take rclpy's handlers off, and return which there were."""
-    options = get_current_signal_handlers_options()
-    if options != SignalHandlerOptions.NO:
+def _take_off() -> frozenset[signal.Signals]:
+    """Take rclpy's handlers off, and return for which signals they were in force.
+
+    Where a program has set one of its own over rclpy's, rclpy counts its own as set for ever.
+    """
+    before = _rclpys()
+    if before:
         uninstall_signal_handlers()
-    return options
+    return before - _rclpys()
+
+
+def _rclpys() -> frozenset[signal.Signals]:
+    now = get_current_signal_handlers_options()
+    return next(numbers for numbers, options in _OPTIONS.items() if options == now)

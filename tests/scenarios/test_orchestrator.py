@@ -571,13 +571,36 @@ def test_cleanup_first_waits_for_a_server_that_is_stopped(
 
 @pytest.mark.chaos
 def test_cleanup_first_runs_nothing_where_a_server_cannot_be_seen(
-    launch: Launch, tree: Tree, name: str, record: Record
+    launch: Launch, tree: Tree, name: str, node: Any, record: Record
 ) -> None:
-    """`run --cleanup-first` of a tree whose server is not there"""
+    """`run --cleanup-first` of a tree whose server is not there, but another client of it"""
+    MoveRobot("somebody", 1.0, action_name=name).setup(node=node)
     run = launch("run", str(tree(name, distance=0.5)), "--cleanup-first")
     assert run.wait(60.0) == 3, run
-    assert f"no server of {name} is in sight" in "\n".join(run.errors)
+    assert f"no server of {name} answers" in "\n".join(run.errors)
     record.outcome = "nothing is run; exit code 3"
+
+
+def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
+    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `ros2 launch` gives a node as its namespace is in force for relative names, too."""
+    from rclpy.context import Context
+
+    from bt_actions.ros import cleanup
+
+    monkeypatch.setattr(cleanup, "LOOK_LONGEST", 0.2)
+    context, told = Context(), list[tuple[list[str], bool]]()
+    context.init(args=["--ros-args", "-r", "__ns:=/r1"], domain_id=domain)
+    cleanup.cleanup(
+        look=0.1,
+        patience=0.1,
+        wanted={"move", "/r2/move"},
+        missing=lambda actions, in_vain: told.append((actions, in_vain)),
+        context=context,
+    )
+    context.shutdown()
+    assert told == [(["/r1/move", "/r2/move"], False), (["/r1/move", "/r2/move"], True)]
 
 
 def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(

@@ -17,7 +17,7 @@ from tests.support.reliability import Record
 Start = Callable[..., Process]
 
 HEAD = """
-import os, sys, threading
+import os, signal, sys, threading
 import py_trees, rclpy
 from bt_actions import MoveRobot, Timeouts, TreeRunner
 T = Timeouts(server=30.0, cancel=3.0)
@@ -60,14 +60,26 @@ LOOP_AFTER_A_RUN = """
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.chaos)]
+    ("number", "own_handler"),
+    [
+        (signal.SIGTERM, False),
+        pytest.param(signal.SIGTERM, True, marks=pytest.mark.chaos),
+        pytest.param(signal.SIGINT, False, marks=pytest.mark.chaos),
+    ],
 )
 def test_rclpys_signal_handlers_are_in_force_again_after_a_run(
-    host: Host, name: str, program: Callable[[str], Process], number: signal.Signals, record: Record
+    host: Host,
+    name: str,
+    program: Callable[[str], Process],
+    number: signal.Signals,
+    own_handler: bool,
+    record: Record,
 ) -> None:
-    """rclpy.init(), a run to its end, then a loop of the user's; a signal in mid-goal"""
+    """rclpy.init(), maybe a SIGINT handler, a run, a loop of the user's; a signal in mid-goal"""
     journal = host.open(name)
-    process = program(LOOP_AFTER_A_RUN)
+    own = "rclpy.init()\n    signal.signal(signal.SIGINT, lambda *_: None)"
+    body = LOOP_AFTER_A_RUN.replace("rclpy.init()", own) if own_handler else LOOP_AFTER_A_RUN
+    process = program(body)
     process.line("executing", within=60.0)
     process.send(number)
     process.wait()

@@ -18,6 +18,7 @@ from py_trees.common import Status
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
 from bt_actions.goal import State
+from bt_actions.ros.line import Line
 from bt_actions.ros.shared import lock
 from bt_actions.server import Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
@@ -316,6 +317,33 @@ class TestStopped:
                 runner.start()
                 until(lambda: state(first) == "EXECUTING", 20.0)
             assert first.end is End.UNKNOWN
+            assert other.run(30.0) is Status.SUCCESS
+        canceled, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
+        assert canceled.t <= received.t
+        record.outcome = "UNKNOWN; canceled before the goal on the other server is sent"
+
+    @pytest.mark.chaos
+    def test_left_behind_where_the_next_node_has_not_discovered_its_server_yet(
+        self, host: Host, name: str, record: Record, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The same with a node of its own, which is shown the one server 1.5 s after the other"""
+        journals = [host.open(f"{name}_0", "1:delay_cancel=3"), host.open(f"{name}_1")]
+        timeouts = Timeouts(server=20.0, cancel=0.5)
+        first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
+        second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
+        first.timeouts = second.timeouts = timeouts
+        with TreeRunner(first) as runner:
+            runner.start()
+            until(lambda: state(first) == "EXECUTING", 20.0)
+        assert first.end is End.UNKNOWN
+        really, began = Line._shown, time.monotonic()
+
+        def late(line: Line) -> frozenset[bytes]:
+            early = line.name == f"{name}_0" and time.monotonic() - began < 1.5
+            return frozenset() if early else really(line)
+
+        monkeypatch.setattr(Line, "_shown", late)
+        with TreeRunner(second) as other:
             assert other.run(30.0) is Status.SUCCESS
         canceled, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
         assert canceled.t <= received.t
@@ -644,6 +672,25 @@ class TestTwice:
         assert runner.unaccounted == []
         runner.shutdown()
         record.outcome = "SUCCEEDED; what the second server took is canceled before it returns"
+
+    @pytest.mark.chaos
+    def test_a_leaf_is_not_drained_while_the_second_server_refuses_to_cancel(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """The second server wakes up when the run is over, and refuses to cancel; shutdown"""
+        one, other = new_host(short_lease=False), new_host(short_lease=False)
+        one.open(name)
+        other.open(name, "*:slow=100", "*:reject_cancel")
+        leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=20.0, cancel=0.5))
+        until_both_hear(leaf, node)
+        other.send(signal.SIGSTOP)
+        with TreeRunner(leaf, node=node) as runner:
+            assert runner.run(30.0) is Status.SUCCESS
+            other.send(signal.SIGCONT)
+            until(lambda: not leaf.drained, 10.0)
+        assert not leaf.drained
+        assert [report.name for report in runner.unaccounted] == ["m"]
+        record.outcome = "told as unaccounted for, also by the leaf, after shutdown"
 
     def test_a_goal_that_turns_up_when_its_leaf_is_gone_is_reported_by_name(
         self, new_host: HostFactory, name: str, node: Any, record: Record
