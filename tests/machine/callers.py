@@ -1,7 +1,8 @@
 """Leaves and traffic as ros/traffic.py drives them, in a model world.
 
 It carries out what goals and resources decide, and reports each step to a judge. For who is in the
-way, takes over, or replaces it is a copy of ros/line.py and ros/traffic.py, kept by hand.
+way, takes over, or replaces it is a copy of ros/line.py and ros/traffic.py, kept by hand, which is
+fast and can be broken in many ways; production.py plays the same histories with those themselves.
 """
 
 from __future__ import annotations

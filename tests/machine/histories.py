@@ -208,9 +208,9 @@ class Play:
         self.judge.at_the_end()
 
 
-def play(history: History, *, aloud: bool = False) -> Play:
+def play(history: History, kind: type[Play] = Play, *, aloud: bool = False) -> Play:
     """Play a history to its end; raises Violation, or whatever the code under test raises."""
-    played = Play(history.plans, aloud=aloud)
+    played = kind(history.plans, aloud=aloud)
     try:
         for kind, number in history.moves:
             played.move(kind, number)
@@ -222,10 +222,10 @@ def play(history: History, *, aloud: bool = False) -> Play:
     return played
 
 
-def broken(history: History) -> str | None:
+def broken(history: History, kind: type[Play] = Play) -> str | None:
     """Return what goes wrong in a history, or None."""
     try:
-        play(history)
+        play(history, kind)
     except Violation as violation:
         return str(violation)
     except Exception as error:  # noqa: BLE001 - any exception out of the machine is a finding
@@ -233,7 +233,7 @@ def broken(history: History) -> str | None:
     return None
 
 
-def shrink(history: History) -> History:
+def shrink(history: History, kind: type[Play] = Play) -> History:
     """Return a shorter history that still goes wrong."""
     moves = list(history.moves)
     size = len(moves)
@@ -241,7 +241,7 @@ def shrink(history: History) -> History:
         start = 0
         while start < len(moves):
             shorter = moves[:start] + moves[start + size :]
-            if broken(History(history.plans, tuple(shorter))) is not None:
+            if broken(History(history.plans, tuple(shorter)), kind) is not None:
                 moves = shorter
             else:
                 start += size
@@ -249,10 +249,10 @@ def shrink(history: History) -> History:
     return History(history.plans, tuple(moves))
 
 
-def tell(history: History) -> str:
+def tell(history: History, kind: type[Play] = Play) -> str:
     """Return a history in words, with what goes wrong at its end."""
     try:
-        done = play(history, aloud=True)
+        done = play(history, kind, aloud=True)
     except Exception as error:
         with contextlib.suppress(AttributeError):
             return "\n".join([*error.__notes__, f"BROKEN: {error!r}"])
@@ -260,9 +260,9 @@ def tell(history: History) -> str:
     return "\n".join([*(done.told or ()), "nothing goes wrong"])
 
 
-def first_broken(seeds: Iterable[int]) -> int | None:
+def first_broken(seeds: Iterable[int], kind: type[Play] = Play) -> int | None:
     """Return the first seed whose history goes wrong, or None."""
     for seed in seeds:
-        if broken(random_history(seed)) is not None:
+        if broken(random_history(seed), kind) is not None:
             return seed
     return None
