@@ -112,7 +112,7 @@ class Goal:
 
     def __repr__(self) -> str:
         told = "" if self.outcome is None else f" {self.outcome}, end {self.end}"
-        return f"<Goal {self.server} {self.id.hex()[:8]} {self.state.value}{told}>"
+        return f"<Goal {self.server} {self.id.hex()} {self.state.value}{told}>"
 
     # What the caller may ask
 
