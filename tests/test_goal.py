@@ -170,10 +170,10 @@ def test_a_moment_that_is_none_is_a_mistake_of_the_caller() -> None:
 
 
 def test_a_goal_shows_where_it_is() -> None:
-    assert repr(sending().goal) == "<Goal /move 2a2a2a2a SENDING>"
+    assert repr(sending().goal) == f"<Goal /move {'2a' * 16} SENDING>"
     life = executing()
     life.on(Event.RESULT, ABORTED)
-    assert repr(life.goal) == "<Goal /move 2a2a2a2a DONE ABORTED, end ABORTED>"
+    assert repr(life.goal) == f"<Goal /move {'2a' * 16} DONE ABORTED, end ABORTED>"
 
 
 def test_without_resources_of_its_own_a_goal_needs_its_servers_name() -> None:
