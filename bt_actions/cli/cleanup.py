@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
 def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace: str = "") -> Exit:
     """Clean up, saying what is found and how it ended.
 
-    Where one of the `wanted` actions does not come in sight, nobody can say: UNKNOWN.
+    Where no server of one of the `wanted` actions answers, nobody can say: UNKNOWN.
     """
     from bt_actions.policy import End
     from bt_actions.ros.cleanup import cleanup

@@ -36,8 +36,7 @@ SETTLE = 4.0
 client was just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
 
 LOOK_LONGEST = 30.0
-"""Seconds for which actions are looked for that are wanted, and not in sight: a ghost of a killed
-server is shown for 20."""
+"""Seconds for which a server of a wanted action may take to answer: a ghost is shown for 20."""
 
 
 @dataclass(slots=True)
