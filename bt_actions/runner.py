@@ -40,6 +40,10 @@ PATIENCE_AT_EXIT = 30.0
 """Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
 
 
+_runs: dict[int, TreeRunner] = {}
+"""All that go on in this process; a list of them can be made in a signal handler."""
+
+
 class TreeError(Exception):
     """A behaviour raised, or the spin thread died; the tree's goals have been drained."""
 
@@ -111,7 +115,7 @@ class TreeRunner:
         self._traffic.observe(self._note)
         # Before the exit hook of ros/traffic.py: a tree that ticks on would send another goal, and
         # a daemon thread in spin() aborts the process that ends beside it.
-        atexit.register(self._shut_down)
+        atexit.register(self._at_exit)
 
     @property
     def node(self) -> Any:
@@ -181,18 +185,28 @@ class TreeRunner:
             with self._mind_signals():
                 return self._run(timeout)
         finally:
-            self._stop_wanted = self._abandoned = False
-            self._runs_on = None
-            self._running.release()
+            self._release()
 
     def _mind_signals(self) -> contextlib.AbstractContextManager[None]:
         """With a node of the user's, its context's signal handling is the user's as well."""
         if not self._spinner.owns_context:
             return contextlib.nullcontext()
+        return self._ended_by_signals()
+
+    def _ended_by_signals(self) -> contextlib.AbstractContextManager[None]:
         from bt_actions.ros.signals import ended_by_signals
         from bt_actions.ros.traffic import close_process
 
-        return ended_by_signals(lambda again: self.interrupt(abandon=again), close_process)
+        return ended_by_signals(self._signalled, close_process)
+
+    def _signalled(self, again: bool, ends_process: bool) -> bool:
+        """Interrupt the run, and all of them before the process ends; tell whether ours cannot end.
+
+        Called in a signal handler.
+        """
+        for runner in [self, *(list(_runs.values()) if ends_process else [])]:
+            runner.interrupt(abandon=again)
+        return self._patience.is_over
 
     def start(self) -> None:
         """Run the tree on a thread of its own; see `wait`. For use inside a running node."""
@@ -216,14 +230,18 @@ class TreeRunner:
         except BaseException as error:  # noqa: BLE001 - raised again by wait()
             self._outcome = error
         finally:
-            self._stop_wanted = self._abandoned = False
-            self._runs_on = None
-            self._running.release()
+            self._release()
+
+    def _release(self) -> None:
+        self._stop_wanted = self._abandoned = False
+        self._runs_on = None
+        _runs.pop(id(self), None)
+        self._running.release()
 
     def wait(self, timeout: float | None = None) -> Status:
         """Wait for a tree that was started, and return or raise what `run` would.
 
-        Signals take effect as in `run` while this waits on the main thread, and not before.
+        Signals take effect as in `run` while this, or `shutdown`, is on the main thread.
         Raises TimeoutError when it is still running after `timeout` seconds; it goes on.
         """
         thread = self._thread
@@ -283,14 +301,19 @@ class TreeRunner:
             raise RuntimeError("shutdown() on the executor's own thread would wait for itself")
         if self._runs_on == threading.get_ident():
             raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
-        self._shut_down(patience=-1.0)
+        with self._mind_signals():
+            self._shut_down(patience=-1.0)
 
-    def _shut_down(self, patience: float = PATIENCE_AT_EXIT) -> None:
+    def _at_exit(self) -> None:
+        with contextlib.suppress(KeyboardInterrupt), self._ended_by_signals():
+            self._shut_down(PATIENCE_AT_EXIT)
+
+    def _shut_down(self, patience: float) -> None:
         """Shut down; where a run does not end within `patience` seconds, leave all as it is."""
         if os.getpid() != self._pid:
             return  # the child of a fork: all of this is the parent's
         self._closed = True
-        atexit.unregister(self._shut_down)
+        atexit.unregister(self._at_exit)
         if self._running.locked():
             self.interrupt()
         if not self._running.acquire(timeout=patience):
@@ -335,6 +358,7 @@ class TreeRunner:
         self._visitor.forget()
         self.tree.visitors.append(self._visitor)
         self._runs_on = threading.get_ident()
+        _runs[id(self)] = self
         self._patience.begin(deadline)
         try:
             self._guarded("setup", self._set_up)  # clients are made before anything spins

@@ -63,10 +63,17 @@ class Patience:
         """The last tick is over, and so is all that a behaviour does when it is stopped."""
         self._ticks_on = None
 
-    def gives_up(self) -> bool:
-        """Whether the last tick should have been over for long."""
+    @property
+    def is_over(self) -> bool:
+        """Whether the last tick should have been over for long; safe in a signal handler."""
         ends_at = self._ends_at
-        if self._ticks_on is None or ends_at is None or time.monotonic() - ends_at < self.GRACE:
+        if self._ticks_on is None or ends_at is None:
+            return False
+        return time.monotonic() - ends_at >= self.GRACE
+
+    def gives_up(self) -> bool:
+        """Whether nobody waits for the last tick any more."""
+        if not self.is_over:
             return False
         if not self.gave_up:
             self.gave_up = True

@@ -1,4 +1,4 @@
-"""While a tree runs on the main thread: signals that would end the process end the tree first.
+"""While a runner works on the main thread: signals that would end the process end its trees first.
 
 Only handlers that are Python's own defaults are replaced, and they are put back; so are rclpy's,
 which are set beneath Python's, and of which Python knows nothing.
@@ -6,11 +6,13 @@ which are set beneath Python's, and of which Python knows nothing.
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 import rclpy
 from rclpy.signals import (
@@ -32,64 +34,151 @@ _OPTIONS = {
 }
 """What rclpy calls its handlers for these signals."""
 
+Interrupt = Callable[[bool, bool], bool]
+
 
 @contextmanager
 def ended_by_signals(
-    interrupt: Callable[[bool], None], last_words: Callable[[Callable[[], bool]], None]
+    interrupt: Interrupt, last_words: Callable[[], object] = lambda: None
 ) -> Iterator[None]:
-    """Call `interrupt(again)` at a signal, and let it take its usual effect when the block is over.
+    """Call `interrupt(again, ends_process)` at a signal; its usual effect comes after the block.
 
-    `again` is True from the second signal on: who sends it does not want to wait. The usual effect
-    of SIGINT is KeyboardInterrupt; with rclpy's handlers, which contexts are shut down. The others
-    end the process on the spot, without its exit hooks: then `last_words` is called before, with a
-    question that it has to ask again and again, whether there was one more signal. Elsewhere than
-    on the main thread nothing is done, because Python handles signals there only.
+    `again` is True from the second signal on: who sends it does not want to wait. `interrupt`
+    returns True where the block cannot end by itself; with the second signal KeyboardInterrupt is
+    raised in it then.
+
+    The usual effect of SIGINT is KeyboardInterrupt; with rclpy's handlers, which contexts are shut
+    down. The others end the process on the spot, without its exit hooks; then `ends_process` is
+    True, and `last_words` is called before. Of blocks within each other all are told, and the
+    outermost lets the signals take effect. Elsewhere than on the main thread nothing is done,
+    because Python handles signals there only.
     """
+    global _watch
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    received: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        received.append(number)
-        interrupt(len(received) > 1)
-
-    had_contexts = rclpy.ok()
-    theirs = _take_off()
-    before = {number: signal.getsignal(number) for number in _ENDING}
-    ours = [number for number in _ENDING if before[number] in _DEFAULTS]
-    for number in ours:
-        signal.signal(number, note)
+    if _watch is not None:
+        with _watch.telling(interrupt):
+            yield
+        return
+    watch = _Watch()
+    spoken = False
     try:
-        yield
+        _watch = watch
+        watch.put_on()
+        with watch.telling(interrupt):
+            yield
     finally:
-        if had_contexts and not rclpy.ok():
-            theirs = frozenset()  # rclpy.shutdown() would have taken them off
-        theirs |= _take_off()  # and what an rclpy.init() has put on meanwhile
-        first = received[0] if received else 0
         try:
-            if first and before[first] is signal.SIG_DFL and first not in theirs:
-                last_words(lambda: len(received) > 1)
+            if spoken := watch.ends_process():
+                last_words()
         finally:
-            for number in ours:
-                signal.signal(number, before[number])
-            if theirs:
-                install_signal_handlers(_OPTIONS[theirs])
-            if first:
-                signal.raise_signal(first)
+            _watch = None
+            try:
+                watch.take_off()
+                if watch.ends_process() and not spoken:  # it came in between
+                    last_words()
+            finally:
+                watch.let_take_effect()
 
 
-def _take_off() -> frozenset[signal.Signals]:
-    """Take rclpy's handlers off, and return for which signals they were in force.
+class _Watch:
+    """Handlers that take note of signals, in place of the defaults and of rclpy's."""
 
-    Where a program has set one of its own over rclpy's, rclpy counts its own as set for ever.
-    """
-    before = _rclpys()
-    if before:
-        uninstall_signal_handlers()
-    return before - _rclpys()
+    def __init__(self) -> None:
+        self._received: list[int] = []
+        self._interrupts: list[Interrupt] = []
+        self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
+        self._rclpys = _rclpys()
+        self._had_contexts = rclpy.ok()
+
+    def put_on(self) -> None:
+        if self._rclpys:
+            uninstall_signal_handlers()
+        for number in _ENDING:
+            handler = signal.getsignal(number)
+            if handler in _DEFAULTS:
+                self._before[number] = handler
+                signal.signal(number, self._note)
+
+    def take_off(self) -> None:
+        """Put all back: SIGINT's handler at the end, because KeyboardInterrupt is back with it.
+
+        But rclpy's come after Python's, which would be set over them.
+        """
+        if self._had_contexts and not rclpy.ok():
+            self._rclpys = frozenset()  # rclpy.shutdown() would have taken them off
+        meanwhile = _rclpys()  # what an rclpy.init() has put on
+        if meanwhile:
+            uninstall_signal_handlers()
+        # Over which the program has set one of its own, rclpy counts its own as set for ever.
+        self._rclpys = (self._rclpys | meanwhile) - _rclpys()
+        try:
+            for number in reversed(self._before):
+                signal.signal(number, self._before[number])
+            install_signal_handlers(_OPTIONS[self._rclpys])
+        finally:
+            install_signal_handlers(_OPTIONS[self._rclpys])  # again: it may have been interrupted
+
+    @contextmanager
+    def telling(self, interrupt: Interrupt) -> Iterator[None]:
+        """Tell `interrupt` of signals meanwhile, and of those that came before."""
+        self._interrupts.append(interrupt)
+        try:
+            if self._received:
+                interrupt(len(self._received) > 1, self.ends_process())
+            yield
+        finally:
+            self._interrupts.pop()
+
+    def ends_process(self) -> bool:
+        """Whether what was received ends the process on the spot."""
+        return any(
+            self._before.get(signal.Signals(number)) is signal.SIG_DFL
+            and number not in self._rclpys
+            for number in self._received
+        )
+
+    def let_take_effect(self) -> None:
+        """Raise what was received; KeyboardInterrupt last, after which nothing could be."""
+        for number in sorted(set(self._received), key=lambda number: number == signal.SIGINT):
+            signal.raise_signal(number)
+
+    def disown(self) -> None:
+        """In the child of a fork: it ends as if this had never been."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._before.clear()
+        self._received.clear()
+        self._interrupts = [_nothing for _ in self._interrupts]  # each is still taken off
+        self._rclpys = frozenset()
+
+    def _note(self, number: int, _frame: FrameType | None) -> None:
+        self._received.append(number)
+        again, ends_process = len(self._received) > 1, self.ends_process()
+        stuck = [interrupt(again, ends_process) for interrupt in self._interrupts]
+        if again and stuck and stuck[-1]:  # the innermost is where this thread is
+            raise KeyboardInterrupt
+
+
+_watch: _Watch | None = None
+
+
+def _nothing(_again: bool, _ends_process: bool) -> bool:
+    return False
 
 
 def _rclpys() -> frozenset[signal.Signals]:
+    """For which signals rclpy's handlers are in force."""
     now = get_current_signal_handlers_options()
     return next(numbers for numbers, options in _OPTIONS.items() if options == now)
+
+
+def _disown() -> None:
+    global _watch
+    watch, _watch = _watch, None
+    if watch is not None:
+        watch.disown()
+
+
+os.register_at_fork(after_in_child=_disown)

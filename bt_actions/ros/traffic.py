@@ -34,6 +34,7 @@ from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.line import Line, is_valid
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import Beginner, Change, Observer, Ticket, changed, domain_of, lock
+from bt_actions.ros.signals import ended_by_signals
 from bt_actions.server import Server
 
 JUST_PAST = 0.1
@@ -314,24 +315,30 @@ def _who_begins() -> Beginner | None:
 
 
 @atexit.register
-def close_process(hurry: Callable[[], bool] = lambda: False) -> None:
+def close_process() -> None:
     """Close what a loop that crashed, or never called shutdown, has left; send nothing more.
 
-    For a process that ends; `hurry` as in `drain`.
+    For a process that ends. A first signal meanwhile waits, and a second one ends the wait.
     """
     global _closing
-    with lock:
-        _closing = True
-        lines = [line for line in alarm.minded() if isinstance(line, Line)]
-        left = [ticket for line in lines for ticket in line.goals.values() if not ticket.goal.lost]
-    try:
-        drain(left, hurry)
-    except KeyboardInterrupt:
-        log.warning("interrupted while the goals are canceled: not waiting for them any more")
-    for ticket in left:
-        if not ticket.accounted_for:
-            log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
-    log.flush()
+    hurried = False
+
+    def hurry(again: bool, _ends_process: bool) -> bool:
+        nonlocal hurried
+        hurried = again
+        return False
+
+    with contextlib.suppress(KeyboardInterrupt), ended_by_signals(hurry):
+        with lock:
+            _closing = True
+            lines = [line for line in alarm.minded() if isinstance(line, Line)]
+            tickets = [ticket for line in lines for ticket in line.goals.values()]
+        left = [ticket for ticket in tickets if not ticket.goal.lost]
+        drain(left, lambda: hurried)
+        for ticket in left:
+            if not ticket.accounted_for:
+                log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
+        log.flush()
 
 
 def _disown() -> None:

@@ -1,6 +1,6 @@
 """Programs of the user's own around our runners: signals, and forks.
 
-Here `run()` or `wait()` is on the main thread, and the runners' contexts are their own.
+Here the runners' calls are on the main thread, and their contexts are their own.
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ import py_trees, rclpy
 from bt_actions import MoveRobot, Timeouts, TreeRunner
 T = Timeouts(server=30.0, cancel=3.0)
 name = {name!r}
+executing = threading.Event()
 def said(event):
     if getattr(event, "state", "") == "EXECUTING":
         print("executing", flush=True)
+        executing.set()
 """
 
 
@@ -116,24 +118,62 @@ def test_a_signal_that_ends_a_process_ends_the_goals_of_all_its_runners(
 
 ONE_RUNNER = """
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(server=30.0, cancel=CANCEL))
-    with TreeRunner(leaf) as runner:
-        runner.observe(said)
+    runner = TreeRunner(leaf)
+    runner.observe(said)
+    WHERE
+    threading.Event().wait(60.0)
+"""
+IN_RUN = """
+    try:
         runner.run()
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+"""
+IN_SHUTDOWN = """
+    with runner:
+        runner.start()
+        executing.wait()
+"""
+AT_EXIT = """
+    runner.start()
+    executing.wait()
+    sys.exit()
 """
 
 
-@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize(
+    ("where", "numbers", "cancel"),
+    [
+        (IN_RUN, [signal.SIGTERM], "0.5"),
+        (IN_RUN, [signal.SIGTERM, signal.SIGTERM], "60.0"),
+        pytest.param(IN_RUN, [signal.SIGINT, signal.SIGTERM], "60.0", marks=pytest.mark.chaos),
+        (IN_SHUTDOWN, [signal.SIGTERM], "3.0"),
+        pytest.param(
+            IN_SHUTDOWN, [signal.SIGTERM, signal.SIGTERM], "60.0", marks=pytest.mark.chaos
+        ),
+        pytest.param(AT_EXIT, [signal.SIGTERM], "3.0", marks=pytest.mark.chaos),
+    ],
+    ids=["run", "run-again", "run-other", "shutdown", "shutdown-again", "exit"],
+)
 def test_a_goal_that_is_left_running_is_named_before_a_signal_ends_the_process(
-    host: Host, name: str, program: Callable[[str], Process], times: int, record: Record
+    host: Host,
+    name: str,
+    program: Callable[[str], Process],
+    where: str,
+    numbers: list[signal.Signals],
+    cancel: str,
+    record: Record,
 ) -> None:
-    """A server that refuses to cancel; SIGTERM, and one more where it would take too long"""
+    """A server that refuses to cancel; SIGTERM in run(), in shutdown() or at exit; one more"""
     journal = host.open(name, "*:reject_cancel")
-    process = program(ONE_RUNNER.replace("CANCEL", "0.5" if times == 1 else "60.0"))
+    process = program(ONE_RUNNER.replace("WHERE", where).replace("CANCEL", cancel))
     process.line("executing", within=60.0)
-    process.send(signal.SIGTERM)
-    if times == 2:
+    if where is not IN_RUN:  # which cancels by itself
         journal.wait_for("cancel_requested")
-        process.send(signal.SIGTERM)
+    process.send(numbers[0])
+    for number in numbers[1:]:
+        journal.wait_for("cancel_requested")
+        process.send(number)
     assert process.wait() == -signal.SIGTERM
     goal_id = str(journal.wait_for("accepted").goal)
     errors = "\n".join(process.errors)
@@ -141,6 +181,58 @@ def test_a_goal_that_is_left_running_is_named_before_a_signal_ends_the_process(
     assert goal_id in errors, process
     host.cancel_all(name)
     record.outcome = "named on standard error, then the process ends by the signal"
+
+
+A_TICK_THAT_TAKES_LONG = """
+    leaves = [MoveRobot(x, 9.0, action_name=name + x, timeout=T) for x in ("", "_b")]
+    inner = TreeRunner(leaves[1])
+    inner.observe(said)
+
+    class TakesLong(py_trees.behaviour.Behaviour):
+        def update(self):
+            if leaves[0].progress().state != "EXECUTING":
+                return py_trees.common.Status.RUNNING
+            HOW
+            return py_trees.common.Status.RUNNING
+
+    every = py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=True)
+    both = [leaves[0], TakesLong("takes long")]
+    runner = TreeRunner(py_trees.composites.Parallel("both", policy=every, children=both))
+    runner.run()
+"""
+RUNS_ANOTHER = "inner.run()"
+DOES_NOT_RETURN = "inner.start(); threading.Event().wait()"
+
+
+@pytest.mark.parametrize(
+    ("how", "number"),
+    [
+        (RUNS_ANOTHER, signal.SIGTERM),
+        pytest.param(RUNS_ANOTHER, signal.SIGINT, marks=pytest.mark.chaos),
+        (DOES_NOT_RETURN, signal.SIGTERM),
+    ],
+    ids=["nested", "nested-interrupted", "stuck"],
+)
+def test_a_signal_ends_all_goals_while_a_tick_takes_long(
+    host: Host,
+    name: str,
+    program: Callable[[str], Process],
+    how: str,
+    number: signal.Signals,
+    record: Record,
+) -> None:
+    """In a tick beside a running goal: another runner's run(), or what never returns"""
+    journals = [host.open(name), host.open(f"{name}_b")]
+    process = program(A_TICK_THAT_TAKES_LONG.replace("HOW", how))
+    process.line("executing", within=60.0)
+    process.send(number)
+    for journal in journals:
+        journal.wait_for("canceled", within=30.0)
+    if how is DOES_NOT_RETURN:
+        process.send(number)
+    assert process.wait() == -number if number is signal.SIGTERM else process.wait() != 0
+    assert [journal.ends() for journal in journals] == [["canceled"]] * 2, process
+    record.outcome = "both canceled, then the process ends; at a second signal where it is stuck"
 
 
 A_FORK = """
