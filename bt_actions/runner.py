@@ -40,7 +40,7 @@ PATIENCE_AT_EXIT = 30.0
 """Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
 
 
-_runs: dict[int, TreeRunner] = {}
+_runs: set[TreeRunner] = set()
 """All that go on in this process; a list of them can be made in a signal handler."""
 
 
@@ -106,7 +106,9 @@ class TreeRunner:
         self._outcome: Status | BaseException | None = None
         self._running = threading.Lock()
         self._runs_on: int | None = None
-        self._closed = False
+        self._closed = False  # no run begins any more
+        self._shutting_down = threading.Lock()
+        self._is_down = False
         self._pid = os.getpid()
         self._tickets: set[Ticket] = set()
         self._patience = Patience(_warn)  # on its behalf the ticks of ours begin goals
@@ -204,7 +206,7 @@ class TreeRunner:
 
         Called in a signal handler.
         """
-        for runner in [self, *(list(_runs.values()) if ends_process else [])]:
+        for runner in [self, *(list(_runs) if ends_process else [])]:
             runner.interrupt(abandon=again)
         return self._patience.is_over
 
@@ -235,7 +237,7 @@ class TreeRunner:
     def _release(self) -> None:
         self._stop_wanted = self._abandoned = False
         self._runs_on = None
-        _runs.pop(id(self), None)
+        _runs.discard(self)
         self._running.release()
 
     def wait(self, timeout: float | None = None) -> Status:
@@ -276,8 +278,8 @@ class TreeRunner:
         With `abandon`, stop waiting for goals that are being drained; `unaccounted` tells which.
         """
         self._abandoned = self._abandoned or abandon
-        self._stop_wanted = True
         self._patience.end_now()
+        self._stop_wanted = True  # after it: where this run ends in between, the next is stopped
         self._wake()
 
     def catch_up(self) -> None:
@@ -295,7 +297,7 @@ class TreeRunner:
         """
         from bt_actions.ros.spinning import on_executor_thread
 
-        if self._closed:
+        if self._is_down:
             return
         if self._spinner.spins and on_executor_thread():
             raise RuntimeError("shutdown() on the executor's own thread would wait for itself")
@@ -309,16 +311,28 @@ class TreeRunner:
             self._shut_down(PATIENCE_AT_EXIT)
 
     def _shut_down(self, patience: float) -> None:
-        """Shut down; where a run does not end within `patience` seconds, leave all as it is."""
+        """Shut down; where a run does not end within `patience` seconds, leave all as it is.
+
+        What an exception has cut short can be done again, and the exit hook does so.
+        """
         if os.getpid() != self._pid:
             return  # the child of a fork: all of this is the parent's
         self._closed = True
-        atexit.unregister(self._at_exit)
-        if self._running.locked():
-            self.interrupt()
-        if not self._running.acquire(timeout=patience):
-            return
-        self._running.release()
+        if not self._shutting_down.acquire(blocking=False):
+            return  # somebody else is at it
+        try:
+            if self._running.locked():
+                self.interrupt()
+            if not self._running.acquire(timeout=patience):
+                return
+            self._running.release()
+            self._take_down()
+            self._is_down = True
+            atexit.unregister(self._at_exit)
+        finally:
+            self._shutting_down.release()
+
+    def _take_down(self) -> None:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -332,8 +346,9 @@ class TreeRunner:
                 if isinstance(behaviour, ActionBehaviour):
                     with contextlib.suppress(Exception):
                         behaviour.shutdown()
-        self._traffic.unobserve(self._note)
-        self._spinner.stop(self._close_guests)
+        finally:
+            self._traffic.unobserve(self._note)
+            self._spinner.stop(self._close_guests)
 
     def __enter__(self) -> TreeRunner:
         return self
@@ -358,7 +373,7 @@ class TreeRunner:
         self._visitor.forget()
         self.tree.visitors.append(self._visitor)
         self._runs_on = threading.get_ident()
-        _runs[id(self)] = self
+        _runs.add(self)
         self._patience.begin(deadline)
         try:
             self._guarded("setup", self._set_up)  # clients are made before anything spins
@@ -375,7 +390,7 @@ class TreeRunner:
         leaving, self._leaving = self._leaving, None
         if leaving is not None:
             raise leaving
-        if status is Status.INVALID and not self._stop_wanted:
+        if status is Status.INVALID and timeout is not None and not self._stop_wanted:
             raise TimeoutError(f"{self.tree.root.name} did not finish within {timeout:g} s")
         return status
 
@@ -454,6 +469,7 @@ class TreeRunner:
             try:
                 root.stop(Status.INVALID)
             except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
+                self.node.get_logger().error(f"terminate of a behaviour raised: {error!r}")
                 self._leave_with(error)
                 for node in root.iterate():
                     if isinstance(node, ActionBehaviour):

@@ -14,7 +14,7 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -157,8 +157,8 @@ def start_program(domain: int, no_leaks: None) -> Iterator[Callable[..., Process
 
     processes: list[Process] = []
 
-    def start(*arguments: str) -> Process:
-        processes.append(Process(arguments))
+    def start(*arguments: str, prefix: Sequence[str] = ()) -> Process:
+        processes.append(Process(arguments, prefix=prefix))
         return processes[-1]
 
     yield start

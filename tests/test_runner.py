@@ -366,6 +366,27 @@ class TestStart:
             leaf.initialise()
         assert "on purpose in shutdown" in capfd.readouterr().err
 
+    def test_a_shutdown_that_was_interrupted_leaves_nothing_and_can_be_done_again(
+        self, name: str
+    ) -> None:
+        class Leaves(py_trees.behaviours.Success):
+            def shutdown(self) -> None:
+                raise KeyboardInterrupt
+
+        runner = TreeRunner(in_sequence(MoveRobot("m", 9.0, action_name=name), Leaves("leaves")))
+        runner.interrupt()
+        runner.run()
+        spin = runner._spinner._thread
+        assert spin is not None
+        with pytest.raises(KeyboardInterrupt):
+            runner.shutdown()
+        assert not spin.is_alive()
+        with pytest.raises(RuntimeError, match="has been shut down"):
+            runner.run()
+        runner.tree.root.children[-1].shutdown = lambda: None
+        runner.shutdown()
+        assert runner._is_down
+
     @pytest.mark.parametrize("last", [GoalChanged, TreeFinished])
     def test_shutdown_by_an_observer_is_refused(
         self, journal: Journal, name: str, node: Any, last: type[Event]

@@ -17,12 +17,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rclpy.exceptions import InvalidHandle
-
 from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
+from bt_actions.ros.alive import is_valid
 from bt_actions.ros.graph import servers
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
@@ -580,18 +579,3 @@ def _remapped(node: Any, name: str) -> bool:
     return any(node.resolve_topic_name(topic) != topic for topic in topics) or any(
         node.resolve_service_name(service) != service for service in services
     )
-
-
-def is_valid(node: Any) -> bool:
-    """Whether the node is there, and its context was not shut down.
-
-    Context.ok() would take the context's lock, which rclpy holds while it calls back on shutdown.
-    """
-    handle = node.context.handle
-    if handle is None:
-        return False
-    try:
-        with node.handle, handle:
-            return bool(handle.ok())
-    except InvalidHandle:  # one of them was destroyed
-        return False

@@ -14,13 +14,15 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-import rclpy
 from rclpy.signals import (
     SignalHandlerOptions,
     get_current_signal_handlers_options,
     install_signal_handlers,
     uninstall_signal_handlers,
 )
+from rclpy.utilities import get_default_context
+
+from bt_actions.ros.alive import is_open
 
 _ENDING = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -44,8 +46,8 @@ def ended_by_signals(
     """Call `interrupt(again, ends_process)` at a signal; its usual effect comes after the block.
 
     `again` is True from the second signal on: who sends it does not want to wait. `interrupt`
-    returns True where the block cannot end by itself; with the second signal KeyboardInterrupt is
-    raised in it then.
+    returns True where the block does not end by itself. From the second signal on KeyboardInterrupt
+    is raised in it then, and from the third on in any case.
 
     The usual effect of SIGINT is KeyboardInterrupt; with rclpy's handlers, which contexts are shut
     down. The others end the process on the spot, without its exit hooks; then `ends_process` is
@@ -90,7 +92,8 @@ class _Watch:
         self._interrupts: list[Interrupt] = []
         self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
         self._rclpys = _rclpys()
-        self._had_contexts = rclpy.ok()
+        self._had_context = is_open(get_default_context())
+        self._is_over = False
 
     def put_on(self) -> None:
         if self._rclpys:
@@ -106,7 +109,7 @@ class _Watch:
 
         But rclpy's come after Python's, which would be set over them.
         """
-        if self._had_contexts and not rclpy.ok():
+        if self._had_context and not is_open(get_default_context()):
             self._rclpys = frozenset()  # rclpy.shutdown() would have taken them off
         meanwhile = _rclpys()  # what an rclpy.init() has put on
         if meanwhile:
@@ -115,10 +118,18 @@ class _Watch:
         self._rclpys = (self._rclpys | meanwhile) - _rclpys()
         try:
             for number in reversed(self._before):
-                signal.signal(number, self._before[number])
-            install_signal_handlers(_OPTIONS[self._rclpys])
+                self._put_back(number)
+            self._put_back_rclpys()
         finally:
-            install_signal_handlers(_OPTIONS[self._rclpys])  # again: it may have been interrupted
+            self._put_back_rclpys()  # where the first time was interrupted
+
+    def _put_back(self, number: signal.Signals) -> None:
+        if signal.getsignal(number) == self._note:  # else the program has set its own since
+            signal.signal(number, self._before[number])
+
+    def _put_back_rclpys(self) -> None:
+        if self._rclpys:
+            install_signal_handlers(_OPTIONS[self._rclpys])
 
     @contextmanager
     def telling(self, interrupt: Interrupt) -> Iterator[None]:
@@ -133,31 +144,39 @@ class _Watch:
 
     def ends_process(self) -> bool:
         """Whether what was received ends the process on the spot."""
-        return any(
-            self._before.get(signal.Signals(number)) is signal.SIG_DFL
-            and number not in self._rclpys
-            for number in self._received
-        )
+        return any(self._is_fatal(number) for number in self._received)
+
+    def _is_fatal(self, number: int) -> bool:
+        of_rclpy = self._rclpys | _rclpys()
+        return self._before.get(signal.Signals(number)) is signal.SIG_DFL and number not in of_rclpy
 
     def let_take_effect(self) -> None:
         """Raise what was received; KeyboardInterrupt last, after which nothing could be."""
+        self._is_over = True
         for number in sorted(set(self._received), key=lambda number: number == signal.SIGINT):
+            fatal = self._is_fatal(number)
             signal.raise_signal(number)
+            if fatal:  # the first process of a container does not end by it
+                os._exit(128 + number)
 
     def disown(self) -> None:
         """In the child of a fork: it ends as if this had never been."""
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
+        for number in self._before:
+            self._put_back(number)
         self._before.clear()
         self._received.clear()
         self._interrupts = [_nothing for _ in self._interrupts]  # each is still taken off
         self._rclpys = frozenset()
 
     def _note(self, number: int, _frame: FrameType | None) -> None:
+        if self._is_over:  # a handler of the user's has raised while this was taken off
+            self._put_back(signal.Signals(number))
+            signal.raise_signal(number)
+            return
         self._received.append(number)
-        again, ends_process = len(self._received) > 1, self.ends_process()
-        stuck = [interrupt(again, ends_process) for interrupt in self._interrupts]
-        if again and stuck and stuck[-1]:  # the innermost is where this thread is
+        times, ends_process = len(self._received), self.ends_process()
+        stuck = [interrupt(times > 1, ends_process) for interrupt in self._interrupts]
+        if times > 2 or (times > 1 and any(stuck[-1:])):  # the innermost is where this thread is
             raise KeyboardInterrupt
 
 

@@ -65,6 +65,8 @@ class Spinner:
         self._alive = threading.Event()
         self._asked_at = 0.0
         self._own_node = node is None
+        if executor not in (None, "multi", "single") and not isinstance(executor, Executor):
+            raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {executor!r}")
         given = executor if isinstance(executor, Executor) else None
         if node is not None and node.executor is not None and node not in node.executor.get_nodes():
             node.executor = None  # left behind by an executor that was shut down
@@ -76,7 +78,12 @@ class Spinner:
             context = self._context = Context()
             context.init()
         unique = name or f"bt_actions_{os.getpid()}_{next(_number)}"
-        self.node = node or Node(unique, context=context, namespace=namespace)
+        try:
+            self.node = node or Node(unique, context=context, namespace=namespace)
+        except Exception:
+            if self._context is not None:
+                self._context.shutdown()
+            raise
         self._traffic = Traffic.of(self.node)
         self._own_executor = given is None
         self.executor: Executor = given or _make(executor, context)
@@ -186,11 +193,9 @@ def _nothing() -> None:
 
 
 def _make(kind: Executor | str | None, context: Context) -> Executor:
-    if kind in (None, "multi"):
-        return MultiThreadedExecutor(num_threads=THREADS, context=context)
     if kind == "single":
         return SingleThreadedExecutor(context=context)
-    raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {kind!r}")
+    return MultiThreadedExecutor(num_threads=THREADS, context=context)
 
 
 def node_beside(node: Node, name: str) -> Node:

@@ -30,8 +30,9 @@ from bt_actions.goal_terms import Event, State
 from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
 from bt_actions.ros import alarm, shared
+from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
-from bt_actions.ros.line import Line, is_valid
+from bt_actions.ros.line import Line
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import Beginner, Change, Observer, Ticket, changed, domain_of, lock
 from bt_actions.ros.signals import ended_by_signals
@@ -318,7 +319,8 @@ def _who_begins() -> Beginner | None:
 def close_process() -> None:
     """Close what a loop that crashed, or never called shutdown, has left; send nothing more.
 
-    For a process that ends. A first signal meanwhile waits, and a second one ends the wait.
+    For a process that ends: this cannot be undone. A first signal meanwhile waits, and a second one
+    ends the wait.
     """
     global _closing
     hurried = False
@@ -334,11 +336,13 @@ def close_process() -> None:
             lines = [line for line in alarm.minded() if isinstance(line, Line)]
             tickets = [ticket for line in lines for ticket in line.goals.values()]
         left = [ticket for ticket in tickets if not ticket.goal.lost]
-        drain(left, lambda: hurried)
-        for ticket in left:
-            if not ticket.accounted_for:
-                log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
-        log.flush()
+        try:
+            drain(left, lambda: hurried)
+        finally:
+            for ticket in left:
+                if not ticket.accounted_for:
+                    log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
+            log.flush()
 
 
 def _disown() -> None:

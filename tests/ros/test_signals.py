@@ -3,77 +3,24 @@
 from __future__ import annotations
 
 import signal
-import sys
+import subprocess
 import textwrap
-from collections.abc import Callable, Iterator
-from types import FrameType
-from typing import Any
+from collections.abc import Callable
 
 import pytest
-from rclpy.signals import (
-    SignalHandlerOptions,
-    get_current_signal_handlers_options,
-    install_signal_handlers,
-    uninstall_signal_handlers,
-)
 
-from bt_actions.ros import signals
-from bt_actions.ros.signals import ended_by_signals
 from tests.support.processes import Process
 
-
-@pytest.fixture
-def put_back() -> Iterator[None]:
-    options = get_current_signal_handlers_options()
-    uninstall_signal_handlers()
-    yield
-    uninstall_signal_handlers()
-    install_signal_handlers(options)
+Start = Callable[..., Process]
 
 
-def handlers() -> object:
-    ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    return [signal.getsignal(number) for number in ending], get_current_signal_handlers_options()
-
-
-def interrupted_at(opcode: int) -> tuple[bool, bool]:
-    """Have SIGINT come at an opcode of signals.py; are there so many, and was it raised?"""
-    passed = 0
-
-    def trace(frame: FrameType, event: str, _: object) -> Any:
-        nonlocal passed
-        if frame.f_code.co_filename != signals.__file__:
-            return None
-        frame.f_trace_opcodes = True
-        if event == "opcode":
-            passed += 1
-            if passed == opcode:
-                sys.settrace(None)
-                signal.raise_signal(signal.SIGINT)
-        return trace
-
-    before, raised = sys.gettrace(), False
-    sys.settrace(trace)
-    try:
-        with ended_by_signals(lambda *_: False):
-            pass
-    except KeyboardInterrupt:
-        raised = True
-    finally:
-        sys.settrace(before)
-    return passed >= opcode, raised
-
-
-@pytest.mark.usefixtures("put_back")
 @pytest.mark.parametrize("rclpys", ["NO", "SIGINT", "SIGTERM", "ALL"])
-def test_sigint_at_any_moment_is_raised_and_leaves_nothing_behind(rclpys: str) -> None:
-    install_signal_handlers(getattr(SignalHandlerOptions, rclpys))
-    before, opcode, there = handlers(), 0, True
-    while there:
-        opcode += 1
-        there, raised = interrupted_at(opcode)
-        assert (raised, handlers()) == (there, before), opcode
-    assert opcode > 200  # it has passed through the file
+def test_sigint_at_any_moment_is_raised_and_leaves_nothing_behind(
+    start_program: Start, rclpys: str
+) -> None:
+    process = start_program("-m", "tests.support.interrupted", rclpys)
+    assert process.wait(within=60.0) == 0, process
+    assert int(process.line("opcodes").split()[0]) > 200  # it has passed through the file
 
 
 CHILD_IN_A_RUN = """
@@ -99,7 +46,87 @@ CHILD_IN_A_RUN = """
 
 
 def test_a_child_that_is_forked_in_a_run_can_be_ended(
-    start_program: Callable[..., Process],
+    start_program: Start,
 ) -> None:
     process = start_program("-c", textwrap.dedent(CHILD_IN_A_RUN))
     assert process.line(within=30.0) == str(-signal.SIGTERM)
+
+
+HEAD = """
+import os, signal, sys, threading
+import py_trees, rclpy
+from bt_actions import TreeRunner
+from bt_actions.ros.signals import ended_by_signals
+
+def itself(number):
+    os.kill(os.getpid(), number)
+
+def say(*words):
+    print(*words, flush=True)
+"""
+RCLPY_COMES_WITHIN = """
+with ended_by_signals(lambda again, ends_process: say(ends_process), lambda: say("last words")):
+    rclpy.init()
+    itself(signal.SIGTERM)
+say("goes on")
+"""
+A_HANDLER_COMES_WITHIN = """
+with ended_by_signals(lambda *_: False):
+    signal.signal(signal.SIGTERM, lambda *_: say("the user's"))
+itself(signal.SIGTERM)
+say("goes on")
+"""
+ONE_OF_OURS_IS_LEFT = """
+with ended_by_signals(lambda *_: False):
+    ours = signal.getsignal(signal.SIGTERM)
+signal.signal(signal.SIGTERM, ours)
+itself(signal.SIGTERM)
+say("goes on")
+"""
+A_SHUTDOWN_THAT_BLOCKS = """
+class Blocks(py_trees.behaviours.Success):
+    def shutdown(self):
+        for _ in range(3):
+            itself(signal.SIGINT)
+        threading.Event().wait()
+
+try:
+    TreeRunner(Blocks("blocks")).shutdown()
+except KeyboardInterrupt:
+    say("goes on")
+"""
+A_SIGNAL_THAT_DOES_NOT_END_IT = """
+class Ends(py_trees.behaviours.Running):
+    def update(self):
+        itself(signal.SIGTERM)
+        return super().update()
+
+TreeRunner(Ends("ends")).run()
+say("goes on")
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (RCLPY_COMES_WITHIN, ["False", "goes on"]),
+        (A_HANDLER_COMES_WITHIN, ["the user's", "goes on"]),
+        (ONE_OF_OURS_IS_LEFT, []),
+        (A_SHUTDOWN_THAT_BLOCKS, ["goes on"]),
+    ],
+    ids=["rclpy within", "handler within", "left", "blocks"],
+)
+def test_a_program_of_the_users(start_program: Start, body: str, said: list[str]) -> None:
+    process = start_program("-c", HEAD + body)
+    assert process.wait(within=60.0) == (0 if said else -signal.SIGTERM), process
+    assert process.lines == said
+
+
+def test_the_first_process_of_a_container_ends_by_a_signal(start_program: Start) -> None:
+    """The kernel does not end it by a signal that it has no handler for."""
+    alone = ["unshare", "--map-root-user", "--pid", "--fork"]
+    if subprocess.run([*alone, "true"], check=False, capture_output=True).returncode:
+        pytest.skip("no process namespace can be made here")
+    process = start_program("-c", HEAD + A_SIGNAL_THAT_DOES_NOT_END_IT, prefix=alone)
+    assert process.wait(within=60.0) == 128 + signal.SIGTERM, process
+    assert process.lines == []
