@@ -137,6 +137,9 @@ class Testimony:
                 if len(answers) < all_asked and self._may_be_at_two(watch):
                     self._ended = done
                     return []
+            if len(ended) > 1 and self._accepted_by < 2:  # both have run it, which was not known
+                watch.two_answered()
+                return [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, done)]
             return [(Event.RESULT, done)]
         if status != 0:  # answered too soon, by a server that is none of rclpy's or rclcpp's
             return [(Event.STATUS, status)]

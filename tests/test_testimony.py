@@ -98,7 +98,15 @@ def test_what_one_has_ended_the_other_may_run(
 ) -> None:
     assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
     assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == [(Event.RESULT, ABORTED)]
-    assert said.finished(watch, 0.0, 0.0, [ABORTED, SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
+
+
+def test_what_both_have_ended_was_at_two_servers(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
+    told = said.finished(watch, 0.0, 0.0, [ABORTED, SUCCEEDED])
+    assert told == [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, SUCCEEDED)]
+    assert watch.both_live
 
 
 def test_a_denial_by_a_newcomer_is_no_word_of_the_other(
@@ -107,7 +115,8 @@ def test_a_denial_by_a_newcomer_is_no_word_of_the_other(
     watch.observe(0.0, True, BOTH | {b"newcomer"})
     assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == []
     answers = [ABORTED, UNKNOWN, SUCCEEDED]
-    assert said.finished(watch, 0.0, 0.0, answers) == [(Event.RESULT, SUCCEEDED)]
+    told = said.finished(watch, 0.0, 0.0, answers)
+    assert told == [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, SUCCEEDED)]
 
 
 def test_an_end_counts_when_the_other_is_a_ghost(
