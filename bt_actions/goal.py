@@ -656,6 +656,7 @@ class Goal:
     def _drained(self, now: Now, detail: Any) -> State:
         """Nobody waits any longer; a request that was never answered is UNKNOWN."""
         self.waited_for = True
+        self._settle_as_planned()
         if self.suspect:
             self.end = End.UNKNOWN  # canceled if it turns up all the same
         return State.CANCELING

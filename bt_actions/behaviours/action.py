@@ -75,7 +75,8 @@ class ActionBehaviour(Behaviour):
         save: blackboard keys, and the place in the result that each is set from on success
             (``{"final_pose": "result.final_pose"}``).
         busy: what to do when the resources are taken: wait, replace, fail or share.
-        resources: what the goal occupies; the action server's own name where not given.
+        resources: what the goal occupies, in place of the action server; named as servers are, so
+            a relative name is expanded with the node's namespace.
         on_feedback: called with each feedback message, on the ticking thread.
 
     Raises ValueError for a policy, an expression or a place that makes no sense.
@@ -256,13 +257,20 @@ class ActionBehaviour(Behaviour):
                 message = ticket.feedback.popleft()
                 if self.on_feedback is not None:
                     self.on_feedback(message)
-                if self._outcome is not None:
-                    return Status.FAILURE  # stopped, or shut down, by its own callback
+                if self._is_over():
+                    return Status.FAILURE
+            if self._is_over():
+                return Status.FAILURE
             if ticket.goal.outcome is None:
                 self.feedback_message = self._in_words(ticket)
                 return Status.RUNNING
             record = self._judge(ticket)
-            if not self._attempts.again(record, traffic.clocks.now()):
+            if self._is_over():
+                return Status.FAILURE
+            again = self._attempts.again(record, traffic.clocks.now())
+            if self._is_over():
+                return Status.FAILURE
+            if not again:
                 return self._finish(record)
 
     def terminate(self, new_status: Status) -> None:
@@ -343,6 +351,10 @@ class ActionBehaviour(Behaviour):
             keeps_feedback=self.on_feedback is not None,
         )
         return self._ticket
+
+    def _is_over(self) -> bool:
+        """Whether code of the user's has ended the visit: stopped this leaf, or shut it down."""
+        return self._outcome is not None
 
     def _filed(self, ticket: Ticket) -> bool:
         """Whether this attempt is over and in the history."""

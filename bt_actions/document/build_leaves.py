@@ -36,7 +36,8 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         context.scope.key(name): place.expression
         for name, place in table_of(settings.get("save")).items()
     }
-    resources: Any = settings.get("resources")
+    given = settings.get("resources")
+    resources = given if isinstance(given, list) else []
     return ActionBehaviour(
         node.name,
         _interface(settings["type"], "action", context),
@@ -47,7 +48,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         expect=context.condition(settings.get("expect"), "result"),
         save=save,
         busy=text_of(settings, "busy") or "wait",
-        resources=resources,
+        resources=[context.joined(settings, str(each)) for each in resources],
     )
 
 

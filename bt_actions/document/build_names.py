@@ -53,7 +53,8 @@ def resources_below(root: TreeNode, document: Document, namespace: str = "") -> 
             if settings.get("busy") == "share":
                 continue
             given = settings.get("resources")
-            server = join_names(inner, text_of(settings, "namespace"), text_of(settings, "server"))
-            for name in given if isinstance(given, list) and given else [server]:
-                found.setdefault(str(name), node)
+            names = given if isinstance(given, list) and given else [text_of(settings, "server")]
+            for name in names:
+                full = join_names(inner, text_of(settings, "namespace"), str(name))
+                found.setdefault(full, node)
     return found

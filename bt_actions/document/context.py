@@ -51,7 +51,11 @@ class Context:
 
     def name(self, values: Mapping[str, object], key: str) -> str:
         """A ROS name in the namespaces that hold here."""
-        return join_names(self.namespace, text_of(values, "namespace"), text_of(values, key))
+        return self.joined(values, text_of(values, key))
+
+    def joined(self, values: Mapping[str, object], name: str) -> str:
+        """A name in the namespaces that hold here."""
+        return join_names(self.namespace, text_of(values, "namespace"), name)
 
     def value(self, written: object) -> Callable[[], object]:
         """A function that computes a value as it stands in the document."""

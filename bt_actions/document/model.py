@@ -115,9 +115,10 @@ _DOING = (
     *_POLICIES,
     Key("expect", Condition(_RESULT), "What the result must be, beyond the server's word."),
     Key("save", Table(Place(_RESULT)), "Names to keep parts of the result under."),
-    Key("resources", ListOf(Text("a text")), "What the goal occupies.",
+    Key("resources", ListOf(Text("a text")),
+        "What the goal occupies, in place of its server; named as servers are.",
         default="the server's name"),
-    Key("namespace", NAMESPACE, "Put before a relative server name."),
+    Key("namespace", NAMESPACE, "Put before a relative name of a server or resource."),
 )  # fmt: skip
 ACTION_KEYS = _keys(*_DOING)
 """What may stand beside an action's alias."""

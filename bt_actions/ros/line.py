@@ -27,7 +27,7 @@ from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for
 from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
-from bt_actions.server import PROBES_KEPT, Server, ServerWatch
+from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
 
@@ -45,6 +45,9 @@ STALE = 2.0
 SILENT_FOR = 40.0
 """Seconds without any answer until goals whose node is gone are left to whoever can see whether
 their server is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
+BESIDE = 1.0
+"""Seconds for which a server may be in sight before another one that was there all the time, or
+that came back with it; 0.5 measured."""
 TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
 FEEDBACK = "/_action/feedback"
@@ -69,6 +72,8 @@ class Line:
         self._sight: Sight | None = None  # where the client lives if our node was blind to it
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
+        self.in_sight_since = time.monotonic()
+        """Since when a server of this name has been shown without a break."""
         self._last_probes: deque[int] = deque()
         self._past: dict[bytes, tuple[Any, bool, float, Ticket]] = {}
         """Of goals that are DONE: owner (a weakref), was it accepted, since when, and its twin."""
@@ -402,6 +407,15 @@ class Line:
         same = self.shares_server_with(ticket.line)
         return any(other.goal.bars(ticket.goal, same_server=same) for other in self._near(ticket))
 
+    def may_come_back_for(self, ticket: Ticket, now: float) -> bool:
+        """Whether a goal was lost here whose server may only be shown later than that of `ticket`.
+
+        It shares a resource with `ticket`, and is canceled first where its server is seen in time.
+        """
+        if ticket.goal.busy not in (Busy.WAIT, Busy.FAIL) or self.shares_server_with(ticket.line):
+            return False
+        return self.has_lost(ticket) and now - ticket.line.in_sight_since < BESIDE
+
     def _near(self, ticket: Ticket) -> list[Ticket]:
         same, wanted = self.shares_server_with(ticket.line), ticket.goal.resources
         return [t for t in self.goals.values() if same or t.goal.resources & wanted]
@@ -450,6 +464,8 @@ class Line:
     def _adopt(self) -> None:
         """Take over what was lost, or left, at this action before, to cancel it first."""
         for ticket in self.traffic.domain.take_lost(self.name, self.action_type):
+            if ticket.traffic is not self.traffic:  # a participant that has never seen its server
+                ticket.not_gone_before = time.monotonic() + LEASE
             ticket.line, ticket.traffic = self, self.traffic
             ticket.testimony.taken_over()
             self.goals[ticket.goal.id] = ticket
@@ -490,15 +506,17 @@ class Line:
         self._take_over()
         if self.watch.wants_probe(now):
             self._probe()
-        is_new = self._sight is None and now - self.traffic.seen_since < TOO_NEW
         for ticket in list(self.goals.values()):
-            if is_new and ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to):
-                continue  # left by another; its server may not have been discovered yet
+            unseen = ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to)
+            if unseen and now < ticket.not_gone_before:
+                continue
             if ticket.goal.sent:
                 if not ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to):
                     self.pump()  # its last words
                 self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
         state = self.watch.state(now)
+        if before is Server.ABSENT:
+            self.in_sight_since = now
         if state is not before:
             self.traffic.notify(None)
             self.traffic.domain.lost_sight |= state is Server.ABSENT

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bt_actions.ros.line import Line
     from bt_actions.ros.traffic import Traffic
 
+NEVER = float("-inf")
 FEEDBACK_KEPT = 100
 """Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
 
@@ -114,6 +115,9 @@ class Ticket:
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     testimony: Testimony = field(init=False)
     paused_at: float | None = None
+    not_gone_before: float = NEVER
+    """Until when (steady clock) it is no news that its server is not shown: it may live, and be
+    stopped for less than its lease, or not be discovered yet."""
 
     def __post_init__(self) -> None:
         self.testimony = Testimony(self.goal)

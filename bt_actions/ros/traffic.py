@@ -130,10 +130,14 @@ class Traffic:
         attempt: int = 1,
         keeps_feedback: bool = False,
     ) -> Ticket:
-        """Begin a goal: it queues for its resources. It is sent by `advance`."""
+        """Begin a goal: it queues for its resources. It is sent by `advance`.
+
+        A resource is named as an action is: what is relative is in the node's namespace.
+        """
         with lock:
             now = self.clocks.now()
-            goal = Goal(new_goal_id(), line.name, timeouts, now, resources=resources, busy=busy)
+            held = frozenset(self._full_name(each) for each in resources)
+            goal = Goal(new_goal_id(), line.name, timeouts, now, resources=held, busy=busy)
             who = _who_begins()
             ticket = Ticket(goal, line, self, owner, owner.name, who, attempt, keeps_feedback)
             line.goals[goal.id] = ticket
@@ -146,6 +150,14 @@ class Traffic:
             else:
                 self.note(ticket)
             return ticket
+
+    def _full_name(self, name: str) -> str:
+        """Expand the name of a resource, which may be what ROS would refuse as a name."""
+        if name.startswith("/"):
+            return name
+        if name.startswith("~"):
+            return f"{self.node.get_fully_qualified_name()}{name[1:]}"
+        return f"{self.node.get_namespace().rstrip('/')}/{name}"
 
     def advance(self, ticket: Ticket, make_message: Callable[[], Any]) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
@@ -203,7 +215,10 @@ class Traffic:
         for line in {*lines, *ours}:  # all of them first: one may see what another has lost
             if line.has_lost(ticket) or line in ours:
                 line.look(now)
-        return any(line.in_the_way_of(ticket) for line in ticket.line.neighbors())
+        return any(
+            line.in_the_way_of(ticket) or line.may_come_back_for(ticket, now)
+            for line in ticket.line.neighbors()
+        )
 
     def interrupt(self, ticket: Ticket) -> None:
         """The tree no longer wants it. Returns at once; the goal is drained."""

@@ -137,6 +137,9 @@ class Node:
     def get_clock(self) -> Any:
         return SimpleNamespace(ros_time_is_active=False)
 
+    def get_namespace(self) -> str:
+        return "/"
+
 
 class LineView:
     """A production line, as the judge sees one (parts.Line)."""
