@@ -1,14 +1,17 @@
 """While a runner works on the main thread: signals that would end the process end its trees first.
 
+Python's handlers run on the main thread, and not while it is in C; a thread hears signals then.
 Only handlers that are Python's own defaults are replaced, and they are put back; so are rclpy's,
 which are set beneath Python's, and of which Python knows nothing.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -36,6 +39,9 @@ _OPTIONS = {
 }
 """What rclpy calls its handlers for these signals."""
 
+DEAF_FOR = 1.0
+"""Seconds until the main thread, in which a signal was not seen, does not seem to return from C."""
+
 Interrupt = Callable[[bool, bool], bool]
 
 
@@ -47,7 +53,8 @@ def ended_by_signals(
 
     `again` is True from the second signal on: who sends it does not want to wait. `interrupt`
     returns True where the block does not end by itself. From the second signal on KeyboardInterrupt
-    is raised in it then, and from the third on in any case.
+    is raised in it then, and from the third on in any case; where it is in C, the process ends.
+    `interrupt` and `last_words` may be called on another thread, too.
 
     The usual effect of SIGINT is KeyboardInterrupt; with rclpy's handlers, which contexts are shut
     down. The others end the process on the spot, without its exit hooks; then `ends_process` is
@@ -63,7 +70,7 @@ def ended_by_signals(
         with _watch.telling(interrupt):
             yield
         return
-    watch = _Watch()
+    watch = _Watch(last_words)
     spoken = False
     try:
         _watch = watch
@@ -87,8 +94,12 @@ def ended_by_signals(
 class _Watch:
     """Handlers that take note of signals, in place of the defaults and of rclpy's."""
 
-    def __init__(self) -> None:
+    def __init__(self, last_words: Callable[[], object]) -> None:
+        self._last_words = last_words
         self._received: list[int] = []
+        self._ear: _Ear | None = None
+        self._heard: list[int] = []
+        self._heard_since = 0.0
         self._interrupts: list[Interrupt] = []
         self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
         self._rclpys = _rclpys()
@@ -103,12 +114,16 @@ class _Watch:
             if handler in _DEFAULTS:
                 self._before[number] = handler
                 signal.signal(number, self._note)
+        with contextlib.suppress(RuntimeError, OSError):  # no more threads, no more descriptors
+            self._ear = _Ear(self._hear)
 
     def take_off(self) -> None:
         """Put all back: SIGINT's handler at the end, because KeyboardInterrupt is back with it.
 
         But rclpy's come after Python's, which would be set over them.
         """
+        if self._ear is not None:
+            self._ear.close()
         if self._had_context and not is_open(get_default_context()):
             self._rclpys = frozenset()  # rclpy.shutdown() would have taken them off
         meanwhile = _rclpys()  # what an rclpy.init() has put on
@@ -144,7 +159,10 @@ class _Watch:
 
     def ends_process(self) -> bool:
         """Whether what was received ends the process on the spot."""
-        return any(self._is_fatal(number) for number in self._received)
+        return self._end_process(self._received)
+
+    def _end_process(self, numbers: list[int]) -> bool:
+        return any(self._is_fatal(number) for number in numbers)
 
     def _is_fatal(self, number: int) -> bool:
         of_rclpy = self._rclpys | _rclpys()
@@ -161,6 +179,9 @@ class _Watch:
 
     def disown(self) -> None:
         """In the child of a fork: it ends as if this had never been."""
+        if self._ear is not None:
+            self._ear.disown()
+            self._ear = None
         for number in self._before:
             self._put_back(number)
         self._before.clear()
@@ -178,6 +199,61 @@ class _Watch:
         stuck = [interrupt(times > 1, ends_process) for interrupt in self._interrupts]
         if times > 2 or (times > 1 and any(stuck[-1:])):  # the innermost is where this thread is
             raise KeyboardInterrupt
+
+    def _hear(self, number: int) -> None:
+        """Take note of a signal on the ear's thread: the main thread may be in C."""
+        if number not in self._before or self._is_over:
+            return
+        now = time.monotonic()
+        self._heard_since = self._heard_since or now
+        self._heard.append(number)
+        ends_process = self._end_process(self._heard)
+        for interrupt in list(self._interrupts):
+            interrupt(len(self._heard) > 1, ends_process)
+        deaf = not self._received and now - self._heard_since > DEAF_FOR
+        if deaf and len(self._heard) > 2:
+            self._last_words()
+            os._exit(128 + number)
+
+
+class _Ear:
+    """A thread that hears signals whatever the main thread does."""
+
+    def __init__(self, heard: Callable[[int], None]) -> None:
+        """Begin to listen, unless somebody else does; raises RuntimeError or OSError."""
+        self._heard = heard
+        self._read, self._write = os.pipe()
+        try:
+            os.set_blocking(self._write, False)
+            threading.Thread(target=self._listen, name="bt_actions-signals", daemon=True).start()
+        except RuntimeError:
+            os.close(self._read)
+            os.close(self._write)
+            raise
+        before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+        if before != -1:  # asyncio's, or another
+            signal.set_wakeup_fd(before)
+
+    def close(self) -> None:
+        """Listen no longer; the thread ends by itself."""
+        self._leave()
+        os.close(self._write)
+
+    def disown(self) -> None:
+        """In the child of a fork: nobody listens here, and the pipe leads to the parent."""
+        self.close()
+        os.close(self._read)
+
+    def _leave(self) -> None:
+        now = signal.set_wakeup_fd(-1)
+        if now != self._write:
+            signal.set_wakeup_fd(now)
+
+    def _listen(self) -> None:
+        while numbers := os.read(self._read, 4096):
+            for number in numbers:
+                self._heard(number)
+        os.close(self._read)
 
 
 _watch: _Watch | None = None

@@ -13,6 +13,7 @@ import pytest
 
 from tests.support.processes import Host, Process
 from tests.support.reliability import Record
+from tests.support.waiting import until
 
 Start = Callable[..., Process]
 
@@ -202,6 +203,10 @@ A_TICK_THAT_TAKES_LONG = """
 """
 RUNS_ANOTHER = "inner.run()"
 DOES_NOT_RETURN = "inner.start(); threading.Event().wait()"
+IS_IN_C = """inner.start()
+            import ctypes
+            mutex, c = ctypes.create_string_buffer(64), ctypes.CDLL(None)
+            c.pthread_mutex_lock(mutex), c.pthread_mutex_lock(mutex)"""
 
 
 @pytest.mark.parametrize(
@@ -210,8 +215,9 @@ DOES_NOT_RETURN = "inner.start(); threading.Event().wait()"
         (RUNS_ANOTHER, signal.SIGTERM),
         pytest.param(RUNS_ANOTHER, signal.SIGINT, marks=pytest.mark.chaos),
         (DOES_NOT_RETURN, signal.SIGTERM),
+        (IS_IN_C, signal.SIGTERM),
     ],
-    ids=["nested", "nested-interrupted", "stuck"],
+    ids=["nested", "nested-interrupted", "stuck", "in-c"],
 )
 def test_a_signal_ends_all_goals_while_a_tick_takes_long(
     host: Host,
@@ -221,7 +227,7 @@ def test_a_signal_ends_all_goals_while_a_tick_takes_long(
     number: signal.Signals,
     record: Record,
 ) -> None:
-    """In a tick beside a running goal: another runner's run(), or what never returns"""
+    """In a tick beside a running goal: another runner's run(), or what never returns, also in C"""
     journals = [host.open(name), host.open(f"{name}_b")]
     process = program(A_TICK_THAT_TAKES_LONG.replace("HOW", how))
     process.line("executing", within=60.0)
@@ -230,9 +236,14 @@ def test_a_signal_ends_all_goals_while_a_tick_takes_long(
         journal.wait_for("canceled", within=30.0)
     if how is DOES_NOT_RETURN:
         process.send(number)
-    assert process.wait() == -number if number is signal.SIGTERM else process.wait() != 0
+    if how is IS_IN_C:
+        ended = process.popen.poll
+        until(lambda: ended() is not None, 20.0, meanwhile=lambda: process.send(number))
+        assert process.wait() == 128 + number, process
+    else:
+        assert process.wait() == -number, process
     assert [journal.ends() for journal in journals] == [["canceled"]] * 2, process
-    record.outcome = "both canceled, then the process ends; at a second signal where it is stuck"
+    record.outcome = "both canceled, then the process ends; where it is stuck, at a later signal"
 
 
 A_FORK = """
