@@ -49,7 +49,9 @@ BESIDE = 1.0
 """Seconds for which a server may be in sight before another one that was there all the time, or
 that came back with it; 0.5 measured."""
 TOO_NEW = 3.0
-"""Seconds for which a participant has dropped nobody: no lease that is useful is shorter."""
+"""Seconds for which a participant has dropped nobody: no lease that is useful is shorter.
+
+After them it has discovered who was there."""
 FEEDBACK = "/_action/feedback"
 
 _probes = itertools.count(1)
@@ -464,7 +466,8 @@ class Line:
     def _adopt(self) -> None:
         """Take over what was lost, or left, at this action before, to cancel it first."""
         for ticket in self.traffic.domain.take_lost(self.name, self.action_type):
-            if ticket.traffic is not self.traffic:  # a participant that has never seen its server
+            saw_it = self.traffic.made_at + TOO_NEW < ticket.begun_at
+            if ticket.traffic is not self.traffic and not saw_it:
                 ticket.not_gone_before = time.monotonic() + LEASE
             ticket.line, ticket.traffic = self, self.traffic
             ticket.testimony.taken_over()

@@ -115,9 +115,10 @@ class Ticket:
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     testimony: Testimony = field(init=False)
     paused_at: float | None = None
+    begun_at: float = NEVER
     not_gone_before: float = NEVER
-    """Until when (steady clock) it is no news that its server is not shown: it may live, and be
-    stopped for less than its lease, or not be discovered yet."""
+    """Until when it is no news that its server is not shown: it may be stopped for less than its
+    lease, or not be discovered yet. Both in seconds of the steady clock."""
 
     def __post_init__(self) -> None:
         self.testimony = Testimony(self.goal)

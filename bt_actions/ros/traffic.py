@@ -58,6 +58,7 @@ class Traffic:
         self.domain = domain_of(node.context.get_domain_id())
         self.seen_since = _contexts.setdefault(node.context, time.monotonic())
         """Since when the node's context is known here; a new one is blind to nothing."""
+        self.made_at = time.monotonic()
         self._lines: dict[str, Line] = {}
         self._observers: list[Observer] = []
         self._unaccounted: set[Ticket] = set()  # told of in the log; some may still end
@@ -140,6 +141,7 @@ class Traffic:
             goal = Goal(new_goal_id(), line.name, timeouts, now, resources=held, busy=busy)
             who = _who_begins()
             ticket = Ticket(goal, line, self, owner, owner.name, who, attempt, keeps_feedback)
+            ticket.begun_at = time.monotonic()
             line.goals[goal.id] = ticket
             alarm.mind(line)
             answer = self.domain.resources.request(ticket, goal.resources, busy)

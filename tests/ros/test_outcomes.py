@@ -408,6 +408,21 @@ class TestBusy:
         began = next(e.t for e in journals[1].entries() if e.event == "received")
         assert began >= ended
 
+    @pytest.mark.parametrize("written", ["relative", "absolute"])
+    def test_a_resource_is_named_as_a_server_is(
+        self, serve: Any, name: str, run: Run, written: str
+    ) -> None:
+        """A leaf that occupies another's server waits for it, however both are written."""
+        journals = [serve(name=f"{name}{letter}") for letter in "ab"]
+        arm = f"{name}a" if written == "absolute" else f"{name}a".lstrip("/")
+        first = MoveRobot("first", 0.3, action_name=f"{name}a".lstrip("/"))
+        second = MoveRobot("second", 0.3, action_name=f"{name}b", resources=[arm])
+        run(together(first, second))
+        assert [leaf.outcome for leaf in (first, second)] == [Outcome.SUCCEEDED] * 2
+        ended = next(e.t for e in journals[0].entries() if e.event == "succeeded")
+        began = next(e.t for e in journals[1].entries() if e.event == "received")
+        assert began >= ended
+
 
 class TestFeedback:
     @pytest.mark.parametrize("how", ["stop", "shutdown"])
@@ -424,6 +439,29 @@ class TestFeedback:
             assert runner.run(timeout=9.0) is Status.FAILURE
         assert stood(leaf) == (Outcome.CANCELED, End.CANCELED)
         assert journal.count("received") == 1
+
+    @pytest.mark.parametrize("where", ["goal", "expect", "when"])
+    def test_a_leaf_that_its_own_code_stops_is_over_and_sends_no_more(
+        self, serve: Any, name: str, node: Any, where: str
+    ) -> None:
+        journal = serve(*(["1:abort"] if where == "when" else []))
+
+        def stops(answer: Any) -> Callable[..., Any]:
+            return lambda *_: (leaf.stop(Status.INVALID), answer)[1]
+
+        settings: dict[str, Any] = {
+            "goal": {"goal": stops({"distance": 0.3})},
+            "expect": {"expect": stops(True)},
+            "when": {"retry": Retry(3, when=stops(True))},
+        }[where]
+        settings.setdefault("goal", {"distance": 0.3})
+        goal = settings.pop("goal")
+        leaf = ActionBehaviour("m", "robot_control_interfaces/MoveRobot", name, goal, **settings)
+        with TreeRunner(leaf, node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.FAILURE
+        expected = Outcome.ABORTED if where == "when" else Outcome.CANCELED
+        assert (leaf.outcome, len(leaf.history)) == (expected, 1)
+        assert journal.count("received") == (0 if where == "goal" else 1)
 
 
 class TestDeadlines:

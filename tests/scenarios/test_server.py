@@ -349,6 +349,69 @@ class TestStopped:
         assert canceled.t <= received.t
         record.outcome = "UNKNOWN; canceled before the goal on the other server is sent"
 
+    def test_left_behind_on_a_server_that_is_stopped_for_less_than_its_lease(
+        self, new_host: HostFactory, host: Host, name: str, record: Record
+    ) -> None:
+        """A refused cancel; SIGSTOP; a new run, another server of its arm; SIGCONT after 5 s"""
+        stopped = new_host(short_lease=False)
+        journals = [stopped.open(f"{name}_0", "1:reject_cancel"), host.open(f"{name}_1")]
+        first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
+        second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
+        first.timeouts, second.timeouts = Timeouts(cancel=0.5), Timeouts(server=60.0)
+        with TreeRunner(first) as runner:
+            runner.start()
+            until(lambda: state(first) == "EXECUTING", 20.0)
+        assert first.end is End.UNKNOWN
+        stopped.send(signal.SIGSTOP)
+        with TreeRunner(second) as runner:
+            runner.start()
+            until_shown(runner.node, f"{name}_1", 1)
+            assert holds_for(lambda: state(second) == "WAITING_FOR_SERVER", 5.0)
+            assert first.end is End.UNKNOWN
+            stopped.send(signal.SIGCONT)
+            stopped.cancel_all(f"{name}_0")
+            assert runner.wait(30.0) is Status.SUCCESS
+        ended, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
+        assert ended.t <= received.t
+        record.outcome = "UNKNOWN; the other server is sent to when the goal has ended"
+
+    @pytest.mark.chaos
+    def test_lost_where_the_next_node_discovers_its_server_after_the_other_one(
+        self,
+        new_host: HostFactory,
+        host: Host,
+        name: str,
+        record: Record,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """SIGSTOP beyond the lease, SIGCONT; a new run is shown the other server 0.5 s before it"""
+        stopped = new_host()
+        journals = [stopped.open(f"{name}_0"), host.open(f"{name}_1")]
+        first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
+        second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
+        second.timeouts = Timeouts(server=20.0)
+        with TreeRunner(first) as runner:
+            lose(stopped, first, runner)
+        stopped.send(signal.SIGCONT)
+        really, seen = Line._shown, dict[str, float]()
+
+        def late(line: Line) -> frozenset[bytes]:
+            shown = really(line)
+            if line.name == f"{name}_1":
+                if shown:
+                    seen.setdefault("other", time.monotonic())
+            elif time.monotonic() - seen.get("other", time.monotonic()) < 0.5:
+                return frozenset()
+            return shown
+
+        with TreeRunner(second) as other:
+            until_shown(other.node, f"{name}_0", 1)
+            monkeypatch.setattr(Line, "_shown", late)
+            assert other.run(30.0) is Status.SUCCESS
+        ended, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
+        assert ended.t <= received.t
+        record.outcome = "SERVER_LOST; canceled before the goal on the other server is sent"
+
     def test_a_node_that_is_destroyed_gives_up_the_resource_of_a_server_that_dies(
         self,
         new_host: HostFactory,
