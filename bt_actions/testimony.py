@@ -137,7 +137,7 @@ class Testimony:
                 if len(answers) < all_asked and self._may_be_at_two(watch):
                     self._ended = done
                     return []
-            if len(ended) > 1 and self._accepted_by < 2:  # both have run it, which was not known
+            if len(ended) > 1 and self._accepted_by < 2 and not self._told_of_two:  # both ran it
                 watch.two_answered()
                 return [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, done)]
             return [(Event.RESULT, done)]

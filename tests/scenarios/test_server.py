@@ -20,6 +20,7 @@ from bt_actions.attempts import AttemptRecord
 from bt_actions.goal import State
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import lock
+from bt_actions.ros.traffic import Traffic
 from bt_actions.server import Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import Host, HostFactory, Journal
@@ -352,9 +353,9 @@ class TestStopped:
     def test_left_behind_on_a_server_that_is_stopped_for_less_than_its_lease(
         self, new_host: HostFactory, host: Host, name: str, record: Record
     ) -> None:
-        """A refused cancel; SIGSTOP; a new run, another server of its arm; SIGCONT after 5 s"""
+        """A cancel takes 3 s; SIGSTOP; a new run, another server of its arm; SIGCONT after 5 s"""
         stopped = new_host(short_lease=False)
-        journals = [stopped.open(f"{name}_0", "1:reject_cancel"), host.open(f"{name}_1")]
+        journals = [stopped.open(f"{name}_0", "1:delay_cancel=3"), host.open(f"{name}_1")]
         first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
         second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
         first.timeouts, second.timeouts = Timeouts(cancel=0.5), Timeouts(server=60.0)
@@ -369,7 +370,6 @@ class TestStopped:
             assert holds_for(lambda: state(second) == "WAITING_FOR_SERVER", 5.0)
             assert first.end is End.UNKNOWN
             stopped.send(signal.SIGCONT)
-            stopped.cancel_all(f"{name}_0")
             assert runner.wait(30.0) is Status.SUCCESS
         ended, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
         assert ended.t <= received.t
@@ -428,6 +428,9 @@ class TestStopped:
         monkeypatch.setattr("bt_actions.ros.line.SILENT_FOR", 3.0)
         victim, host = new_host(), new_host()
         victim.open(f"{name}_0", "1:reject_cancel")
+        Traffic.of(node)
+        until_shown(node, f"{name}_0", 1)
+        monkeypatch.setattr("bt_actions.ros.line.TOO_NEW", 0.0)  # it has seen the victim
         journal = host.open(f"{name}_1")
         first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
         first.timeouts = Timeouts(server=20.0, cancel=0.5)
