@@ -891,6 +891,14 @@ def test_replaced_after_a_deadline_it_is_not_tried_again() -> None:
     life.ended(Outcome.CANCELED, End.CANCELED)
 
 
+def test_a_cancel_without_a_deadline_has_an_outcome_when_nobody_waits_any_more() -> None:
+    life = executing(Timeouts(cancel=None))
+    life.on(Event.INTERRUPTED)
+    assert life.goal.outcome is None
+    life.on(Event.DRAINED)
+    assert (life.goal.outcome, life.goal.end) == (Outcome.CANCELED, End.UNKNOWN)
+
+
 def test_a_suspect_that_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_up() -> (
     None
 ):
