@@ -293,6 +293,7 @@ class TreeRunner:
     def shutdown(self) -> None:
         """End the run if there is one, and shut down the tree and all that was made here.
 
+        Returns at once where another thread is at it. What an exception cuts short waits no longer.
         Raises RuntimeError on a thread of an executor that is spun here, and within the run.
         """
         from bt_actions.ros.spinning import on_executor_thread
@@ -311,13 +312,11 @@ class TreeRunner:
             self._shut_down(PATIENCE_AT_EXIT)
 
     def _shut_down(self, patience: float) -> None:
-        """Shut down; where a run does not end within `patience` seconds, leave all as it is.
-
-        What an exception has cut short can be done again, and the exit hook does so.
-        """
+        """Shut down; where a run does not end within `patience` seconds, leave all as it is."""
         if os.getpid() != self._pid:
             return  # the child of a fork: all of this is the parent's
         self._closed = True
+        atexit.unregister(self._at_exit)
         if not self._shutting_down.acquire(blocking=False):
             return  # somebody else is at it
         try:
@@ -326,9 +325,8 @@ class TreeRunner:
             if not self._running.acquire(timeout=patience):
                 return
             self._running.release()
-            self._take_down()
             self._is_down = True
-            atexit.unregister(self._at_exit)
+            self._take_down()
         finally:
             self._shutting_down.release()
 

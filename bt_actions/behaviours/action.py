@@ -354,7 +354,7 @@ class ActionBehaviour(Behaviour):
 
     def _is_over(self) -> bool:
         """Whether code of the user's has ended the visit: stopped this leaf, or shut it down."""
-        return self._outcome is not None
+        return self._outcome is not None or self._traffic is None
 
     def _filed(self, ticket: Ticket) -> bool:
         """Whether this attempt is over and in the history."""

@@ -26,7 +26,7 @@ from bt_actions.ros.graph import servers
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for
-from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
+from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
@@ -75,7 +75,8 @@ class Line:
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
         self.in_sight_since = time.monotonic()
-        """Since when a server of this name has been shown without a break."""
+        """Since when a server of this name has been shown without a break that was seen."""
+        self._just_came = True
         self._last_probes: deque[int] = deque()
         self._past: dict[bytes, tuple[Any, bool, float, Ticket]] = {}
         """Of goals that are DONE: owner (a weakref), was it accepted, since when, and its twin."""
@@ -468,7 +469,8 @@ class Line:
         for ticket in self.traffic.domain.take_lost(self.name, self.action_type):
             saw_it = self.traffic.made_at + TOO_NEW < ticket.begun_at
             if ticket.traffic is not self.traffic and not saw_it:
-                ticket.not_gone_before = time.monotonic() + LEASE
+                first = ticket.not_gone_before == NEVER  # a later node need only have discovered
+                ticket.not_gone_before = time.monotonic() + (LEASE if first else TOO_NEW)
             ticket.line, ticket.traffic = self, self.traffic
             ticket.testimony.taken_over()
             self.goals[ticket.goal.id] = ticket
@@ -520,6 +522,10 @@ class Line:
         state = self.watch.state(now)
         if before is Server.ABSENT:
             self.in_sight_since = now
+        came = now - self.in_sight_since < BESIDE
+        if self._just_came and not came:
+            self.traffic.notify(None)  # what was held up for it may be sent
+        self._just_came = came
         if state is not before:
             self.traffic.notify(None)
             self.traffic.domain.lost_sight |= state is Server.ABSENT

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import threading
 import time
@@ -39,8 +40,8 @@ _OPTIONS = {
 }
 """What rclpy calls its handlers for these signals."""
 
-DEAF_FOR = 1.0
-"""Seconds until the main thread, in which a signal was not seen, does not seem to return from C."""
+TURN = 0.5
+"""Seconds for the main thread to see a signal; after them it seems to be in C."""
 
 Interrupt = Callable[[bool, bool], bool]
 
@@ -53,8 +54,8 @@ def ended_by_signals(
 
     `again` is True from the second signal on: who sends it does not want to wait. `interrupt`
     returns True where the block does not end by itself. From the second signal on KeyboardInterrupt
-    is raised in it then, and from the third on in any case; where it is in C, the process ends.
-    `interrupt` and `last_words` may be called on another thread, too.
+    is raised in it then, and from the third on in any case. Where the main thread is in C both are
+    called on another thread, and the process ends with the third signal that it has not seen.
 
     The usual effect of SIGINT is KeyboardInterrupt; with rclpy's handlers, which contexts are shut
     down. The others end the process on the spot, without its exit hooks; then `ends_process` is
@@ -98,8 +99,9 @@ class _Watch:
         self._last_words = last_words
         self._received: list[int] = []
         self._ear: _Ear | None = None
-        self._heard: list[int] = []
-        self._heard_since = 0.0
+        self._seen_at = float("-inf")
+        self._missed: list[int] = []
+        self._missed_since = 0.0
         self._interrupts: list[Interrupt] = []
         self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
         self._rclpys = _rclpys()
@@ -114,8 +116,8 @@ class _Watch:
             if handler in _DEFAULTS:
                 self._before[number] = handler
                 signal.signal(number, self._note)
-        with contextlib.suppress(RuntimeError, OSError):  # no more threads, no more descriptors
-            self._ear = _Ear(self._hear)
+        with contextlib.suppress(RuntimeError, OSError, ValueError):  # threads, or descriptors
+            self._ear = _Ear(self._was_heard)
 
     def take_off(self) -> None:
         """Put all back: SIGINT's handler at the end, because KeyboardInterrupt is back with it.
@@ -172,7 +174,7 @@ class _Watch:
         """Raise what was received; KeyboardInterrupt last, after which nothing could be."""
         self._is_over = True
         for number in sorted(set(self._received), key=lambda number: number == signal.SIGINT):
-            fatal = self._is_fatal(number)
+            fatal = self._is_fatal(number) and signal.getsignal(number) is signal.SIG_DFL
             signal.raise_signal(number)
             if fatal:  # the first process of a container does not end by it
                 os._exit(128 + number)
@@ -189,43 +191,59 @@ class _Watch:
         self._interrupts = [_nothing for _ in self._interrupts]  # each is still taken off
         self._rclpys = frozenset()
 
-    def _note(self, number: int, _frame: FrameType | None) -> None:
-        if self._is_over:  # a handler of the user's has raised while this was taken off
-            self._put_back(signal.Signals(number))
-            signal.raise_signal(number)
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self._is_over:
+            self._do_as_before(number, frame)
             return
+        self._seen_at = time.monotonic()
         self._received.append(number)
         times, ends_process = len(self._received), self.ends_process()
         stuck = [interrupt(times > 1, ends_process) for interrupt in self._interrupts]
         if times > 2 or (times > 1 and any(stuck[-1:])):  # the innermost is where this thread is
             raise KeyboardInterrupt
 
-    def _hear(self, number: int) -> None:
-        """Take note of a signal on the ear's thread: the main thread may be in C."""
-        if number not in self._before or self._is_over:
+    def _do_as_before(self, number: int, frame: FrameType | None) -> None:
+        """Be what was there before: a handler of the user's calls this one, or has kept it here."""
+        before = self._before.get(signal.Signals(number), signal.SIG_DFL)
+        if callable(before):
+            before(number, frame)
+        else:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+
+    def _was_heard(self, number: int, heard_at: float) -> None:
+        """On the ear's thread: see to a signal that the main thread has not seen in its turn.
+
+        It may be in C for long; or it began to wait there just after the signal had come.
+        """
+        seen = self._seen_at > heard_at - TURN
+        if seen or self._is_over or signal.getsignal(number) != self._note:
             return
-        now = time.monotonic()
-        self._heard_since = self._heard_since or now
-        self._heard.append(number)
-        ends_process = self._end_process(self._heard)
+        if not self._missed or self._seen_at > self._missed_since:
+            self._missed, self._missed_since = [], heard_at
+        self._missed.append(number)
+        numbers = self._received + self._missed
         for interrupt in list(self._interrupts):
-            interrupt(len(self._heard) > 1, ends_process)
-        deaf = not self._received and now - self._heard_since > DEAF_FOR
-        if deaf and len(self._heard) > 2:
-            self._last_words()
-            os._exit(128 + number)
+            interrupt(len(numbers) > 1, self._end_process(numbers))
+        if len(self._missed) > 2:
+            try:
+                self._last_words()
+            finally:
+                if self._seen_at < heard_at:  # it is in C still
+                    os._exit(128 + number)
 
 
 class _Ear:
-    """A thread that hears signals whatever the main thread does."""
+    """A thread that hears signals whatever the main thread does, and tells of each in a while."""
 
-    def __init__(self, heard: Callable[[int], None]) -> None:
-        """Begin to listen, unless somebody else does; raises RuntimeError or OSError."""
-        self._heard = heard
+    def __init__(self, told: Callable[[int, float], None]) -> None:
+        """Begin to listen, unless somebody else does; RuntimeError, OSError, ValueError: not."""
+        self._told = told
         self._read, self._write = os.pipe()
+        os.set_blocking(self._write, False)
+        self._thread = threading.Thread(target=self._listen, name="bt_actions-signals", daemon=True)
         try:
-            os.set_blocking(self._write, False)
-            threading.Thread(target=self._listen, name="bt_actions-signals", daemon=True).start()
+            self._thread.start()
         except RuntimeError:
             os.close(self._read)
             os.close(self._write)
@@ -236,7 +254,10 @@ class _Ear:
 
     def close(self) -> None:
         """Listen no longer; the thread ends by itself."""
-        self._leave()
+        with contextlib.suppress(OSError, ValueError):  # somebody else's, who has closed it
+            now = signal.set_wakeup_fd(-1)
+            if now != self._write:
+                signal.set_wakeup_fd(now)
         os.close(self._write)
 
     def disown(self) -> None:
@@ -244,15 +265,21 @@ class _Ear:
         self.close()
         os.close(self._read)
 
-    def _leave(self) -> None:
-        now = signal.set_wakeup_fd(-1)
-        if now != self._write:
-            signal.set_wakeup_fd(now)
-
     def _listen(self) -> None:
-        while numbers := os.read(self._read, 4096):
-            for number in numbers:
-                self._heard(number)
+        heard: list[tuple[int, float]] = []
+        poll = select.poll()
+        poll.register(self._read, select.POLLIN)
+        while True:
+            wait = max(0.0, heard[0][1] + TURN - time.monotonic()) if heard else None
+            ready = poll.poll(None if wait is None else 1000.0 * wait)
+            now = time.monotonic()
+            if ready:
+                numbers = os.read(self._read, 4096)
+                if not numbers:
+                    break
+                heard += [(number, now) for number in numbers]
+            while heard and now - heard[0][1] >= TURN:
+                self._told(*heard.pop(0))
         os.close(self._read)
 
 

@@ -59,6 +59,8 @@ class Traffic:
         self.seen_since = _contexts.setdefault(node.context, time.monotonic())
         """Since when the node's context is known here; a new one is blind to nothing."""
         self.made_at = time.monotonic()
+        self._namespace = node.get_namespace().rstrip("/")
+        self._name = node.get_name()
         self._lines: dict[str, Line] = {}
         self._observers: list[Observer] = []
         self._unaccounted: set[Ticket] = set()  # told of in the log; some may still end
@@ -155,11 +157,12 @@ class Traffic:
 
     def _full_name(self, name: str) -> str:
         """Expand the name of a resource, which may be what ROS would refuse as a name."""
+        name = name.rstrip("/")
         if name.startswith("/"):
             return name
         if name.startswith("~"):
-            return f"{self.node.get_fully_qualified_name()}{name[1:]}"
-        return f"{self.node.get_namespace().rstrip('/')}/{name}"
+            return f"{self._namespace}/{self._name}{name[1:]}"
+        return f"{self._namespace}/{name}"
 
     def advance(self, ticket: Ticket, make_message: Callable[[], Any]) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
@@ -344,7 +347,7 @@ def close_process() -> None:
 
     def hurry(again: bool, _ends_process: bool) -> bool:
         nonlocal hurried
-        hurried = again
+        hurried = hurried or again
         return False
 
     with contextlib.suppress(KeyboardInterrupt), ended_by_signals(hurry):

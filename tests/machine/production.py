@@ -140,6 +140,9 @@ class Node:
     def get_namespace(self) -> str:
         return "/"
 
+    def get_name(self) -> str:
+        return "node"
+
 
 class LineView:
     """A production line, as the judge sees one (parts.Line)."""

@@ -173,7 +173,7 @@ def test_a_goal_that_is_left_running_is_named_before_a_signal_ends_the_process(
         journal.wait_for("cancel_requested")
     process.send(numbers[0])
     for number in numbers[1:]:
-        journal.wait_for("cancel_requested")
+        journal.wait_for("cancel_requested", journal.count("cancel_requested") + 1)
         process.send(number)
     assert process.wait() == -signal.SIGTERM
     goal_id = str(journal.wait_for("accepted").goal)

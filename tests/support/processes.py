@@ -57,6 +57,7 @@ class Process:
             text=True,
             cwd=ROOT,
             env=environment,
+            start_new_session=True,
         )
         self.pid = self.popen.pid
         self.lines: list[str] = []
@@ -123,6 +124,8 @@ class Process:
             except subprocess.TimeoutExpired:
                 self.popen.kill()
                 self.popen.wait()
+        with contextlib.suppress(ProcessLookupError):  # forks of it, which hold its output open
+            os.killpg(self.pid, signal.SIGKILL)
         for reader in self._readers:
             reader.join(5.0)
         for stream in (self.popen.stdout, self.popen.stderr):
