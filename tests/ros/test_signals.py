@@ -53,9 +53,10 @@ def test_a_child_that_is_forked_in_a_run_can_be_ended(
 
 
 HEAD = """
-import os, signal, sys, threading
+import os, signal, sys, threading, time
 import py_trees, rclpy
 from bt_actions import TreeRunner
+from bt_actions.ros import signals
 from bt_actions.ros.signals import ended_by_signals
 
 def itself(number):
@@ -74,6 +75,21 @@ A_HANDLER_COMES_WITHIN = """
 with ended_by_signals(lambda *_: False):
     signal.signal(signal.SIGTERM, lambda *_: say("the user's"))
 itself(signal.SIGTERM)
+say("goes on")
+"""
+ITS_HANDLER_IS_BUSY = """
+with ended_by_signals(lambda *_: say("ours")):
+    signal.signal(signal.SIGTERM, lambda *_: say("the user's"))
+    for _ in range(3):
+        itself(signal.SIGTERM)
+        time.sleep(signals.TURN + 0.1)
+say("goes on")
+"""
+ITS_HANDLER_CALLS_OURS = """
+with ended_by_signals(lambda *_: False):
+    ours = signal.getsignal(signal.SIGTERM)
+    signal.signal(signal.SIGTERM, lambda *args: (say("the user's"), ours(*args)))
+    itself(signal.SIGTERM)
 say("goes on")
 """
 ONE_OF_OURS_IS_LEFT = """
@@ -111,14 +127,16 @@ say("goes on")
     [
         (RCLPY_COMES_WITHIN, ["False", "goes on"]),
         (A_HANDLER_COMES_WITHIN, ["the user's", "goes on"]),
+        (ITS_HANDLER_IS_BUSY, ["the user's"] * 3 + ["goes on"]),
+        (ITS_HANDLER_CALLS_OURS, ["the user's"] * 2),
         (ONE_OF_OURS_IS_LEFT, []),
         (A_SHUTDOWN_THAT_BLOCKS, ["goes on"]),
     ],
-    ids=["rclpy within", "handler within", "left", "blocks"],
+    ids=["rclpy within", "handler within", "busy", "chained", "left", "blocks"],
 )
 def test_a_program_of_the_users(start_program: Start, body: str, said: list[str]) -> None:
     process = start_program("-c", HEAD + body)
-    assert process.wait(within=60.0) == (0 if said else -signal.SIGTERM), process
+    assert process.wait(within=60.0) == (0 if "goes on" in said else -signal.SIGTERM), process
     assert process.lines == said
 
 

@@ -375,6 +375,39 @@ class TestStopped:
         assert ended.t <= received.t
         record.outcome = "UNKNOWN; the other server is sent to when the goal has ended"
 
+    def test_left_behind_on_a_server_that_is_killed_is_waited_for_once(
+        self,
+        new_host: HostFactory,
+        host: Host,
+        name: str,
+        record: Record,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """A refused cancel; SIGKILL; one runner for each job, with another server of its arm"""
+        monkeypatch.setattr("bt_actions.ros.line.LEASE", 10.0)
+        monkeypatch.setattr("bt_actions.ros.line.TOO_NEW", 0.5)
+        victim = new_host()
+        victim.open(f"{name}_0", "1:reject_cancel")
+        journal = host.open(f"{name}_1")
+        left = MoveRobot("left", 40.0, action_name=f"{name}_0", resources={"arm"})
+        left.timeouts = Timeouts(server=20.0, cancel=0.5)
+        with TreeRunner(left) as runner:
+            runner.start()
+            until(lambda: state(left) == "EXECUTING", 20.0)
+        assert left.end is End.UNKNOWN
+        victim.kill()
+        outcomes = []
+        for seconds in (3.0, 8.0):
+            job = MoveRobot("job", 0.3, action_name=f"{name}_1", resources={"arm"})
+            job.timeouts = Timeouts(server=seconds)
+            with TreeRunner(job) as runner:
+                runner.run(30.0)
+            outcomes.append(job.outcome)
+        assert outcomes == [Outcome.SERVER_UNAVAILABLE, Outcome.SUCCEEDED]
+        assert left.end is End.SERVER_GONE
+        assert journal.ends() == ["succeeded"]
+        record.outcome = "SERVER_UNAVAILABLE, and then the arm is used again"
+
     @pytest.mark.chaos
     def test_lost_where_the_next_node_discovers_its_server_after_the_other_one(
         self,
