@@ -78,11 +78,15 @@ itself(signal.SIGTERM)
 say("goes on")
 """
 ITS_HANDLER_IS_BUSY = """
+heard = threading.Semaphore(0)
+was_heard = signals._Watch._was_heard
+signals._Watch._was_heard = lambda *args: (was_heard(*args), heard.release())
+
 with ended_by_signals(lambda *_: say("ours")):
     signal.signal(signal.SIGTERM, lambda *_: say("the user's"))
     for _ in range(3):
         itself(signal.SIGTERM)
-        time.sleep(signals.TURN + 0.1)
+        heard.acquire()
 say("goes on")
 """
 ITS_HANDLER_CALLS_OURS = """

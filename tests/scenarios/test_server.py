@@ -149,6 +149,14 @@ class TestKilled:
         assert len(leaf.history) == 1
 
 
+def leave(leaf: MoveRobot) -> None:
+    """Shut its runner down in mid-motion, where its server does not end it in time."""
+    with TreeRunner(leaf) as runner:
+        runner.start()
+        until(lambda: state(leaf) == "EXECUTING", 20.0)
+    assert leaf.end is End.UNKNOWN
+
+
 def lose(host: Host, leaf: MoveRobot, runner: TreeRunner) -> None:
     """Stop a server under a goal until its lease is over, and the run with it."""
     runner.start()
@@ -321,10 +329,7 @@ class TestStopped:
             for leaf in (idle, second):
                 leaf.setup(node=other.node)
             until_shown(other.node, f"{name}_0", 1)
-            with TreeRunner(first) as runner:
-                runner.start()
-                until(lambda: state(first) == "EXECUTING", 20.0)
-            assert first.end is End.UNKNOWN
+            leave(first)
             assert other.run(30.0) is Status.SUCCESS
         canceled, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
         assert canceled.t <= received.t
@@ -340,10 +345,7 @@ class TestStopped:
         first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
         second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
         first.timeouts = second.timeouts = timeouts
-        with TreeRunner(first) as runner:
-            runner.start()
-            until(lambda: state(first) == "EXECUTING", 20.0)
-        assert first.end is End.UNKNOWN
+        leave(first)
         really, began = Line._shown, time.monotonic()
 
         def late(line: Line) -> frozenset[bytes]:
@@ -366,10 +368,7 @@ class TestStopped:
         first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
         second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
         first.timeouts, second.timeouts = Timeouts(cancel=0.5), Timeouts(server=60.0)
-        with TreeRunner(first) as runner:
-            runner.start()
-            until(lambda: state(first) == "EXECUTING", 20.0)
-        assert first.end is End.UNKNOWN
+        leave(first)
         stopped.send(signal.SIGSTOP)
         with TreeRunner(second) as runner:
             runner.start()
@@ -398,10 +397,7 @@ class TestStopped:
         journal = host.open(f"{name}_1")
         left = MoveRobot("left", 40.0, action_name=f"{name}_0", resources={"arm"})
         left.timeouts = Timeouts(server=20.0, cancel=0.5)
-        with TreeRunner(left) as runner:
-            runner.start()
-            until(lambda: state(left) == "EXECUTING", 20.0)
-        assert left.end is End.UNKNOWN
+        leave(left)
         victim.kill()
         outcomes = []
         for seconds in (3.0, 8.0):
