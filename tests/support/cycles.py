@@ -25,15 +25,20 @@ from bt_actions import MoveRobot, TreeRunner
 from bt_actions.simulation import Script, ScriptedServer
 
 NAME = "/cycles/move"
+OF_THE_PROCESS = ("bt_actions-lookout", "bt_actions-alarm")
+"""Threads that are begun once, when they are needed."""
 
 
 def held() -> dict[str, float]:
     """What this process holds: threads, open files, memory in MB."""
     gc.collect()
+    for thread in threading.enumerate():
+        if thread.name == "bt_actions-signals":  # has been told to end, and closes a file then
+            thread.join(10.0)
     status = Path("/proc/self/status").read_text()
     resident = next(line for line in status.splitlines() if line.startswith("VmRSS"))
     return {
-        "threads": sum(not t.name.startswith("bt_actions-") for t in threading.enumerate()),
+        "threads": sum(t.name not in OF_THE_PROCESS for t in threading.enumerate()),
         "files": sum(1 for _ in Path("/proc/self/fd").iterdir()),
         "memory": int(resident.split()[1]) / 1024.0,
     }
