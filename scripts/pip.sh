@@ -17,6 +17,11 @@ if [ -n "${CI:-}" ]; then # where nobody can look into the file afterwards
 fi
 # With pinned versions, a package that the index does not give out is reported as a conflict, too.
 if grep -qE 'No matching distribution|ResolutionImpossible|ConnectionPool|ConnectionError|HTTP error|IncompleteRead|ReadTimeout|SSLError|DO NOT MATCH THE HASHES' "$log"; then
+    machine=$(uname -sm)
+    if [ "$machine" != "Linux x86_64" ]; then
+        echo "bt_actions: there are ROS 2 wheels for Linux on x86_64 only, and this is $machine: build it in a ROS 2 workspace instead (README.md, $log)." >&2
+        exit 1
+    fi
     echo "bt_actions: a download failed: check the network and pip's package index, then try again ($log)." >&2
 else
     echo "bt_actions: pip failed; what it said is in $log." >&2

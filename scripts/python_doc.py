@@ -18,7 +18,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 
 import bt_actions
-from bt_actions import events
+from bt_actions import document, events
 
 PATH = Path(__file__).resolve().parent.parent / "docs" / "python.md"
 
@@ -27,9 +27,9 @@ HEAD = """\
 
 <!-- Made by scripts/python_doc.py from the docstrings. Do not edit. -->
 
-`import bt_actions` gives the names on this page. How a tree of your own is made of them and run
-stands in the [README](../README.md#in-your-own-py_trees-tree), a whole program in
-[examples/embed.py](../examples/embed.py). Times are seconds.
+`import bt_actions` gives the names on this page, but for the two parts at its end. How a tree of
+your own is made of them and run stands in the [README](../README.md#in-your-own-py_trees-tree), a
+whole program in [examples/embed.py](../examples/embed.py). Times are seconds.
 
 What holds everywhere:
 
@@ -50,6 +50,19 @@ GROUPS = {
     "What became of a goal": ["Outcome", "End", "AttemptRecord", "Progress"],
     "Running": ["load_tree", "TreeRunner", "TreeError", "GoalReport"],
 }
+DOCUMENT = ["tree_outputs", "tree_inputs", "check_file", "installed_trees", "Finding"]
+DOCUMENT += ["DocumentError", "InputError"]
+DOCUMENT_HEAD = """\
+## Trees from YAML
+
+Beside `load_tree`, from `bt_actions.document`:
+
+```python
+root = load_tree("fetch.yaml", {"pick_at": 2.0})
+with TreeRunner(root) as runner:
+    runner.run()
+print(tree_outputs(root)["final_pose"])
+```"""
 EVENTS = [events.TreeStarted, events.NodeChanged, events.GoalChanged, events.TreeFinished]
 EVENTS_HEAD = """\
 ## Events
@@ -178,6 +191,8 @@ def page() -> str:
     for group, names in GROUPS.items():
         parts.append(f"## {group}")
         parts += [entry(name, getattr(bt_actions, name)) for name in names]
+    parts.append(DOCUMENT_HEAD)
+    parts += [entry(name, getattr(document, name)) for name in DOCUMENT]
     parts.append(EVENTS_HEAD)
     parts += [entry(kind.__name__, kind) for kind in EVENTS]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"

@@ -5,9 +5,13 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import itertools
 import re
 import sys
-from collections.abc import Iterable
+import textwrap
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from bt_actions.document.model import (
@@ -17,6 +21,7 @@ from bt_actions.document.model import (
     KINDS,
     OUTPUT,
     RETRY,
+    SERVICE_RETRY,
     SERVICE_TIMEOUT,
     TIMEOUT,
     TOP_KEYS,
@@ -26,7 +31,10 @@ from bt_actions.document.model import (
 )
 from bt_actions.document.pages import PAGES
 from bt_actions.document.rules import RULES
+from bt_actions.document.scalars import Text
+from bt_actions.document.shape import Shape
 from bt_actions.document.shapes import Key, Record
+from bt_actions.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Busy
 from bt_actions.units import DURATION_UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -47,14 +55,16 @@ completion in editors. The files on this page are in [examples/](../examples).
 ## Rules
 
 - A node is a mapping with **exactly one key that is a kind or the name of an action** that the tree
-  declares. The order of keys is free. For composites, decorators and actions the kind's value is
-  the node's name; it holds no colon. For the others it is what they do, and `name:` is optional.
+  declares. The order of keys is free. The kind's value is the node's name, without a colon, where
+  its section says so; for the others it is what they do, and `name:` is optional.
 - `timeout` and `retry` are settings of an action, and kinds only beside `child:`.
 - Unknown keys, keys that are there twice and values of the wrong form are errors.
 - Scalars are those of YAML 1.2: `on` and `yes` are texts. Files are read with libyaml, which
   PyYAML's wheels hold.
 - Durations carry a unit ({", ".join(f"`{unit}`" for unit in DURATION_UNITS)}); a bare number is
   seconds. Where a limit can be left out, `none` says so.
+- Numbers and durations are plain, so that deadlines can be checked before a robot moves; where
+  `$name` may stand for one, the tables say "or `$name`".
 
 ## Values
 
@@ -110,7 +120,39 @@ The key is a name under `actions`, its value the node's name.
 ```
 """
 ALIAS_EXAMPLE = "move: To the part\ngoal: {distance: 2.0}\nretry: 3"
-IMPORT = "`actions`, `topics` and `defaults` from files beside this one, or installed ones."
+IMPORT = """\
+`actions`, `topics` and `defaults` from other files. They are found as subtrees are: below."""
+WHERE = """\
+## Where trees are found
+
+`subtree:` and `import:` take a path beside the file they stand in, `bt-actions` and `load_tree`
+one from the current folder; `.yaml` and `.yml` may be left out. A name without a folder that is not
+there is looked for among the installed trees, in this order: the folders of `BT_ACTIONS_TREE_PATH`
+(separated as in `PATH`), the trees of bt_actions, and `share/PACKAGE/trees` of every package of the
+ROS workspaces that are sourced. There a package of yours installs its trees, with its `setup.py` or
+CMakeLists.txt; `package://PACKAGE/trees/NAME.yaml` names one of a certain package.
+"""
+BUSY = """\
+What to do when the goal's server, or one of its `resources`, is taken by another goal of this
+process:
+
+| | |
+|---|---|
+"""
+QOS = """\
+### `qos`
+
+| | |
+|---|---|
+| `default` | reliable, the last 10 messages, none from before the subscription |
+| `sensor` | best effort, the last 5 messages: ROS's profile for sensor data |
+| `latched` | reliable, and who subscribes later is given the last message |
+| `best_effort` | as `default`, but best effort |
+| `services` | ROS's profile for services |
+
+A subscription that asks for more than its publisher offers hears nothing: `default` and `latched`
+of a best effort publisher, `latched` of one that keeps nothing.
+"""
 DEFAULTS = """\
 `timeout`, `retry` and `busy` for all actions. They merge key by key, and the nearest wins: the
 node's own, the action's under `actions`, the tree's `defaults`, those that it imports."""
@@ -128,10 +170,20 @@ def table(keys: Iterable[Key]) -> list[str]:
     """A table of keys."""
     lines = ["| key | value | meaning | default |", "|---|---|---|---|"]
     for key in keys:
-        words = key.shape.words.rstrip(",").replace("|", "\\|")
+        words = form(key.shape).replace("|", "\\|")
         default = "**required**" if key.required else (key.default or "")
         lines.append(f"| `{key.name}` | {words} | {key.doc} | {default} |")
     return [*lines, ""]
+
+
+def form(shape: Shape) -> str:
+    """What a shape says of itself."""
+    words = shape.words.rstrip(",")
+    if getattr(shape, "single", False):
+        words = f"{words}, or one item of it"
+    if getattr(shape, "values", False) and not isinstance(shape, Text):
+        words = f"{words}, or `$name`"
+    return words
 
 
 def example(name: str) -> str:
@@ -152,11 +204,41 @@ def part(title: str, text: str, *names: str) -> list[str]:
 
 def section(kind: Kind) -> list[str]:
     """The section of a kind."""
-    value = "the node's name" if kind.named_by_value else kind.value.words.rstrip(",")
+    value = "the node's name" if kind.named_by_value else form(kind.value)
     return [
         f"### `{kind.name}`", "", kind.doc, "", f"`{kind.name}:` is {value}.", "",
         "```yaml", kind.example, "```", "", *(table(kind.keys.values()) if kind.keys else []),
     ]  # fmt: skip
+
+
+def busy() -> list[str]:
+    """The rows of the table of what to do while the server is taken."""
+    words = dict(attribute_docs(Busy))
+    return [f"| `{busy.value}` | {words[busy.name]} |" for busy in Busy]
+
+
+def attribute_docs(cls: type) -> Iterator[tuple[str, str]]:
+    """The names of a class's attributes, with the text that stands below each."""
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+    assert isinstance(body, ast.ClassDef)
+    for assigned, text in itertools.pairwise(body.body):
+        if isinstance(assigned, ast.Assign) and isinstance(text, ast.Expr):
+            assert isinstance(assigned.targets[0], ast.Name)
+            yield assigned.targets[0].id, ast.literal_eval(text.value)
+
+
+def retry_text() -> str:
+    """What retrying means, with the outcomes that count where none are named."""
+
+    def listed(outcomes: Iterable[str]) -> str:
+        *most, last = (f"`{outcome}`" for outcome in sorted(outcomes))
+        return f"{', '.join(most)} and {last}"
+
+    return (
+        "`3` is short for `{attempts: 3}`. Tried again are, where `outcomes` does not say "
+        f"otherwise, {listed(RETRIED_BY_DEFAULT)}. {listed(RETRIED_IF_NAMED)} have to be named: "
+        "the goal may have been executed. What each means: [goal.md](goal.md#outcomes-and-ends)."
+    )
 
 
 def yaml_page() -> str:
@@ -176,10 +258,14 @@ def yaml_page() -> str:
     lines += part("`import`", IMPORT, "words", "imports")
     lines += part("`defaults`", DEFAULTS, "defaults")
     lines += part("`namespace`", NAMESPACE, "namespaces")
+    lines += ["### `busy`", "", BUSY + "\n".join(busy()), ""]
+    lines += [*QOS.split("\n")]
     lines += record("`timeout` of an action", "`30 s` is short for `{result: 30 s}`.", TIMEOUT)
-    lines += record("`retry` of an action", "`3` is short for `{attempts: 3}`.", RETRY)
+    lines += record("`retry` of an action", retry_text(), RETRY)
     text = "`5 s` is short for `{response: 5 s}`."
     lines += record("`timeout` of a service", text, SERVICE_TIMEOUT)
+    lines += record("`retry` of a service", "As an action's.", SERVICE_RETRY)
+    lines += WHERE.split("\n")
     for group, title in TITLES.items():
         lines += [f"## {title}", ""]
         if group is Group.LEAF:

@@ -36,12 +36,31 @@ def trap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("more", [[], ["--set", "x=2.0"]])
-def test_run_no_python_refuses_the_tree_and_imports_nothing(
-    trap: Path, more: list[str], capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("command", "code"),
+    [
+        (["run"], 2),
+        (["run", "--set", "x=2.0"], 2),
+        (["render"], 2),
+        (["check"], 1),
+        (["check", "--no-types"], 1),
+    ],
+)
+def test_no_python_refuses_the_tree_and_imports_nothing(
+    trap: Path, command: list[str], code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["run", str(trap / "outer.yaml"), "--no-python", *more]) == 2
-    assert "inner.yaml:2:8: error[BT214]: python: is not allowed here" in capsys.readouterr().err
+    assert main([*command, "--no-python", str(trap / "outer.yaml")]) == code
+    told = "".join(capsys.readouterr())
+    assert "inner.yaml:2:8: error[BT214]: python: is not allowed here" in told
+    assert not (trap / "imported").exists()
+
+
+def test_check_no_python_holds_for_standard_input(
+    trap: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", (trap / "inner.yaml").open())
+    assert main(["check", "--no-python", "-"]) == 1
+    assert "BT214" in capsys.readouterr().out
     assert not (trap / "imported").exists()
 
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import Exit, columns, prints_apart, write
+from bt_actions.cli.common import Exit, add_no_python, columns, prints_apart, write
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -36,8 +36,11 @@ def add_parser(subparsers: Subparsers) -> None:
         "trees", metavar="TREE", nargs="+", help="path or name of a tree; - is standard input"
     )
     parser.add_argument(
-        "--no-types", action="store_true", help="leave ROS out: no interface is looked up"
+        "--no-types",
+        action="store_true",
+        help="look up no ROS interface, and no class of a python: node",
     )
+    add_no_python(parser)
     parser.add_argument(
         "--format",
         choices=("text", "json", "github", "sarif"),
@@ -55,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     unreadable = False
     for tree in args.trees:
         with prints_apart():
-            found = _check(tree, types=not args.no_types)
+            found = _check(tree, types=not args.no_types, python=args.python)
         for finding in found:
             if finding not in seen:  # trees share what they include
                 seen.add(finding)
@@ -70,14 +73,14 @@ def run(args: argparse.Namespace) -> int:
     return Exit.FAILURE if findings else Exit.SUCCESS
 
 
-def _check(tree: str, *, types: bool) -> list[Finding]:
+def _check(tree: str, *, types: bool, python: bool) -> list[Finding]:
     from bt_actions.document import DocumentError, check_file, check_source
     from bt_actions.document.source import read_stream
 
     if tree != "-":
-        return check_file(tree, types=types)
+        return check_file(tree, types=types, python=python)
     try:
         source = read_stream(getattr(sys.stdin, "buffer", None), "<stdin>")
     except DocumentError as error:
         return list(error.findings)
-    return check_source(source, types=types)
+    return check_source(source, types=types, python=python)

@@ -131,6 +131,17 @@ def namespace(text: str) -> str:
     return f"/{name}" if name else ""
 
 
+def add_no_python(parser: argparse.ArgumentParser) -> None:
+    """Add the option of every command that reads a tree with its `python:` nodes."""
+    parser.add_argument(
+        "--no-python",
+        dest="python",
+        action="store_false",
+        help="refuse a tree with python: nodes, and import nothing for it; for trees that are not "
+        "trusted",
+    )
+
+
 def load(
     tree: str,
     settings: Iterable[str],

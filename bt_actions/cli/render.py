@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import BadInput, Exit, load, write
+from bt_actions.cli.common import BadInput, Exit, add_no_python, load, write
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -61,6 +61,7 @@ def add_parser(subparsers: Subparsers) -> None:
         default=[],
         help="give an input of the tree a value; repeatable",
     )
+    add_no_python(parser)
 
 
 def _levels(text: str) -> int:
@@ -76,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         if args.output is not None:
             render.form_of(args.output)  # before the tree: the cheaper mistake first
-        root = load(args.tree, args.set)
+        root = load(args.tree, args.set, python=args.python)
         if args.output is not None:
             render.write(root, args.output, direction=args.direction, depth=args.depth)
         else:

@@ -11,7 +11,16 @@ import contextlib
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import BadInput, Exit, load, metres, namespace, seconds, speed
+from bt_actions.cli.common import (
+    BadInput,
+    Exit,
+    add_no_python,
+    load,
+    metres,
+    namespace,
+    seconds,
+    speed,
+)
 from bt_actions.cli.ros_arguments import parameters
 
 if TYPE_CHECKING:
@@ -75,12 +84,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help="cancel what a killed orchestrator of this machine left, before the tree starts; "
         "waits 30 s for the tree's servers, and does not run where it cannot see what was left",
     )
-    parser.add_argument(
-        "--no-python",
-        dest="python",
-        action="store_false",
-        help="refuse a tree with python: nodes; for trees that are not trusted",
-    )
+    add_no_python(parser)
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object a line, the result last"
     )

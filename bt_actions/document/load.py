@@ -106,8 +106,12 @@ def tree_outputs(root: Behaviour) -> dict[str, object]:
 
 
 @_no_collecting()
-def check_file(path: PathLike, *, types: bool = True) -> list[Finding]:
-    """Everything that is wrong with a tree, and with all that it includes and imports."""
+def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> list[Finding]:
+    """Everything that is wrong with a tree, and with all that it includes and imports.
+
+    A class that a ``python:`` node names is imported for it, unless `types` or `python` is False;
+    with `python=False` such a node is an error.
+    """
     workspace = Workspace()
     try:
         found = _found(path)
@@ -116,18 +120,18 @@ def check_file(path: PathLike, *, types: bool = True) -> list[Finding]:
         return list(error.findings)
     except TooManyErrors:
         return workspace.findings
-    return _checked(workspace, types=types)
+    return _checked(workspace, types=types, python=python)
 
 
 @_no_collecting()
-def check_source(source: Source, *, types: bool = True) -> list[Finding]:
+def check_source(source: Source, *, types: bool = True, python: bool = True) -> list[Finding]:
     """As `check_file`, for a text that was read already."""
     workspace = Workspace()
     try:
         workspace.open_source(source)
     except TooManyErrors:
         return workspace.findings
-    return _checked(workspace, types=types)
+    return _checked(workspace, types=types, python=python)
 
 
 def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[Finding]:

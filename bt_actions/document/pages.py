@@ -122,8 +122,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
         ),
         "BT110": Page(
             "The value is of the right form, but cannot be: an unknown word, a duration with an "
-            "unknown unit, a number out of its range. Units of time are ns, us, ms, s, min and h; "
-            "a bare number is seconds.",
+            "unknown unit, a number out of its range. Units of time are ns, us, ms, s, sec, min "
+            "and h; a bare number is seconds.",
             _tree("root: {wait: 5 sconds}\n"),
             _tree("root: {wait: 5 s}\n"),
         ),
@@ -339,7 +339,9 @@ PAGES: Mapping[str, Page] = MappingProxyType(
                   "  children: [{check: $ready}, {move: Go}]\n"),
         ),
         "BT307": Page(
-            "The node stops what it holds before the deadlines and retries in there can pass.",
+            "The node stops what it holds before the deadlines for results and answers, the waits "
+            "and the retries in there can pass. What an action may take besides, for its queue, "
+            "server and acceptance, is not counted.",
             _move("root:\n  timeout: Short\n  after: 5 s\n  child: {move: Go}\n"),
             _move("root:\n  timeout: Long enough\n  after: 40 s\n  child: {move: Go}\n"),
         ),

@@ -153,6 +153,15 @@ class TestDownload:
         assert "a download failed: check the network" in sentence(done)
         assert message in (tmp_path / "venv" / "pip.log").read_text()
 
+    def test_one_on_a_machine_without_wheels_is_told_as_that(
+        self, fake: Fake, tmp_path: Path
+    ) -> None:
+        path = f"{fake('uname', 'echo Linux aarch64').parent}:{os.environ['PATH']}"
+        message = "ERROR: No matching distribution found for ros-rcl==9.2.8"
+        said = sentence(self.pip(fake, tmp_path, f"echo '{message}'; exit 1", PATH=path))
+        assert "Linux on x86_64 only, and this is Linux aarch64" in said
+        assert "ROS 2 workspace" in said
+
     def test_another_failure_is_not_called_a_failed_download(
         self, fake: Fake, tmp_path: Path
     ) -> None:
