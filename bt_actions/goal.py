@@ -437,6 +437,8 @@ class Goal:
         """Only an accepted goal has a status: if that is news, cancel it at once."""
         if not self._accepted:
             self._turned_up(now, detail)
+        elif self.lost and detail not in ENDS:
+            self._server_returned(now, detail)
         return self._terminal_status_seen(now, detail)
 
     def _ask_for_lost_result(self, now: Now, detail: Any) -> State:

@@ -165,7 +165,7 @@ class TreeRunner:
             try:
                 callback()
             except Exception as error:  # noqa: BLE001 - the rest must be closed all the same
-                self.node.get_logger().error(f"closing: {error!r}")
+                _error(f"closing: {error!r}")
 
     # Running
 
@@ -237,6 +237,10 @@ class TreeRunner:
     def _release(self) -> None:
         self._stop_wanted = self._abandoned = False
         self._runs_on = None
+        # What the run left, and what has become known to be left since it last looked.
+        self._tickets |= {
+            each.ticket for each in list(self._changes) if self._has_left(each.ticket)
+        }
         _runs.discard(self)
         self._running.release()
 
@@ -335,11 +339,11 @@ class TreeRunner:
             self._thread.join()
             self._thread = None
             if isinstance(self._outcome, BaseException):  # and nobody has called wait()
-                self.node.get_logger().error(f"the tree that was started raised {self._outcome!r}")
+                _error(f"the tree that was started raised {self._outcome!r}")
         try:
             self.tree.shutdown()
         except Exception as error:  # noqa: BLE001 - the user's: any
-            self.node.get_logger().error(f"shutdown of a behaviour raised: {error!r}")
+            _error(f"shutdown of a behaviour raised: {error!r}")
             for behaviour in self.tree.root.iterate():  # ours must let go all the same
                 if isinstance(behaviour, ActionBehaviour):
                     with contextlib.suppress(Exception):
@@ -467,7 +471,7 @@ class TreeRunner:
             try:
                 root.stop(Status.INVALID)
             except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
-                self.node.get_logger().error(f"terminate of a behaviour raised: {error!r}")
+                _error(f"terminate of a behaviour raised: {error!r}")
                 self._leave_with(error)
                 for node in root.iterate():
                     if isinstance(node, ActionBehaviour):
@@ -560,7 +564,7 @@ class TreeRunner:
                 observer(event)
             except BaseException as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
-                self.node.get_logger().error(f"an observer raised and was removed: {error!r}")
+                _error(f"an observer raised and was removed: {error!r}")
                 self._leave_with(error)
 
     def _leave_with(self, error: BaseException) -> None:
@@ -578,6 +582,12 @@ def _warn(message: str) -> None:
     from bt_actions.ros.log import log
 
     log.warning(message)
+
+
+def _error(message: str) -> None:
+    from bt_actions.ros.log import log
+
+    log.error(message)
 
 
 def _traffic_of(node: Any) -> Any:

@@ -174,7 +174,8 @@ class Testimony:
         one_left = bool(self._crowd - watch.gids)
         self._crowd = watch.gids if _is_crowded(watch) else frozenset()
         if goal.lost:
-            if returned:
+            alive = watch.both_live or not watch.changed(self.sent_to)  # and no ghost, after all
+            if returned or (not gone and alive and goal.end is not End.UNKNOWN):
                 self._forget(now)
                 return [(Event.SERVER_RETURNED, None)]
             if gone and goal.end is End.UNKNOWN:  # it was left, not lost

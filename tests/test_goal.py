@@ -659,6 +659,13 @@ def test_feedback_of_a_goal_given_up_as_lost_shows_that_it_runs() -> None:
     assert life.goal.end is End.UNKNOWN
 
 
+def test_a_status_of_a_goal_given_up_as_lost_shows_that_it_runs() -> None:
+    life = executing()
+    life.on(Event.SERVER_LOST, "restarted")
+    assert life.on(Event.STATUS, 2) == [CANCEL, ASK]
+    assert (life.goal.lost, life.goal.end) == (False, End.UNKNOWN)
+
+
 def test_a_goal_lost_before_its_acceptance_is_judged_when_the_server_is_back() -> None:
     life = sending()
     life.on(Event.SERVER_LOST, "gone")

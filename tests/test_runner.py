@@ -852,11 +852,27 @@ class TestWhoWaits:
     def test_standard_error_that_nobody_reads_holds_up_nothing(
         self, host: Host, name: str, domain: int
     ) -> None:
-        """In a program of the user's own, with a full pipe for standard error."""
+        """In a program of the user's own, with a full pipe for standard error.
+
+        What is logged there: by a leaf, of an observer and of a leaf that raise, of a goal.
+        """
         program = f"""
+from py_trees.behaviours import Success
+from py_trees.composites import Sequence
 from bt_actions import MoveRobot, Timeouts, TreeRunner
+from bt_actions.behaviours.doing import Log
+
+class Rude(Success):
+    def shutdown(self):
+        raise RuntimeError("rude")
+
+def observer(event):
+    raise RuntimeError("rude")
+
 leaf = MoveRobot("m", 9.0, action_name={name!r}, timeout=Timeouts(result=0.2, cancel=0.3))
-with TreeRunner(leaf) as runner:
+root = Sequence("root", True, [Log("log", lambda: "a line"), Rude("rude"), leaf])
+with TreeRunner(root) as runner:
+    runner.observe(observer)
     print(runner.run(timeout=20.0), runner.unaccounted[0].name, flush=True)
 """
         host.open(name, "1:reject_cancel")
@@ -899,6 +915,33 @@ with TreeRunner(leaf) as runner:
             assert said.wait(5.0), "the goal is not accounted for, and the log is told"
         written.set()
         log.flush(5.0)
+        host.cancel_all(name)
+        host.close_server(name)
+
+
+class TestLastMoments:
+    def test_what_becomes_known_at_the_end_of_a_run_is_reported(
+        self, host: Host, name: str, node: Any
+    ) -> None:
+        """Its server comes back while the observers are told that the tree has finished."""
+        from bt_actions.ros.shared import Change
+
+        host.open(name, "1:reject_cancel")
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.2, cancel=0.3))
+        with TreeRunner(leaf, node=node) as runner:
+
+            def late(event: Any) -> None:
+                if isinstance(event, TreeFinished):
+                    (ticket,) = runner._tickets
+                    runner._tickets.clear()  # as of a goal that was lost, and so accounted for
+                    goal = ticket.goal
+                    now = time.monotonic()
+                    change = Change(now, ticket, goal.state, goal.outcome, goal.end, goal.reason)
+                    runner._note(change)
+
+            runner.observe(late)
+            runner.run(timeout=9.0)
+            assert [report.name for report in runner.unaccounted] == ["m"]
         host.cancel_all(name)
         host.close_server(name)
 

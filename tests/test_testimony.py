@@ -198,6 +198,7 @@ def test_a_lost_server_is_back_only_when_it_can_be_talked_to(
     assert said.looked(watch, 2.0) == []
     watch.observe(2.1, True, BOTH)
     assert events(said.looked(watch, 2.1)) == [Event.SERVER_RETURNED]
+    said._goal.on(Event.SERVER_RETURNED, Now(2.1, 2.1))
     assert said.looked(watch, 2.2) == []
 
 
@@ -209,6 +210,28 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
     assert events(said.looked(watch, 0.0)) == [Event.SERVER_CHANGED]
     assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == []
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
+
+
+@pytest.mark.parametrize("how", ["both answer", "the other has gone"])
+def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
+    said: testimony.Testimony, watch: ServerWatch, how: str
+) -> None:
+    said.sent_to = frozenset({ONE})
+    said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
+    said.looked(watch, 0.0)
+    said.finished(watch, 0.0, 0.0, [UNKNOWN])
+    now = alone(watch)
+    for event, detail in said.looked(watch, now):
+        said._goal.on(event, Now(now, now), detail)
+    assert said._goal.lost
+    assert said.looked(watch, now) == [], "it is still taken for one"
+    if how == "both answer":
+        watch.probe_answered(now, 1)
+    else:
+        watch.observe(now, True, frozenset({ONE}))
+    assert events(said.looked(watch, now)) == [Event.SERVER_RETURNED]
+    said._goal.on(Event.SERVER_RETURNED, Now(now, now))
+    assert Event.SERVER_LOST not in events(said.looked(watch, now))
 
 
 def test_the_status_of_one_of_two_shows_no_end(

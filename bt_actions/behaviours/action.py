@@ -231,6 +231,8 @@ class ActionBehaviour(Behaviour):
     def initialise(self) -> None:
         """Begin a visit. What an earlier one left behind is drained beside it."""
         self._require_setup()
+        if self._ticket is not None and not self._filed(self._ticket):
+            ActionBehaviour.terminate(self, Status.INVALID)  # the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._when, CHANCE)
         self._outcome = None
         self._left_behind, self._ticket = self.open_tickets(), None

@@ -72,13 +72,14 @@ class Log(Behaviour):
         if self._logger is None:
             logging.getLogger("bt_actions").log(LEVELS[self._level], "%s", line)
         else:
-            # rclpy remembers the severity of each calling line, so each level has its own.
-            write = {
-                "debug": lambda: self._logger.debug(line),
-                "info": lambda: self._logger.info(line),
-                "warn": lambda: self._logger.warning(line),
-                "error": lambda: self._logger.error(line),
-                "fatal": lambda: self._logger.fatal(line),
-            }
-            write[self._level]()
+            from bt_actions.ros.log import log
+
+            log.by(self._logger, self._level, line)
         return Status.SUCCESS
+
+    def shutdown(self) -> None:
+        """See that the lines are written before the node, which publishes them, is destroyed."""
+        if self._logger is not None:
+            from bt_actions.ros.log import log
+
+            log.flush()

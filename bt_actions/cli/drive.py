@@ -257,11 +257,11 @@ class Drive:
             for goal in goals.values()
         ]
         if self._abandoned:
-            named = {goal.name for goal in goals.values()}
             lines += [
-                f"{row.name} on {row.server}, {row.state.lower()} when left"
+                f"{row.name} on {row.server}, goal {goal_id}, {state.lower()} when left"
                 for row in self._report.live
-                if row.name not in named
+                for goal_id, state in row.live_goals.items()
+                if goal_id not in goals
             ]
             for row in self._report.live:
                 row.leave(self._report.now)

@@ -66,7 +66,12 @@ class Row:
     @property
     def live(self) -> bool:
         """Whether a goal of this leaf may be running, be it one that the leaf has left."""
-        return any(state not in UNSENT for state in self._open.values())
+        return bool(self.live_goals)
+
+    @property
+    def live_goals(self) -> dict[str, str]:
+        """The goals that may be running, by their ids: their states."""
+        return {each: state for each, state in self._open.items() if state not in UNSENT}
 
     @property
     def under_way(self) -> bool:

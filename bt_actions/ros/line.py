@@ -442,12 +442,17 @@ class Line:
             if not isinstance(line, Line) or line is self or not line.shares_server_with(self):
                 continue
             for ticket in list(line.goals.values()):
-                if ticket.goal.lost and ticket.testimony.sent_to & self.watch.gids:
+                if ticket.goal.lost and self._sees_more_than(line, ticket.testimony.sent_to):
                     ticket.line = self
                     ticket.testimony.taken_over()
                     self.goals[ticket.goal.id] = ticket
                     line.close_book(ticket)
                     alarm.mind(self)
+
+    def _sees_more_than(self, line: Line, servers: frozenset[bytes]) -> bool:
+        """Whether one of `servers` is shown here that `line` does not see, or takes for a ghost."""
+        unseen = line.orphaned or not servers & line.watch.gids
+        return bool(servers & self.watch.gids) and (unseen or self.watch.both_live)
 
     def shares_server_with(self, other: Line) -> bool:
         """Whether both, which belong to two nodes, mean the same action."""
@@ -470,7 +475,8 @@ class Line:
             saw_it = self.traffic.made_at + TOO_NEW < ticket.begun_at
             if ticket.traffic is not self.traffic and not saw_it:
                 first = ticket.not_gone_before == NEVER  # a later node need only have discovered
-                ticket.not_gone_before = time.monotonic() + (LEASE if first else TOO_NEW)
+                until = time.monotonic() + (LEASE if first else TOO_NEW)
+                ticket.not_gone_before = max(ticket.not_gone_before, until)
             ticket.line, ticket.traffic = self, self.traffic
             ticket.testimony.taken_over()
             self.goals[ticket.goal.id] = ticket

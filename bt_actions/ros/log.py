@@ -1,7 +1,8 @@
-"""The log of what becomes of goals, written by a thread of its own.
+"""The log of goals, runs and trees, written by a thread of its own.
 
 Most of it is told under the one lock. Whoever reads standard error may stop to read: then the log
-waits, and nothing else does. Decides nothing and keeps nothing that was written.
+waits, and nothing else does; rclpy's own loggers would hold up the whole process, so nobody else
+in a tree's process calls them. Decides nothing and keeps nothing that was written.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import queue
 import select
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 import rclpy.logging
 
@@ -22,9 +25,17 @@ LINGER = 5.0
 AT_EXIT = 1.0
 """Seconds that a process which ends gives the log to be written."""
 LONGEST = 3000
-"""Characters of a line; a pipe that has room at all has room for 4,096 bytes."""
+"""Bytes of a line; a pipe that has room at all has room for 4,096."""
 STDERR = 2
 THREAD = "bt_actions-log"
+WRITE: dict[str, Callable[[Any, str], object]] = {
+    "debug": lambda logger, text: logger.debug(text),
+    "info": lambda logger, text: logger.info(text),
+    "warn": lambda logger, text: logger.warning(text),
+    "error": lambda logger, text: logger.error(text),
+    "fatal": lambda logger, text: logger.fatal(text),
+}
+"""How a line of each level is written. rclpy keeps to one level for each line of code that logs."""
 
 
 class Log:
@@ -32,7 +43,7 @@ class Log:
 
     def __init__(self, name: str) -> None:
         self._logger = rclpy.logging.get_logger(name)
-        self._lines: queue.Queue[tuple[str, str]] = queue.Queue()
+        self._lines: queue.Queue[tuple[Any, str, str]] = queue.Queue()
         self._guard = threading.Lock()
         self._thread: threading.Thread | None = None
         self._dropped = 0
@@ -44,11 +55,15 @@ class Log:
 
     def warning(self, text: str) -> None:
         """Log something that may need attention."""
-        self._put("warning", text)
+        self._put("warn", text)
 
     def error(self, text: str) -> None:
         """Log something that needs attention."""
         self._put("error", text)
+
+    def by(self, logger: Any, level: str, text: str) -> None:
+        """Log a line by another of rclpy's loggers; `level` is one of `WRITE`."""
+        self._put(level, text, logger)
 
     def flush(self, seconds: float = AT_EXIT) -> None:
         """Wait until all has been written, but not for long."""
@@ -56,15 +71,16 @@ class Log:
         while self._lines.unfinished_tasks and time.monotonic() < end:
             time.sleep(0.001)
 
-    def _put(self, level: str, text: str) -> None:
+    def _put(self, level: str, text: str, logger: Any = None) -> None:
         with self._guard:
             if self._lines.qsize() >= MOST:
                 self._dropped += 1
                 return
             if self._dropped:
-                self._lines.put(("warning", f"{self._dropped} lines were not logged"))
+                self._lines.put((None, "warn", f"{self._dropped} lines were not logged"))
                 self._dropped = 0
-            self._lines.put((level, text[:LONGEST]))
+            short = text.encode(errors="replace")[:LONGEST].decode(errors="ignore")
+            self._lines.put((logger, level, short))
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._write, name=THREAD, daemon=True)
                 try:
@@ -76,7 +92,7 @@ class Log:
     def _write(self) -> None:
         while True:
             try:
-                level, text = self._lines.get(timeout=LINGER)
+                logger, level, text = self._lines.get(timeout=LINGER)
             except queue.Empty:
                 with self._guard:
                     if self._lines.empty():
@@ -84,20 +100,16 @@ class Log:
                         return
                 continue
             self._room(None)
-            self._say(level, text)
+            self._say(logger, level, text)
 
     def _write_here(self) -> None:
         with contextlib.suppress(queue.Empty):
             while self._room(0):
                 self._say(*self._lines.get_nowait())
 
-    def _say(self, level: str, text: str) -> None:
-        if level == "info":
-            self._logger.info(text)
-        elif level == "warning":
-            self._logger.warning(text)
-        else:
-            self._logger.error(text)
+    def _say(self, logger: Any, level: str, text: str) -> None:
+        with contextlib.suppress(Exception):  # of a logger whose node is gone
+            WRITE[level](self._logger if logger is None else logger, text)
         self._lines.task_done()
 
     def _room(self, patience: int | None) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 import py_trees
 import pytest
 from py_trees.common import Status
+from rclpy.executors import SingleThreadedExecutor
 
 from bt_actions import MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.behaviours import action
@@ -55,6 +56,45 @@ def test_a_tick_begins_one_more_attempt_at_most(node: Any, name: str) -> None:
     assert len(second.history) == 3
     for leaf in (first, second):
         leaf.shutdown()
+
+
+def test_a_visit_whose_first_tick_breaks_off_is_interrupted_by_the_next(
+    host: Any, node: Any, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C in a notebook, which ticks on: no status is set yet, and nobody stops the leaf."""
+    journal = host.open(name)
+    leaf = MoveRobot("m", 3.0, action_name=name)
+    leaf.setup(node=node)
+    traffic = leaf._traffic
+    assert traffic is not None
+    until(lambda: leaf._line is not None and leaf._line.client.server_is_ready())
+    advance = traffic.advance
+
+    def interrupted(ticket: Any, make: Any) -> None:
+        advance(ticket, make)
+        if ticket.goal.sent:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(traffic, "advance", interrupted)
+
+    def first_ticks() -> None:
+        while True:
+            leaf.tick_once()
+            leaf.status = Status.INVALID
+
+    with pytest.raises(KeyboardInterrupt):
+        first_ticks()
+    monkeypatch.undo()
+    leaf.goal = {"distance": 0.1}
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    while leaf.status is not Status.SUCCESS:
+        executor.spin_once()
+        leaf.tick_once()
+    executor.remove_node(node)
+    assert journal.ends() == ["canceled", "succeeded"]
+    leaf.shutdown()
+    host.close_server(name)
 
 
 def test_a_name_of_the_nodes_own(node: Any) -> None:

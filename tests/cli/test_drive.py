@@ -148,7 +148,8 @@ def test_a_goal_whose_end_is_unknown_wins_over_every_other_code(story: Story) ->
 def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
     story: Story,
 ) -> None:
-    run = Run(FakeRunner(waits=True, never_drains=True))
+    older = GoalReport("Move", "/move_robot", "0123456789abcdef", Outcome.STALLED, "silent")
+    run = Run(FakeRunner(waits=True, never_drains=True, unaccounted=[older]))
     run.runner.before = executing(run, story)
     stop = threading.Event()
 
@@ -165,9 +166,10 @@ def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
         impatient.join()
     run.runner.released.set()
     assert (ended.code, ended.abandoned) == (Exit.UNKNOWN, True)
-    assert run.out.getvalue().splitlines()[-1] == (
-        "not accounted for: Move on move_robot, executing when left"
-    )
+    assert run.out.getvalue().splitlines()[-2:] == [
+        "not accounted for: Move on /move_robot, goal 0123456789abcdef: silent",
+        "not accounted for: Move on move_robot, goal Move-1-1, executing when left",
+    ]
     assert "  CANCELED, end UNKNOWN  " in run.out.getvalue()
 
 

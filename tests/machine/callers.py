@@ -417,7 +417,9 @@ class Caller:
             if other is line or other.action != line.action:
                 continue
             for ticket in list(other.tickets.values()):
-                if ticket.goal.lost and ticket.testimony.sent_to & line.watch.gids:
+                sent_to = ticket.testimony.sent_to
+                more = not sent_to & other.watch.gids or line.watch.both_live
+                if ticket.goal.lost and sent_to & line.watch.gids and more:
                     del other.tickets[ticket.goal.id]
                     ticket.line = line
                     ticket.testimony.taken_over()
