@@ -918,6 +918,41 @@ with TreeRunner(root) as runner:
         host.cancel_all(name)
         host.close_server(name)
 
+    @pytest.mark.parametrize("executor", ["single", "multi"])
+    def test_a_callback_that_does_not_return_is_told_of(
+        self, executor: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of a node that was added to the runner's executor; shutdown() waits for it."""
+        from rclpy.node import Node
+
+        from bt_actions.ros.log import log
+
+        entered, goes_on, told = threading.Event(), threading.Event(), threading.Event()
+
+        class Written:
+            def warning(self, text: str) -> None:
+                if "has not returned" in text:
+                    told.set()
+
+        def blocks() -> None:
+            entered.set()
+            goes_on.wait(60.0)
+
+        monkeypatch.setattr(log, "_logger", Written())
+        runner = TreeRunner(Gate(), executor=executor)
+        guest = Node("guest", context=runner.node.context)
+        guest.create_timer(0.01, blocks)
+        runner.executor.add_node(guest)
+        runner.on_close(guest.destroy_node)
+        runner.start()
+        assert entered.wait(20.0)
+        closing = threading.Thread(target=runner.shutdown)
+        closing.start()
+        assert told.wait(20.0)
+        assert closing.is_alive()
+        goes_on.set()
+        closing.join()
+
 
 class TestLastMoments:
     def test_what_becomes_known_at_the_end_of_a_run_is_reported(

@@ -13,7 +13,7 @@ import itertools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rclpy.context import Context
@@ -26,6 +26,7 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 
+from bt_actions.ros.log import log
 from bt_actions.ros.traffic import Traffic
 
 THREADS = 2
@@ -156,6 +157,18 @@ class Spinner:
             if not self._stopping:
                 self._died(error)
 
+    def _await(self, threads: Iterable[threading.Thread]) -> None:
+        """Wait for threads that run callbacks, and tell it where one takes long to return."""
+        until = time.monotonic() + PATIENCE
+        for thread in list(threads):
+            thread.join(max(0.0, until - time.monotonic()))
+            if thread.is_alive():
+                log.warning(
+                    f"shutdown waits for a callback that {self.node.get_fully_qualified_name()}'s "
+                    "executor is in, of a node that was added to it: it has not returned yet"
+                )
+                return
+
     def stop(self, before_nodes: Callable[[], None]) -> None:
         """Shut down what is ours, in the clean order; goals must be drained before.
 
@@ -166,10 +179,12 @@ class Spinner:
             if self._thread is not None:
                 with contextlib.suppress(Exception):  # of a guard whose context is gone
                     self.executor.create_task(_nothing)  # so that spin_once returns
-                self._thread.join(PATIENCE)
+                self._await([self._thread])
             pool: Any = getattr(self.executor, "_executor", None)
             if self._own_executor:
                 if pool is not None and not self._spinning():
+                    pool.shutdown(wait=False)
+                    self._await(pool._threads)  # noqa: SLF001
                     pool.shutdown(wait=True)  # what it still runs needs the executor's guard
                 self.executor.shutdown()
             if self._thread is not None:
