@@ -483,6 +483,7 @@ class TreeRunner:
             message = node.feedback_message
             self._emit(NodeChanged(time.monotonic(), path_of(node), node, changed, message))
         self._tickets = {ticket for ticket in self._tickets if not ticket.accounted_for}
+        _flush_log()  # who tells of the end tells it last
         self._emit(TreeFinished(time.monotonic(), status))
 
     def _hurry(self) -> bool:
@@ -588,6 +589,12 @@ def _error(message: str) -> None:
     from bt_actions.ros.log import log
 
     log.error(message)
+
+
+def _flush_log() -> None:
+    from bt_actions.ros.log import log
+
+    log.flush()
 
 
 def _traffic_of(node: Any) -> Any:
