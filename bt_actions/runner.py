@@ -235,12 +235,13 @@ class TreeRunner:
             self._release()
 
     def _release(self) -> None:
+        from bt_actions.ros.shared import lock
+
         self._stop_wanted = self._abandoned = False
-        self._runs_on = None
-        # What the run left, and what has become known to be left since it last looked.
-        self._tickets |= {
-            each.ticket for each in list(self._changes) if self._has_left(each.ticket)
-        }
+        with lock:  # under which _note() is called
+            self._runs_on = None
+            late = {change.ticket for change in self._changes}  # since the run last looked
+            self._tickets |= {ticket for ticket in late if self._has_left(ticket)}
         _runs.discard(self)
         self._running.release()
 

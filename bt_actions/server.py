@@ -54,6 +54,7 @@ class ServerWatch:
         self._sent: dict[int, float] = {}  # probe: when it was sent
         self._answers: dict[int, tuple[int, float]] = {}  # probe: answers, time of the first
         self._both_answered = False
+        self._most_answers = 0
 
     def observe(self, now: float, ready: bool, gids: frozenset[GID]) -> None:
         """Take what discovery shows at `now` (seconds, steady clock)."""
@@ -64,6 +65,7 @@ class ServerWatch:
         self._ready = ready
         if gids != self.gids:
             self._both_answered = self.alone = False
+            self._most_answers = 0
             self._answers.clear()
             self._crowded_since = now if len(gids) > 1 else None
             self.gids = gids
@@ -99,18 +101,24 @@ class ServerWatch:
         if len(self._answers) > PROBES_KEPT:
             del self._answers[next(iter(self._answers))]
         if count + 1 > 1:
-            self.two_answered()
+            self.two_answered(count + 1)
 
-    def two_answered(self) -> None:
-        """Take note that two have answered one question, a probe or another."""
+    def two_answered(self, answers: int = 2) -> None:
+        """Take note that two, or more, have answered one question, a probe or another."""
         if self._crowded_since is not None:
             self._both_answered = True
+            self._most_answers = max(self._most_answers, answers)
             self.alone = False
 
     @property
     def both_live(self) -> bool:
         """Whether two of those that are shown have answered one question."""
         return self._both_answered
+
+    @property
+    def all_live(self) -> bool:
+        """Whether so many have answered one question as are shown, and more than one are."""
+        return self._both_answered and self._most_answers >= len(self.gids)
 
     def state(self, now: float) -> Server:
         """Return what answers under the name, as far as is known at `now`."""

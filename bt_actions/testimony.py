@@ -174,8 +174,9 @@ class Testimony:
         one_left = bool(self._crowd - watch.gids)
         self._crowd = watch.gids if _is_crowded(watch) else frozenset()
         if goal.lost:
-            alive = watch.both_live or not watch.changed(self.sent_to)  # and no ghost, after all
-            if returned or (not gone and alive and goal.end is not End.UNKNOWN):
+            no_ghost = watch.all_live or not watch.changed(self.sent_to)
+            is_there = not gone and no_ghost and watch.state(now) is not Server.ABSENT
+            if returned or (is_there and goal.end is not End.UNKNOWN):
                 self._forget(now)
                 return [(Event.SERVER_RETURNED, None)]
             if gone and goal.end is End.UNKNOWN:  # it was left, not lost

@@ -227,6 +227,9 @@ def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
     assert said.looked(watch, now) == [], "it is still taken for one"
     if how == "both answer":
         watch.probe_answered(now, 1)
+        watch.observe(now, False, BOTH)
+        assert said.looked(watch, now) == [], "it cannot be talked to"
+        watch.observe(now, True, BOTH)
     else:
         watch.observe(now, True, frozenset({ONE}))
     assert events(said.looked(watch, now)) == [Event.SERVER_RETURNED]

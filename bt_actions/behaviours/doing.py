@@ -54,6 +54,8 @@ class Log(Behaviour):
 
     def __init__(self, name: str, text: Callable[[], object], level: str = "info") -> None:
         super().__init__(name)
+        if level not in LEVELS:
+            raise ValueError(f"level must be one of {', '.join(LEVELS)}, not {level!r}")
         self._text = text
         self._level = level
         self._logger: Any = None
@@ -76,10 +78,3 @@ class Log(Behaviour):
 
             log.by(self._logger, self._level, line)
         return Status.SUCCESS
-
-    def shutdown(self) -> None:
-        """See that the lines are written before the node, which publishes them, is destroyed."""
-        if self._logger is not None:
-            from bt_actions.ros.log import log
-
-            log.flush()

@@ -433,7 +433,7 @@ class Line:
         with lock:
             return [ticket for ticket in self.goals.values() if ticket.owner is owner]
 
-    def _take_over(self) -> None:
+    def _take_over(self, now: float) -> None:
         """Take lost goals of other nodes whose server is in sight here: it is to cancel them first.
 
         Each node discovers for itself; theirs may see the server later, or in part, or never again.
@@ -442,17 +442,22 @@ class Line:
             if not isinstance(line, Line) or line is self or not line.shares_server_with(self):
                 continue
             for ticket in list(line.goals.values()):
-                if ticket.goal.lost and self._sees_more_than(line, ticket.testimony.sent_to):
+                if ticket.goal.lost and self._sees_more_than(line, ticket.testimony.sent_to, now):
                     ticket.line = self
                     ticket.testimony.taken_over()
                     self.goals[ticket.goal.id] = ticket
                     line.close_book(ticket)
                     alarm.mind(self)
 
-    def _sees_more_than(self, line: Line, servers: frozenset[bytes]) -> bool:
-        """Whether one of `servers` is shown here that `line` does not see, or takes for a ghost."""
-        unseen = line.orphaned or not servers & line.watch.gids
-        return bool(servers & self.watch.gids) and (unseen or self.watch.both_live)
+    def _sees_more_than(self, line: Line, servers: frozenset[bytes], now: float) -> bool:
+        """Whether one of `servers` is here that has gone for `line`, or that it takes for a ghost.
+
+        What both see is left where it is: a ghost would be handed to and fro.
+        """
+        if not servers & self.watch.gids or self.watch.state(now) is Server.ABSENT:
+            return False
+        ghost_there = self.watch.all_live and not line.watch.all_live
+        return line.orphaned or line.watch.gone(now, servers) or ghost_there
 
     def shares_server_with(self, other: Line) -> bool:
         """Whether both, which belong to two nodes, mean the same action."""
@@ -514,7 +519,7 @@ class Line:
             self._come_home()
             return Server.ABSENT
         self._adopt()
-        self._take_over()
+        self._take_over(now)
         if self.watch.wants_probe(now):
             self._probe()
         for ticket in list(self.goals.values()):

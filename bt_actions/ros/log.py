@@ -1,8 +1,9 @@
 """The log of goals, runs and trees, written by a thread of its own.
 
 Most of it is told under the one lock. Whoever reads standard error may stop to read: then the log
-waits, and nothing else does; rclpy's own loggers would hold up the whole process, so nobody else
-in a tree's process calls them. Decides nothing and keeps nothing that was written.
+waits, and nothing else does; rclpy's own loggers would hold up the whole process, so no other part
+of this package calls them, but for the simulation, which has no real robot behind it. Decides
+nothing and keeps nothing that was written.
 """
 
 from __future__ import annotations
@@ -19,7 +20,10 @@ from typing import Any
 import rclpy.logging
 
 MOST = 1000
-"""Lines that wait to be written; of a reader that has stopped, newer ones are only counted."""
+"""Lines that wait to be written; of a reader that has stopped, newer ones are only counted.
+Half of them is for what is said of goals."""
+PACE = 0.01
+"""Seconds that who logs faster than it is written waits for the next line to be."""
 LINGER = 5.0
 """Seconds without a line until the thread ends."""
 AT_EXIT = 1.0
@@ -47,6 +51,9 @@ class Log:
         self._guard = threading.Lock()
         self._thread: threading.Thread | None = None
         self._dropped = 0
+        self._taken = 0
+        self._written = 0
+        self._stuck_at = -1  # lines written when somebody last waited in vain
         atexit.register(self.flush)
 
     def info(self, text: str) -> None:
@@ -62,25 +69,40 @@ class Log:
         self._put("error", text)
 
     def by(self, logger: Any, level: str, text: str) -> None:
-        """Log a line by another of rclpy's loggers; `level` is one of `WRITE`."""
-        self._put(level, text, logger)
+        """Log a line of a tree by another of rclpy's loggers; `level` is one of `WRITE`.
+
+        In a loop it keeps the pace of who reads, as long as somebody does.
+        """
+        while self._lines.qsize() >= MOST // 2 and self._wait_for(self._written + 1, PACE):
+            pass
+        self._put(level, text, logger, MOST // 2)
 
     def flush(self, seconds: float = AT_EXIT) -> None:
-        """Wait until all has been written, but not for long."""
-        end = time.monotonic() + seconds
-        while self._lines.unfinished_tasks and time.monotonic() < end:
-            time.sleep(0.001)
+        """Wait until all that was said by now has been written, but not for long."""
+        self._wait_for(self._taken, seconds)
 
-    def _put(self, level: str, text: str, logger: Any = None) -> None:
+    def _wait_for(self, line: int, seconds: float) -> bool:
+        """Wait until so many lines were written; not where that was in vain, and nothing was since.
+
+        Returns whether they were.
+        """
+        end = time.monotonic() + seconds
+        while self._written < line:
+            if self._written == self._stuck_at:
+                return False
+            if time.monotonic() >= end:
+                self._stuck_at = self._written
+                return False
+            time.sleep(0.001)
+        return True
+
+    def _put(self, level: str, text: str, logger: Any = None, most: int = MOST) -> None:
         with self._guard:
-            if self._lines.qsize() >= MOST:
+            if self._lines.qsize() >= most:
                 self._dropped += 1
                 return
-            if self._dropped:
-                self._lines.put((None, "warn", f"{self._dropped} lines were not logged"))
-                self._dropped = 0
-            short = text.encode(errors="replace")[:LONGEST].decode(errors="ignore")
-            self._lines.put((logger, level, short))
+            self._tell_dropped()
+            self._take(logger, level, _cut(text))
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._write, name=THREAD, daemon=True)
                 try:
@@ -88,6 +110,15 @@ class Log:
                 except RuntimeError:  # there are too many, or the process ends (Python 3.12.1)
                     self._thread = None
                     self._write_here()
+
+    def _take(self, logger: Any, level: str, text: str) -> None:
+        self._taken += 1
+        self._lines.put((logger, level, text))
+
+    def _tell_dropped(self) -> None:
+        if self._dropped:
+            self._take(None, "warn", f"{self._dropped} lines were not logged")
+            self._dropped = 0
 
     def _write(self) -> None:
         while True:
@@ -101,6 +132,9 @@ class Log:
                 continue
             self._room(None)
             self._say(logger, level, text)
+            with self._guard:
+                if self._lines.empty():
+                    self._tell_dropped()
 
     def _write_here(self) -> None:
         with contextlib.suppress(queue.Empty):
@@ -110,7 +144,7 @@ class Log:
     def _say(self, logger: Any, level: str, text: str) -> None:
         with contextlib.suppress(Exception):  # of a logger whose node is gone
             WRITE[level](self._logger if logger is None else logger, text)
-        self._lines.task_done()
+        self._written += 1
 
     def _room(self, patience: int | None) -> bool:
         """Wait until standard error takes a line: rclpy writes with the interpreter's lock held."""
@@ -120,6 +154,13 @@ class Log:
             return bool(poll.poll(patience))
         except OSError:
             return True
+
+
+def _cut(text: str) -> str:
+    whole = text.encode(errors="replace")
+    if len(whole) <= LONGEST:
+        return whole.decode()
+    return whole[: LONGEST - 3].decode(errors="ignore") + "..."
 
 
 log = Log("bt_actions")

@@ -418,8 +418,11 @@ class Caller:
                 continue
             for ticket in list(other.tickets.values()):
                 sent_to = ticket.testimony.sent_to
-                more = not sent_to & other.watch.gids or line.watch.both_live
-                if ticket.goal.lost and sent_to & line.watch.gids and more:
+                now = self.world.now.steady
+                there = sent_to & line.watch.gids and line.watch.state(now) is not Server.ABSENT
+                ghost_there = line.watch.all_live and not other.watch.all_live
+                more = other.watch.gone(now, sent_to) or ghost_there
+                if ticket.goal.lost and there and more:
                     del other.tickets[ticket.goal.id]
                     ticket.line = line
                     ticket.testimony.taken_over()

@@ -39,7 +39,7 @@ def test_no_history_breaks_a_rule() -> None:
 
 
 MISTAKES: dict[str, tuple[type, str, Callable[..., Any]]] = {
-    "takes over nothing that another node lost": (Line, "_take_over", lambda self: None),
+    "takes over nothing that another node lost": (Line, "_take_over", lambda self, now: None),
     "adopts nothing that was left": (Line, "_adopt", lambda self: None),
     "knows of nothing in the way": (Traffic, "_in_the_way_of", lambda self, ticket: False),
     "takes preemption for a failure": (Line, "_rival_sent", lambda self, ticket: False),

@@ -20,11 +20,12 @@ from bt_actions.server import ServerWatch
 OURS, NEW = b"ours", b"new"
 
 
-def watch(*shown: bytes, both_answered: bool = False) -> ServerWatch:
+def watch(*shown: bytes, answers: int = 0, ready: bool = True) -> ServerWatch:
     seen = ServerWatch()
-    seen.observe(0.0, True, frozenset(shown))
-    if both_answered:
-        seen.two_answered()
+    for now in (0.0, 2.0):
+        seen.observe(now, ready, frozenset(shown))
+    if answers > 1:
+        seen.two_answered(answers)
     return seen
 
 
@@ -34,17 +35,29 @@ def watch(*shown: bytes, both_answered: bool = False) -> ServerWatch:
         (watch(OURS), watch(), False, True),
         (watch(), watch(), False, False),
         (watch(OURS, NEW), watch(OURS, NEW), False, False),  # lost there: it is taken for a ghost
-        (watch(OURS, NEW, both_answered=True), watch(OURS, NEW), False, True),
+        (watch(OURS, NEW, answers=2), watch(OURS, NEW), False, True),
+        (watch(OURS, NEW, b"newer", answers=2), watch(OURS, NEW, b"newer"), False, False),
+        (watch(OURS), watch(OURS, ready=False), False, True),
+        (watch(OURS, ready=False), watch(), False, False),
         (watch(OURS), watch(OURS), True, True),  # whose node is gone sees nothing any more
     ],
-    ids=["seen here only", "not seen", "a ghost", "no ghost", "orphaned"],
+    ids=[
+        "seen here only",
+        "not seen",
+        "a ghost",
+        "no ghost",
+        "a ghost beside two",
+        "not ready there",
+        "not ready here",
+        "orphaned",
+    ],
 )
 def test_a_lost_goal_goes_to_who_sees_more_of_its_server(
     here: ServerWatch, there: ServerWatch, orphaned: bool, taken: bool
 ) -> None:
     line: Any = SimpleNamespace(watch=here)
     other: Any = SimpleNamespace(watch=there, orphaned=orphaned)
-    assert Line._sees_more_than(line, other, frozenset({OURS})) is taken
+    assert Line._sees_more_than(line, other, frozenset({OURS}), 2.0) is taken
 
 
 def test_a_goal_that_was_left_is_waited_for_as_long_whoever_adopts_it(

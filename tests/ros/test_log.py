@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from bt_actions.ros.log import LONGEST, Log
+from bt_actions.ros.log import LONGEST, MOST, Log
+from tests.support.waiting import until
 
 
 class Written:
@@ -25,7 +26,48 @@ def test_a_line_fits_into_a_pipe_that_has_room(monkeypatch: pytest.MonkeyPatch) 
     log.error("\N{CYRILLIC SMALL LETTER ZHE}" * LONGEST)
     log.flush(10.0)
     (line,) = written.lines
-    assert len(line.removeprefix("error: ").encode()) == LONGEST
+    assert LONGEST - 1 <= len(line.removeprefix("error: ").encode()) <= LONGEST
+    assert line.endswith("...")
+
+
+def test_a_tree_that_logs_in_a_loop_loses_nothing_while_somebody_reads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, written = Log("test"), Written()
+    monkeypatch.setattr(log, "_logger", written)
+    for number in range(3 * MOST):
+        log.by(written, "info", str(number))
+    log.error("of a goal")
+    log.flush(10.0)
+    assert written.lines == [*(f"info: {number}" for number in range(3 * MOST)), "error: of a goal"]
+
+
+def test_where_nobody_reads_a_tree_leaves_room_for_goals_and_what_was_dropped_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, written, reads = Log("test"), Written(), threading.Event()
+    monkeypatch.setattr(log, "_logger", written)
+    monkeypatch.setattr(log, "_room", lambda _: reads.wait(60.0))
+    for number in range(2 * MOST):
+        log.by(written, "info", str(number))
+    log.error("of a goal")
+    log.flush(0.1)
+    assert not log._wait_for(log._taken, 60.0), "it was waited for in vain already"
+    reads.set()
+    until(lambda: written.lines and written.lines[-1] == "error: of a goal")
+    told = next(line for line in written.lines if "were not logged" in line)
+    number = int(told.removeprefix("warning: ").split()[0])
+    assert len(written.lines) - 2 + number == 2 * MOST
+
+
+def test_what_was_dropped_last_is_told_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, written, reads = Log("test"), Written(), threading.Event()
+    monkeypatch.setattr(log, "_logger", written)
+    monkeypatch.setattr(log, "_room", lambda _: reads.wait(60.0))
+    for number in range(2 * MOST):
+        log.info(str(number))
+    reads.set()
+    until(lambda: written.lines and "were not logged" in written.lines[-1])
 
 
 def test_a_logger_of_a_node_that_is_gone_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -55,4 +97,4 @@ def test_where_no_thread_can_be_started_the_line_is_written_at_once(
     monkeypatch.undo()
     assert written.lines == ["error: a goal is not accounted for", "info: and on"]
     log.flush(0.0)
-    assert not log._lines.unfinished_tasks
+    assert log._written == log._taken
