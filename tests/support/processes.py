@@ -220,6 +220,16 @@ class Host(Process):
         """Close a server or a robot, gracefully."""
         self.order("close", name=name)
 
+    def freeze(self) -> None:
+        """Have it answer nothing, as a server that is too busy; its middleware still listens."""
+        self.order("freeze")
+
+    def thaw(self) -> float:
+        """Have it go on, with all that came meanwhile; return when."""
+        moment = time.monotonic()
+        self.order("thaw")
+        return moment
+
     def cancel_all(self, name: str) -> None:
         """Cancel all goals of `name`, as another client."""
         self.order("cancel_all", name=name)

@@ -77,6 +77,9 @@ class Serving:
         """Serve it no more."""
         self.servers.pop(name).close()
 
+    def thaw(self) -> None:
+        """Go on, after `freeze`."""
+
     def cancel_all(self, name: str) -> None:
         """Ask the server `name`, as an operator does, to cancel all its goals."""
         from action_msgs.srv import CancelGoal
@@ -112,6 +115,10 @@ def main() -> None:
                 what = order.pop("order")
                 if what == "end":
                     return
+                if what == "freeze":
+                    print(json.dumps({"done": what}), flush=True)
+                    order = orders.get()  # "thaw", and nothing is taken or answered until then
+                    what = order.pop("order")
                 try:
                     getattr(serving, what)(**order)
                     answer = {"done": what}
