@@ -137,8 +137,8 @@ def add_no_python(parser: argparse.ArgumentParser) -> None:
         "--no-python",
         dest="python",
         action="store_false",
-        help="refuse a tree with python: nodes, and import nothing for it; for trees that are not "
-        "trusted",
+        help="refuse a tree with python: nodes, and import no class for it; for trees that are "
+        "not trusted",
     )
 
 
