@@ -238,12 +238,14 @@ class TreeRunner:
         from bt_actions.ros.shared import lock
 
         self._stop_wanted = self._abandoned = False
-        with lock:  # under which _note() is called
-            self._runs_on = None
-            late = {change.ticket for change in self._changes}  # since the run last looked
-            self._tickets |= {ticket for ticket in late if self._has_left(ticket)}
-        _runs.discard(self)
-        self._running.release()
+        try:
+            with lock:  # under which _note() is called
+                self._runs_on = None
+                late = {change.ticket for change in list(self._changes)}  # since it last looked
+                self._tickets |= {ticket for ticket in late if self._has_left(ticket)}
+        finally:
+            _runs.discard(self)
+            self._running.release()
 
     def wait(self, timeout: float | None = None) -> Status:
         """Wait for a tree that was started, and return or raise what `run` would.

@@ -115,10 +115,14 @@ class ServerWatch:
         """Whether two of those that are shown have answered one question."""
         return self._both_answered
 
-    @property
-    def all_live(self) -> bool:
-        """Whether so many have answered one question as are shown, and more than one are."""
-        return self._both_answered and self._most_answers >= len(self.gids)
+    def all_live(self, now: float) -> bool:
+        """Whether all that are shown live, and more than one are: so many answered one question.
+
+        Or two did, and no ghost is left by now.
+        """
+        if not self._both_answered or self._crowded_since is None:
+            return False
+        return self._most_answers >= len(self.gids) or now - self._crowded_since > LEASE
 
     def state(self, now: float) -> Server:
         """Return what answers under the name, as far as is known at `now`."""

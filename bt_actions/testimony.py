@@ -174,7 +174,7 @@ class Testimony:
         one_left = bool(self._crowd - watch.gids)
         self._crowd = watch.gids if _is_crowded(watch) else frozenset()
         if goal.lost:
-            no_ghost = watch.all_live or not watch.changed(self.sent_to)
+            no_ghost = watch.all_live(now) or not watch.changed(self.sent_to)
             is_there = not gone and no_ghost and watch.state(now) is not Server.ABSENT
             if returned or (is_there and goal.end is not End.UNKNOWN):
                 self._forget(now)

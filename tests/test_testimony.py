@@ -8,7 +8,7 @@ from bt_actions import testimony
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import Event, Now
 from bt_actions.policy import Timeouts
-from bt_actions.server import SETTLED_AFTER, SLOWEST_START, ServerWatch
+from bt_actions.server import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER = b"one", b"other"
 BOTH = frozenset({ONE, OTHER})
@@ -212,7 +212,7 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
 
 
-@pytest.mark.parametrize("how", ["both answer", "the other has gone"])
+@pytest.mark.parametrize("how", ["both answer", "two of three, and no ghost", "the other has gone"])
 def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
     said: testimony.Testimony, watch: ServerWatch, how: str
 ) -> None:
@@ -230,6 +230,11 @@ def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
         watch.observe(now, False, BOTH)
         assert said.looked(watch, now) == [], "it cannot be talked to"
         watch.observe(now, True, BOTH)
+    elif how == "two of three, and no ghost":
+        watch.observe(now, True, BOTH | {b"third"})
+        watch.two_answered()
+        assert said.looked(watch, now) == [], "these may be the other two"
+        now += LEASE + 1.0
     else:
         watch.observe(now, True, frozenset({ONE}))
     assert events(said.looked(watch, now)) == [Event.SERVER_RETURNED]

@@ -456,7 +456,7 @@ class Line:
         """
         if not servers & self.watch.gids or self.watch.state(now) is Server.ABSENT:
             return False
-        ghost_there = self.watch.all_live and not line.watch.all_live
+        ghost_there = self.watch.all_live(now) and not line.watch.all_live(now)
         return line.orphaned or line.watch.gone(now, servers) or ghost_there
 
     def shares_server_with(self, other: Line) -> bool:

@@ -22,8 +22,8 @@ import rclpy.logging
 MOST = 1000
 """Lines that wait to be written; of a reader that has stopped, newer ones are only counted.
 Half of them is for what is said of goals."""
-PACE = 0.01
-"""Seconds that who logs faster than it is written waits for the next line to be."""
+PACE = 0.1
+"""Seconds, at most, that a tree which logs faster than it is written waits for room."""
 LINGER = 5.0
 """Seconds without a line until the thread ends."""
 AT_EXIT = 1.0
@@ -43,7 +43,7 @@ WRITE: dict[str, Callable[[Any, str], object]] = {
 
 
 class Log:
-    """Takes lines from any thread; never waits and never raises."""
+    """Takes lines from any thread; never raises and, but for `by` and `flush`, never waits."""
 
     def __init__(self, name: str) -> None:
         self._logger = rclpy.logging.get_logger(name)
@@ -53,7 +53,8 @@ class Log:
         self._dropped = 0
         self._taken = 0
         self._written = 0
-        self._stuck_at = -1  # lines written when somebody last waited in vain
+        self._slow_at = -1  # lines written when `by` last waited in vain
+        self._stuck_at = -1  # and `flush`
         atexit.register(self.flush)
 
     def info(self, text: str) -> None:
@@ -71,27 +72,26 @@ class Log:
     def by(self, logger: Any, level: str, text: str) -> None:
         """Log a line of a tree by another of rclpy's loggers; `level` is one of `WRITE`.
 
-        In a loop it keeps the pace of who reads, as long as somebody does.
+        In a loop it keeps the pace of who reads, as long as somebody does; else it is dropped.
         """
-        while self._lines.qsize() >= MOST // 2 and self._wait_for(self._written + 1, PACE):
-            pass
+        room_at = self._taken - MOST // 2 + 1
+        if self._written != self._slow_at and not self._wait_for(room_at, PACE):
+            self._slow_at = self._written
         self._put(level, text, logger, MOST // 2)
 
     def flush(self, seconds: float = AT_EXIT) -> None:
-        """Wait until all that was said by now has been written, but not for long."""
-        self._wait_for(self._taken, seconds)
+        """Wait until all that was said by now has been written, but not for long.
 
-    def _wait_for(self, line: int, seconds: float) -> bool:
-        """Wait until so many lines were written; not where that was in vain, and nothing was since.
-
-        Returns whether they were.
+        Where that was in vain, not again before something has been written.
         """
+        if self._written != self._stuck_at and not self._wait_for(self._taken, seconds):
+            self._stuck_at = self._written
+
+    def _wait_for(self, lines: int, seconds: float) -> bool:
+        """Wait until so many lines have been written; return whether they were in time."""
         end = time.monotonic() + seconds
-        while self._written < line:
-            if self._written == self._stuck_at:
-                return False
+        while self._written < lines:
             if time.monotonic() >= end:
-                self._stuck_at = self._written
                 return False
             time.sleep(0.001)
         return True

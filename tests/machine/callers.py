@@ -420,7 +420,7 @@ class Caller:
                 sent_to = ticket.testimony.sent_to
                 now = self.world.now.steady
                 there = sent_to & line.watch.gids and line.watch.state(now) is not Server.ABSENT
-                ghost_there = line.watch.all_live and not other.watch.all_live
+                ghost_there = line.watch.all_live(now) and not other.watch.all_live(now)
                 more = other.watch.gone(now, sent_to) or ghost_there
                 if ticket.goal.lost and there and more:
                     del other.tickets[ticket.goal.id]

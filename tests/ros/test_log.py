@@ -52,12 +52,28 @@ def test_where_nobody_reads_a_tree_leaves_room_for_goals_and_what_was_dropped_is
         log.by(written, "info", str(number))
     log.error("of a goal")
     log.flush(0.1)
-    assert not log._wait_for(log._taken, 60.0), "it was waited for in vain already"
+    log.flush(60.0)  # it was waited for in vain already
     reads.set()
     until(lambda: written.lines and written.lines[-1] == "error: of a goal")
     told = next(line for line in written.lines if "were not logged" in line)
     number = int(told.removeprefix("warning: ").split()[0])
     assert len(written.lines) - 2 + number == 2 * MOST
+
+
+def test_a_reader_that_falters_is_waited_for_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tree that logs has given up by then; what is said of goals at the end has not."""
+    log, written, reads = Log("test"), Written(), threading.Event()
+    monkeypatch.setattr(log, "_logger", written)
+    monkeypatch.setattr(log, "_room", lambda _: reads.wait(60.0))
+    for number in range(MOST):
+        log.by(written, "info", str(number))
+    assert log._slow_at == 0
+    log.error("of a goal")
+    flush = threading.Thread(target=log.flush, args=(60.0,))
+    flush.start()
+    reads.set()
+    flush.join()
+    assert "error: of a goal" in written.lines
 
 
 def test_what_was_dropped_last_is_told_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -113,12 +113,12 @@ def main() -> None:
             while not orders.empty():
                 order = orders.get()
                 what = order.pop("order")
-                if what == "end":
-                    return
                 if what == "freeze":
                     print(json.dumps({"done": what}), flush=True)
                     order = orders.get()  # "thaw", and nothing is taken or answered until then
                     what = order.pop("order")
+                if what == "end":
+                    return
                 try:
                     getattr(serving, what)(**order)
                     answer = {"done": what}
