@@ -18,6 +18,9 @@ class Gate(Decorator):
     SUCCESS and FAILURE end the node. `update` then reads the child's status as usual.
     """
 
+    refused = False
+    """Whether it failed without its child, whose status is that of an earlier time then."""
+
     def gate(self) -> Status | None:
         """What to do this time; called after `initialise`."""
         return None
@@ -26,6 +29,7 @@ class Gate(Decorator):
         if self.status is not Status.RUNNING:
             self.initialise()
         decided = self.gate()
+        self.refused = decided is Status.FAILURE
         if decided is None:
             yield from self.decorated.tick()
             decided = self.update()

@@ -8,6 +8,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.gate import Gate
 from bt_actions.expression import ExpressionError
@@ -106,12 +107,12 @@ class While(Gate):
 
 def draining(node: Behaviour) -> bool:
     """Whether something of a behaviour goes on outside of the tree, and is waited for."""
-    return bool(getattr(node, "draining", False))
+    return isinstance(node, ActionBehaviour) and node.draining
 
 
 def drained(node: Behaviour) -> bool:
     """Whether nothing of a behaviour goes on outside of the tree."""
-    return bool(getattr(node, "drained", True))
+    return not isinstance(node, ActionBehaviour) or node.drained
 
 
 def seconds(value: object) -> float:

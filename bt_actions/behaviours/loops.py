@@ -72,9 +72,10 @@ class RetryChild(Gate):
             return Status.FAILURE
         first, factor, longest = self._backoff
         try:
-            self._pause.start(min(first * factor ** (self.failures - 1), longest))
+            pause = first and min(first * factor ** (self.failures - 1), longest)
         except OverflowError:
-            self._pause.start(longest)
+            pause = longest
+        self._pause.start(pause)
         return Status.RUNNING
 
     def due_in(self) -> float | None:

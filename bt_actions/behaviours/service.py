@@ -107,8 +107,8 @@ class CallService(Behaviour):
                 return self._failed("the answer is not what was expected")
             if self._save is not None:
                 self._save(self.response)
-        except ExpressionError as error:
-            return self._failed(error.message)
+        except ValueError as error:  # ExpressionError, or what is saved does not fit
+            return self._failed(str(error))
         self.feedback_message = ""
         return Status.SUCCESS
 

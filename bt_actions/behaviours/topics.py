@@ -133,8 +133,8 @@ class WaitForMessage(Behaviour):
                     self.feedback_message = ""
                     return Status.SUCCESS
                 self.feedback_message = "a message came, but not the one waited for"
-            except ExpressionError as error:
-                self.feedback_message = error.message
+            except ValueError as error:  # ExpressionError, or what is saved does not fit
+                self.feedback_message = str(error)
         if self._timeout is not None and self._countdown.left() <= 0.0:
             self.feedback_message = f"no such message on {self._topic} within {self._timeout:g} s"
             return Status.FAILURE

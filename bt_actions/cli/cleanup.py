@@ -6,7 +6,16 @@ import argparse
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import Exit, note, seconds, write
+from bt_actions.cli.common import (
+    NO_ROS,
+    BadInput,
+    Exit,
+    OutputLost,
+    discard_stdout,
+    note,
+    seconds,
+    write,
+)
 from bt_actions.suggest import listing
 
 if TYPE_CHECKING:
@@ -61,7 +70,11 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
     Where no server of one of the `wanted` actions answers, nobody can say: UNKNOWN.
     """
     from bt_actions.policy import End
-    from bt_actions.ros.cleanup import cleanup
+
+    try:
+        from bt_actions.ros.cleanup import CannotStart, cleanup
+    except ImportError as error:
+        raise BadInput(NO_ROS.format(error)) from error
 
     def found(left: LeftBehind) -> None:
         note(f"canceling a goal of dead process {left.pid} on {left.action}: {left.goal_id.hex()}")
@@ -76,27 +89,37 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
         else:
             note(f"waiting for {listing(names)}, where something may have been left")
 
-    goals = cleanup(
-        look=look,
-        patience=patience,
-        found=found,
-        sighted=actions.append,
-        elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
-        wanted=wanted,
-        namespace=namespace,
-        missing=missing,
-    )
+    try:
+        goals = cleanup(
+            look=look,
+            patience=patience,
+            found=found,
+            sighted=actions.append,
+            elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
+            wanted=wanted,
+            namespace=namespace,
+            missing=missing,
+        )
+    except CannotStart as error:
+        raise BadInput(f"ROS 2 cannot start: {error}") from error
     if foreign:
         note(
             f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in another "
             "container, where it cannot be seen whether it is alive (see BT_ACTIONS_MACHINE)"
         )
-    for goal in goals:
-        crowd = f": {goal.servers} servers of this name, and each may run it"
-        write(
-            f"{goal.action}  {goal.goal_id.hex()}  {goal.end}{crowd if goal.servers > 1 else ''}\n"
-        )
-    if any(goal.end is End.UNKNOWN for goal in goals):
+    unknown = any(goal.end is End.UNKNOWN for goal in goals)
+    try:
+        for goal in goals:
+            crowd = f": {goal.servers} servers of this name, and each may run it"
+            write(
+                f"{goal.action}  {goal.goal_id.hex()}  {goal.end}"
+                f"{crowd if goal.servers > 1 else ''}\n"
+            )
+    except (OutputLost, BrokenPipeError):
+        if not unknown:
+            raise
+        discard_stdout()
+    if unknown:
         note("not all of them have ended; they may still be running")
         return Exit.UNKNOWN
     if unseen:

@@ -47,6 +47,12 @@ class BadInput(Exception):
         self.prefixed = prefixed
 
 
+NO_ROS = (
+    "ROS 2 cannot be imported ({}); source your workspace, or install bt_actions with its "
+    "dependencies"
+)
+
+
 class OutputLost(Exception):
     """Standard output cannot be written, for another reason than that nobody reads it."""
 
@@ -229,7 +235,9 @@ def path_of(node: Behaviour) -> tuple[str, ...]:
 
 def place_of(node: Behaviour) -> str:
     """Return file:line:column where a tree file says `node`, or "" for a node made in Python."""
-    place = getattr(node, "place", None)
+    from bt_actions import document
+
+    place = document.place_of(node)
     if place is None:
         return ""
     return f"{place.file}:{place.line}:{place.column}"

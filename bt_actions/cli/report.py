@@ -15,8 +15,9 @@ from uuid import UUID
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite
+from py_trees.composites import Composite, Selector
 
+from bt_actions.behaviours.gate import Gate
 from bt_actions.cli.common import path_of, place_of
 from bt_actions.policy import End, Outcome
 
@@ -32,6 +33,9 @@ STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
 REMEMBERED = 64
 """Goals of a leaf that are known again when their last news come late."""
+
+
+_ENDED = (Status.SUCCESS, Status.FAILURE)
 
 
 @dataclass(slots=True)
@@ -246,18 +250,33 @@ class Report:
             for leaf in self._failed_leaves()
         ]
 
-    def _failed_leaves(self) -> Iterator[Behaviour]:
-        """Go down from the root along what failed; through a decorator whatever its child says.
+    def _stands(self, child: Behaviour) -> Status:
+        """Return the status of a child when its parent failed.
 
-        A failed composite whose children all say otherwise speaks for itself, as a leaf does.
+        What was reset since an earlier visit was not told of. But a parent that was stopped when it
+        had failed has no status in its children any more, and a Selector resets those that failed.
+        """
+        parent = child.parent
+        as_it_ended = parent is not None and parent.status is self.status_of(parent)
+        if as_it_ended and not isinstance(parent, Selector):
+            return child.status
+        return self.status_of(child)
+
+    def _failed_leaves(self) -> Iterator[Behaviour]:
+        """Go down from the root along what failed; through a decorator to what has ended below.
+
+        What failed though nothing below it did, or did not come to an end, speaks for itself, as a
+        leaf does.
         """
         waiting = [self.root]
         while waiting:
             node = waiting.pop()
             if isinstance(node, Composite):
-                below = [c for c in node.children if self.status_of(c) is Status.FAILURE]
+                below = [c for c in node.children if self._stands(c) is Status.FAILURE]
+            elif isinstance(node, Gate) and node.refused:
+                below = []
             else:
-                below = list(node.children)
+                below = [c for c in node.children if self._stands(c) in _ENDED]
             if below:
                 waiting.extend(reversed(below))
             else:

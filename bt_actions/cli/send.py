@@ -79,8 +79,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _leaf(server: str, type_name: str, data: dict[str, object]) -> ActionBehaviour:
     """Check everything that can be checked without a server."""
+    from bt_actions.document.ros_names import why_not
     from bt_actions.ros.messages import MessageError, UnknownInterface, fill, find_action
 
+    why = why_not(server)
+    if why:
+        raise BadInput(f"{server!r} cannot be the name of an action server: {why}")
     try:
         action_type = find_action(type_name)
         goal = fill(action_type.Goal, data)  # type: ignore[attr-defined]  # made by rosidl

@@ -7,6 +7,7 @@ it decides nothing.
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TextIO
@@ -280,8 +281,21 @@ class JsonView:
         """Nothing to give back."""
 
     def _write(self, data: dict[str, object]) -> None:
-        self._out.write(json.dumps(data, ensure_ascii=not _is_utf8(self._out)) + "\n")
+        ascii_only = not _is_utf8(self._out)
+        try:
+            line = json.dumps(data, ensure_ascii=ascii_only, allow_nan=False)
+        except ValueError:  # JSON has no word for it
+            line = json.dumps(_finite(data), ensure_ascii=ascii_only)
+        self._out.write(line + "\n")
         self._out.flush()
+
+
+def _finite(data: object) -> object:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def _action(report: Report, row: Row) -> dict[str, object]:

@@ -5,6 +5,7 @@ Importing this imports neither rclpy nor any message package.
 
 from bt_actions.document.find import TreeNotFoundError, find_tree, installed_trees
 from bt_actions.document.findings import (
+    PLACE,
     DocumentError,
     Finding,
     Place,
@@ -52,5 +53,5 @@ __all__ = [
 
 def place_of(behaviour: object) -> Place | None:
     """Where a behaviour was written, or None for one that no document made."""
-    place = getattr(behaviour, "place", None)
+    place = getattr(behaviour, PLACE, None)
     return place if isinstance(place, Place) else None

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from py_trees.behaviour import Behaviour
-from py_trees.common import OneShotPolicy
+from py_trees.common import OneShotPolicy, Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import FailureIsSuccess, Inverter, OneShot, SuccessIsFailure
 
@@ -22,10 +22,12 @@ from bt_actions.behaviours.topics import TopicValue
 from bt_actions.document.build_leaves import LEAVES, build_action
 from bt_actions.document.build_names import join_names, text_of
 from bt_actions.document.context import Context, plain_name, table_of, written_text
+from bt_actions.document.findings import PLACE
 from bt_actions.document.inputs import check_inputs
 from bt_actions.document.scope import Scope
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.values import resolve
+from bt_actions.document.writes import writes_of
 from bt_actions.expression import ExpressionError
 
 __all__ = ["BUILDERS", "build"]
@@ -80,7 +82,7 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
     else:
         assert node.kind is not None
         behaviour = BUILDERS[node.kind.name](node, context)
-    behaviour.place = node.place  # type: ignore[attr-defined]
+    setattr(behaviour, PLACE, node.place)
     return behaviour
 
 
@@ -160,7 +162,8 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     child = build(included, scope, namespace=namespace, types=context.types)
     given = node.values.get("with", {})
     saved = table_of(node.values.get("save"))
-    written = [declared.name for declared in included.outputs.values()]
+    written = {declared.name for declared in included.outputs.values()}
+    written |= {each.name for inner in included.nodes() for each in writes_of(inner, included)}
 
     def begin() -> None:
         values = _resolved(given, context)
@@ -172,13 +175,13 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
                 scope.clear(name)
         scope.write_all(inputs)
 
-    def end() -> None:
+    def end(status: Status) -> None:
         for name, output in saved.items():
             try:
-                value = scope.read(output)
-            except KeyError:
-                continue  # a tree that failed may have nothing to give
-            context.scope.write(name, value)
+                context.scope.write(name, scope.read(output))
+            except KeyError:  # a tree that failed may have nothing to give
+                if status is Status.SUCCESS:
+                    context.scope.clear(name)
 
     return Subtree(node.name or included.name, child, begin, end)
 

@@ -11,7 +11,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-__all__ = ["DocumentError", "Finding", "Place", "Related", "Severity", "Span"]
+PLACE = "_bt_actions_place"
+LOADED = "_bt_actions_loaded"
+"""The attribute of a behaviour that says where it was written, and that of a loaded root which has
+its document. Not such as a user's own class may have."""
+
+__all__ = ["LOADED", "PLACE", "DocumentError", "Finding", "Place", "Related", "Severity", "Span"]
 
 
 class Place(NamedTuple):

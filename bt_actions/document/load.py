@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from bt_actions.document.check import Checker
 from bt_actions.document.find import TreeNotFoundError, find_tree, installed_trees
-from bt_actions.document.findings import DocumentError, Finding, Severity, Span
+from bt_actions.document.findings import LOADED, DocumentError, Finding, Severity, Span
 from bt_actions.document.hazards import find_hazards
 from bt_actions.document.ignores import apply_ignores
 from bt_actions.document.inputs import TreeInput, check_inputs, inputs_of
@@ -81,7 +81,7 @@ def load_tree(
     scope.write_all(values)
     root = build(document, scope, types=types)
     _refuse(workspace.findings)  # a class of one's own may fail when it is made
-    root.loaded = Loaded(document, scope)  # type: ignore[attr-defined]
+    setattr(root, LOADED, Loaded(document, scope))
     return root
 
 
@@ -93,7 +93,7 @@ def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
 
 def tree_outputs(root: Behaviour) -> dict[str, object]:
     """The outputs of a loaded tree that have a value by now, by name."""
-    loaded = getattr(root, "loaded", None)
+    loaded = getattr(root, LOADED, None)
     if not isinstance(loaded, Loaded):
         return {}
     found = {}

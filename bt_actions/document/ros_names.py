@@ -15,7 +15,7 @@ from bt_actions.document.shape import Schema, wrong_form
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD
 
-__all__ = ["RosName"]
+__all__ = ["RosName", "why_not"]
 
 _PART = r"(?:[A-Za-z0-9_]|\{(?:node|ns|namespace)\})"
 _TOKEN = rf"(?![0-9]){_PART}+"
@@ -49,6 +49,11 @@ class RosName:
     @property
     def _pattern(self) -> str:
         return _NAMESPACE if self.namespace else _NAME
+
+
+def why_not(name: str) -> str:
+    """What keeps a text from being the name of a topic or server; empty where nothing does."""
+    return "" if re.fullmatch(_NAME, name) else _why(name)
 
 
 def _why(text: str) -> str:

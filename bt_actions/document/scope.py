@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import itertools
 import re
+import weakref
+from collections import deque
 from collections.abc import Mapping
 
 from py_trees.blackboard import Blackboard
@@ -14,6 +16,8 @@ from py_trees.blackboard import Blackboard
 __all__ = ["Scope"]
 
 _loads = itertools.count(1)
+_gone: deque[str] = deque()
+"""Prefixes of which no scope is left; the collector may come in the middle of a tick."""
 
 
 class Scope:
@@ -21,6 +25,7 @@ class Scope:
 
     def __init__(self, prefix: str) -> None:
         self.prefix = prefix
+        self._outer: Scope | None = None
         self._children: dict[str, int] = {}
 
     def __repr__(self) -> str:
@@ -28,14 +33,27 @@ class Scope:
 
     @classmethod
     def of_load(cls, tree: str) -> Scope:
-        """The scope of a tree that is loaded now: no other load has the same."""
-        return cls(f"/bt/{_safe(tree)}/{next(_loads)}")
+        """The scope of a tree that is loaded now: no other load has the same.
+
+        Its variables are forgotten at a later load, when nothing of the tree is left.
+        """
+        while _gone:
+            prefix = f"{_gone.popleft()}/"
+            for key in [key for key in list(Blackboard.storage) if key.startswith(prefix)]:
+                Blackboard.unset(key)
+            for key in [key for key in list(Blackboard.metadata) if key.startswith(prefix)]:
+                Blackboard.metadata.pop(key, None)
+        scope = cls(f"/bt/{_safe(tree)}/{next(_loads)}")
+        weakref.finalize(scope, _gone.append, scope.prefix).atexit = False
+        return scope
 
     def inner(self, tree: str) -> Scope:
         """The scope of a tree included in this one."""
         name = _safe(tree)
         number = self._children[name] = self._children.get(name, 0) + 1
-        return Scope(f"{self.prefix}/{name}_{number}")
+        scope = Scope(f"{self.prefix}/{name}_{number}")
+        scope._outer = self  # which lives as long, and so do the variables
+        return scope
 
     def key(self, name: str) -> str:
         """The blackboard key of a variable."""

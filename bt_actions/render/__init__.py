@@ -14,6 +14,7 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.document.findings import PLACE
 from bt_actions.render.graphviz import RenderError, draw
 from bt_actions.render.look import (
     DOWN_UP_TO,
@@ -144,7 +145,7 @@ def _label(row: Row) -> str:
 
 
 def _tooltip(node: Behaviour) -> str:
-    place = getattr(node, "place", None)
+    place = getattr(node, PLACE, None)
     file, line = getattr(place, "file", None), getattr(place, "line", None)
     if file is None or line is None:
         return clean(node.name)

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.document.findings import PLACE
 from bt_actions.render.card import Table, describe, interface_of, tables
 from bt_actions.render.graphviz import RenderError
 from bt_actions.render.look import Row, action_of, clean, direction_of, kind, label, look, rows
@@ -112,7 +113,7 @@ def _data(
             "fill": fill,
             "tables": [shared.setdefault(table, len(shared)) for table in said],
         }
-        place = getattr(node, "place", None)
+        place = getattr(node, PLACE, None)
         more = {
             "font": font,
             "place": None if place is None else str(place),

@@ -1,6 +1,6 @@
 """Where in a document a behaviour comes from, and the lines that made it.
 
-Works from what a loaded tree remembers (`place` on each node, `loaded` on its root) and reads no
+Works from what a loaded tree remembers (the attributes PLACE and LOADED) and reads no
 file again. A behaviour made in Python was not written, and has nothing here.
 """
 
@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from py_trees.behaviour import Behaviour
+
+from bt_actions.document.findings import LOADED, PLACE
 
 if TYPE_CHECKING:
     from bt_actions.document.findings import Place
@@ -31,14 +33,14 @@ class Written:
         self._loaded: dict[int, Document] = {}
         self._nodes: dict[Place, TreeNode] = {}
         for behaviour in behaviours:
-            document = getattr(getattr(behaviour, "loaded", None), "document", None)
+            document = getattr(getattr(behaviour, LOADED, None), "document", None)
             if document is not None:
                 self._loaded[id(behaviour)] = document
                 self._take(document)
 
     def node(self, behaviour: Behaviour) -> TreeNode | None:
         """The node of a document that `behaviour` was made from."""
-        place = getattr(behaviour, "place", None)
+        place = getattr(behaviour, PLACE, None)
         return None if place is None else self._nodes.get(place)
 
     def document(self, behaviour: Behaviour) -> Document | None:

@@ -60,6 +60,10 @@ class LeftBehind:
         return self.shown if self.servers <= 1 else End.UNKNOWN
 
 
+class CannotStart(RuntimeError):
+    """ROS 2 cannot start: the domain id is none, say."""
+
+
 def cleanup(
     *,
     look: float = 5.0,
@@ -82,11 +86,16 @@ def cleanup(
     belong to `namespace`, those of which no server has answered by then (one that is shown may be
     stopped, or a ghost) are waited for up to LOOK_LONGEST seconds, and `missing` is called with
     them, in the beginning of that, and in the end if it was in vain, as it is told. Blocks.
+
+    Raises CannotStart.
     """
     own = Context() if context is None else context
-    if context is None:
-        own.init()
-    node = Node("bt_actions_cleanup", context=own, namespace=namespace)
+    try:
+        if context is None:
+            own.init()
+        node = Node("bt_actions_cleanup", context=own, namespace=namespace)
+    except RuntimeError as error:  # rclpy's RCLError
+        raise CannotStart(str(error).splitlines()[0]) from error
     executor = SingleThreadedExecutor(context=own)
     executor.add_node(node)
     sweep = _Sweep(node, found, sighted, elsewhere)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import time
+from pathlib import Path
+
+import py_trees
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure
@@ -11,9 +15,11 @@ from py_trees.decorators import Inverter
 
 from bt_actions.cli.report import Report, Row, summary, table
 from bt_actions.cli.words import goal_text
-from bt_actions.document import Place
-from bt_actions.events import Event
+from bt_actions.document import Place, load_tree
+from bt_actions.document.findings import PLACE
+from bt_actions.events import Event, NodeChanged, TreeFinished
 from bt_actions.policy import End, Outcome
+from bt_actions.ticking import ChangeVisitor, path_of
 from tests.cli.fakes import FakeAction, Story
 
 
@@ -160,7 +166,7 @@ def fail(story: Story, leaf: FakeAction, reason: str = "") -> list[Event]:
 
 def test_the_summary_names_path_attempts_outcome_reason_and_place(story: Story) -> None:
     leaf = FakeAction("Move")
-    leaf.place = Place("trees/x.yaml", 14, 9)  # type: ignore[attr-defined]
+    setattr(leaf, PLACE, Place("trees/x.yaml", 14, 9))
     root = Sequence("Deliver", memory=True, children=[leaf])
     report = told(
         root,
@@ -196,6 +202,49 @@ def test_of_a_fallback_each_child_that_failed_is_named_and_of_a_sequence_only_th
         story.finish(Status.FAILURE),
     )
     assert [culprit.path[-1] for culprit in report.culprits()] == ["b", "d", "not delivered"]
+
+
+ANOTHER_EACH_TIME = (
+    "{retry: R, attempts: 2, child: {sequence: S, children: [{set: {m: = $m + 1}},"
+    " {check: $m != 2, name: A}, {check: $m != 1, name: B}]}}"
+)
+
+
+@pytest.mark.parametrize(
+    ("written", "culprits"),
+    [
+        ("{timeout: T, after: 10 ms, child: {running: R}}", {"T": "not done within 0.01 s"}),
+        ("{while: false, name: W, child: {wait: 1 s}}", {"W": "the condition does not hold"}),
+        ("{repeat: R, times: $n, child: {success: S}}", {"R": "times"}),
+        ("{invert: I, child: {success: S}}", {"S": ""}),
+        (ANOTHER_EACH_TIME, {"A": ""}),
+    ],
+    ids=["timeout", "while", "repeat", "invert", "retry"],
+)
+def test_who_failed_is_named_and_nobody_who_did_not_run(
+    tmp_path: Path, written: str, culprits: dict[str, str]
+) -> None:
+    tree = tmp_path / "t.yaml"
+    tree.write_text(
+        "tree: t\ninputs: {n: {type: int32, default: -1}, m: {type: int32, default: 0}}\n"
+        f"root: {written}\n"
+    )
+    root = load_tree(tree)
+    events: list[Event] = []
+    visitor = ChangeVisitor()
+    ticking = py_trees.trees.BehaviourTree(root)
+    ticking.visitors.append(visitor)
+    while root.status in (Status.INVALID, Status.RUNNING):
+        visitor.begin()
+        ticking.tick()
+        for node, status in visitor.finish():
+            message = node.feedback_message
+            events.append(NodeChanged(time.monotonic(), path_of(node), node, status, message))
+    report = told(root, *events, TreeFinished(time.monotonic(), root.status))
+    named = {culprit.path[-1]: culprit.message for culprit in report.culprits()}
+    assert list(named) == list(culprits)
+    for name, message in culprits.items():
+        assert named[name].startswith(message)
 
 
 def test_a_tree_that_succeeded_has_no_culprits_though_a_leaf_failed(story: Story) -> None:

@@ -82,10 +82,10 @@ def test_a_parameter_that_does_not_fit_is_told_by_its_name(
 def test_what_is_set_wins_over_parameters_and_they_over_defaults() -> None:
     given = {"pick_at": 4.0, "place_at": 6.0}
     root: Any = load("pick_and_place", ["place_at=7.0"], parameters=given)
-    read = root.loaded.scope.read
+    read = root._bt_actions_loaded.scope.read
     assert (read("pick_at"), read("place_at")) == (4.0, 7.0)
     root = load("pick_and_place", [], parameters={"place_at": 6.0})
-    assert root.loaded.scope.read("pick_at") == 2.0
+    assert root._bt_actions_loaded.scope.read("pick_at") == 2.0
 
 
 @pytest.mark.usefixtures("domain")

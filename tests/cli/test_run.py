@@ -221,11 +221,12 @@ class TestExitCode2:
         fault = ("--sim", "--fault", "move_robt:1:abort")
         assert "--fault" in self.refused(capsys, "pick_and_place", *fault)
 
+    @pytest.mark.parametrize("command", ["run", "run --cleanup-first", "cleanup"])
     def test_a_ros_domain_that_is_none(
-        self, start: Start, monkeypatch: pytest.MonkeyPatch, tree: Tree
+        self, start: Start, monkeypatch: pytest.MonkeyPatch, tree: Tree, command: str
     ) -> None:
         monkeypatch.setenv("ROS_DOMAIN_ID", "many")
-        run = start("run", str(tree()), "--sim")
+        run = start(*command.split(), *([str(tree())] if "run" in command else []))
         assert run.wait() == 2, run
         assert clean(run), run
         assert run.errors[-1].startswith("bt-actions: ROS 2 cannot start: ")

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
+from bt_actions.cli import main
 from tests.cli.conftest import Start
 from tests.support.processes import Journal, Process
 from tests.support.waiting import until
@@ -95,3 +96,8 @@ def test_without_a_server_it_fails_in_time(start: Start, namespace: str) -> None
     send = start("send", f"{namespace}/nobody", "MoveRobot", "distance=1")
     assert send.wait() == 1, send
     assert "SERVER_UNAVAILABLE" in send.lines[-1]
+
+
+def test_a_name_that_ros_does_not_take_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["send", "move robot", "MoveRobot", "distance=1.0"]) == 2
+    assert "'move robot' cannot be the name of an action server: a space" in capsys.readouterr().err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -425,3 +426,11 @@ def test_a_message_in_words_shows_constants_by_name() -> None:
 
 def test_without_a_result_there_are_no_lines() -> None:
     assert result_lines(None) == []
+
+
+def test_numbers_that_json_has_no_word_for_are_null() -> None:
+    out = io.StringIO()
+    view = JsonView(Report(FakeAction("Move")), out)
+    view._write({"outputs": {"n": math.nan, "all": [1.0, -math.inf]}, "duration": 2.5})
+    expected = {"outputs": {"n": None, "all": [1.0, None]}, "duration": 2.5}
+    assert json.loads(out.getvalue(), parse_constant=pytest.fail) == expected

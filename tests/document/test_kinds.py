@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import textwrap
 from collections.abc import Callable
 
 import pytest
 from py_trees.behaviour import Behaviour
+from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from bt_actions.document import Severity, check_source, source_of, tree_outputs
@@ -264,3 +266,74 @@ def test_a_node_that_needs_no_name_gets_one_without_a_colon(
     load: Load, node: str, name: str
 ) -> None:
     assert run(load, node, 0)[2].name == name
+
+
+def test_a_retry_without_a_pause_never_makes_one(load: Load) -> None:
+    """The factor's power is no float any more after 1,024 failures."""
+    root = load(HEAD + "  retry: R\n  child: {check: $level > 2}\n")
+    for _ in range(1030):
+        root.tick_once()
+    assert root.failures == 1030  # type: ignore[attr-defined]
+    assert root.due_in() == 0.0  # type: ignore[attr-defined]
+
+
+INNER = """
+tree: inner
+inputs: {k: int32}
+outputs: {r: int32}
+root:
+  sequence: S
+  children:
+    - force_success: If it is the first
+      child: {sequence: First, children: [{check: $k == 0}, {set: {seen: = $k + 100}}]}
+    - set: {r: $seen}
+"""
+
+
+def test_a_subtree_begins_without_what_its_last_visit_wrote(load: Load) -> None:
+    each = """
+tree: outer
+outputs: {last: int32}
+root:
+  for_each: Each
+  in: [0, 1]
+  child: {subtree: inner.yaml, with: {k: $item}, save: {last: r}}
+"""
+    root = load(each, inner=INNER)
+    assert tick(root) is Status.FAILURE
+    assert tree_outputs(root) == {"last": 100}
+
+
+def test_an_output_that_a_subtree_has_not_given_is_not_that_of_the_time_before(load: Load) -> None:
+    sometimes = """
+tree: sometimes
+inputs: {k: int32}
+outputs: {r: int32}
+root: {force_success: F, child: {sequence: S, children: [{check: $k == 0}, {set: {r: $k}}]}}
+"""
+    each = """
+tree: outer
+outputs: {last: int32}
+root:
+  for_each: Each
+  in: [0, 1]
+  child: {subtree: sometimes.yaml, with: {k: $item}, save: {last: r}}
+"""
+    root = load(each, sometimes=sometimes)
+    assert tick(root) is Status.SUCCESS
+    assert tree_outputs(root) == {}
+
+
+def test_what_a_tree_wrote_is_forgotten_when_nothing_of_it_is_left(load: Load) -> None:
+    def names() -> set[str]:
+        return {key.split("/")[2] for key in Blackboard.storage if key.startswith("/bt/forgotten")}
+
+    text = "tree: forgotten%d\noutputs: {n: int32}\nroot: {set: {n: 1}}\n"
+    kept = load(text % 0)
+    tick(kept)
+    for number in range(1, 4):
+        tick(load(text % number))
+    gc.collect()
+    load(text % 4)
+    assert names() == {"forgotten0"}
+    assert tree_outputs(kept) == {"n": 1}

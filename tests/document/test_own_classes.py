@@ -9,9 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from py_trees.common import Status
 
+from bt_actions.behaviours.limits import Deadline
 from bt_actions.cli import main
-from bt_actions.document import DocumentError, check_file, load_tree
+from bt_actions.document import DocumentError, check_file, load_tree, place_of, tree_outputs
 
 Own = Callable[..., Path]
 BASE = """
@@ -169,3 +171,29 @@ def test_a_run_of_a_class_that_cannot_be_made_ends_with_2_and_the_place(
     tree = own("class A(Base):\n    def __init__(self, name): raise ValueError('no')")
     assert main(["render", str(tree)]) == 2
     assert "t.yaml:4:14: error[BT215]: making a A raised ValueError: no" in capsys.readouterr().err
+
+
+def test_names_that_a_class_of_ones_own_may_have(own: Own) -> None:
+    """A place, a state of its own, and ones that leaves for actions have."""
+    tree = own(
+        """
+        class A(Base):
+            draining, drained = True, False
+            def __init__(self, name, place):
+                super().__init__(name)
+                self.place = self.loaded = place
+            @property
+            def refused(self):
+                raise AttributeError
+        """,
+        "{place: shelf}",
+    )
+    root = load_tree(tree)
+    assert (root.place, root.loaded) == ("shelf", "shelf")  # type: ignore[attr-defined]
+    assert str(place_of(root)).endswith("t.yaml:3:3")
+    assert tree_outputs(root) == {}
+    assert main(["render", str(tree)]) == 0
+    late = Deadline("T", root, lambda: 0.0)
+    late.tick_once()
+    late.tick_once()
+    assert late.status is Status.FAILURE

@@ -62,6 +62,35 @@ def test_a_service_is_called_and_its_answer_saved(
     assert tree_outputs(root) == {"said": "set to True"}
 
 
+def test_a_message_that_does_not_fit_into_its_variable_is_not_the_one_waited_for(
+    load: Load, run: Run, name: str
+) -> None:
+    """Anybody may send 300 where an int8 is kept; that ends no run."""
+    root = run(
+        load(
+            f"""
+            tree: t
+            outputs: {{n: int8}}
+            root:
+              parallel: P
+              children:
+                - wait_for_message: Small
+                  topic: {name}/count
+                  type: std_msgs/msg/Int32
+                  save: {{n: message.data}}
+                  timeout: 500 ms
+                  qos: latched
+                - publish: {name}/count
+                  type: std_msgs/msg/Int32
+                  message: {{data: 300}}
+                  qos: latched
+            """
+        )
+    )
+    assert root.status is Status.FAILURE
+    assert root.children[0].feedback_message.startswith("no such message")
+
+
 def test_an_answer_that_is_not_expected_fails_and_is_tried_again(
     load: Load, run: Run, switch: Any
 ) -> None:

@@ -321,22 +321,33 @@ def until_two_are_seen(node: Any, name: str) -> None:
     until(lambda: len(node.get_publishers_info_by_topic(topic)) == 2, what=f"two servers {name}")
 
 
+def run_after(first: MoveRobot, second: MoveRobot, node: Any, executor: str = "multi") -> None:
+    """Run both beside each other; the second begins when the server has the goal of the first."""
+    starts = Gate()
+    tree = together(first, in_sequence(starts, second))
+    with TreeRunner(tree, node=node, executor=executor) as runner:
+        runner.start()
+        until(lambda: executing(first))
+        starts.passed = True
+        runner.wait(9.0)
+
+
 class TestBusy:
-    def test_fail_gives_up_at_once(self, serve: Any, name: str, run: Run) -> None:
+    def test_fail_gives_up_at_once(self, serve: Any, name: str, node: Any) -> None:
         journal = serve()
-        first = MoveRobot("first", 0.5, action_name=name)
+        first = MoveRobot("first", 9.0, action_name=name)
         second = MoveRobot("second", 0.1, action_name=name, busy="fail")
-        run(together(first, second))
+        run_after(first, second, node)
         assert stood(second) == (Outcome.SERVER_BUSY, End.NEVER_STARTED)
         assert journal.count("received") == 1
 
     def test_wait_gives_up_after_its_deadline(
-        self, serve: Any, name: str, run: Run, executor: str
+        self, serve: Any, name: str, node: Any, executor: str
     ) -> None:
         journal = serve()
-        first = MoveRobot("first", 2.5, action_name=name)
+        first = MoveRobot("first", 9.0, action_name=name)
         second = MoveRobot("second", 0.1, action_name=name, timeout=Timeouts(queue=0.3))
-        run(together(first, second), executor=executor)
+        run_after(first, second, node, executor)
         assert stood(second) == (Outcome.SERVER_BUSY, End.NEVER_STARTED)
         assert second.history[0].duration >= 0.3
         assert second.history[0].ended < first.history[0].ended

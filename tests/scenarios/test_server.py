@@ -393,7 +393,7 @@ class TestStopped:
         leave(left)
         victim.kill()
         outcomes = []
-        for seconds in (3.0, 8.0):
+        for seconds in (3.0, 20.0):
             job = MoveRobot("job", 0.3, action_name=f"{name}_1", resources={"arm"})
             job.timeouts = Timeouts(server=seconds)
             with TreeRunner(job) as runner:
