@@ -450,8 +450,8 @@ class TreeRunner:
         dues = []
         for node in self._visitor.running:
             due_in = getattr(node, "due_in", None)
-            due = due_in() if due_in is not None else None
-            if due is not None:
+            due = due_in() if callable(due_in) else None
+            if isinstance(due, int | float):
                 dues.append(max(due, 0.001))
         return dues
 

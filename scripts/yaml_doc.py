@@ -78,8 +78,9 @@ completion in editors. The files on this page are in [examples/](../examples).
 
 A tree sees only its own names: inputs, outputs, topics, and what its nodes `save`, `set` or loop
 over. A subtree gets what `with` passes and gives back outputs by `save`; each visit begins without
-what the one before it wrote. A variable that has no value yet makes a goal INVALID_GOAL and a check
-FAILURE, and says so.
+what the one before it wrote, but for what stands below a `run_once`, and an output that it does not
+give leaves the name as it was. A variable that has no value yet makes a goal INVALID_GOAL and a
+check FAILURE, and says so.
 
 Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, `int8` to `int64`,
 `uint8` to `uint64`, any `package/msg/Name`, and lists of them: `float64[]`, `float64[3]`,

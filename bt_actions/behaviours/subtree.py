@@ -24,11 +24,11 @@ class Subtree(Gate):
         child: the root of the tree.
         begin: writes the inputs, each time the tree starts; raises ValueError for one that has no
             value or does not fit, which fails the subtree before its first tick.
-        end: gives back the outputs, when the tree has succeeded or failed; told which.
+        end: gives back the outputs, when the tree has succeeded or failed.
     """
 
     def __init__(
-        self, name: str, child: Behaviour, begin: Callable[[], None], end: Callable[[Status], None]
+        self, name: str, child: Behaviour, begin: Callable[[], None], end: Callable[[], None]
     ) -> None:
         super().__init__(name, child)
         self._begin = begin
@@ -53,5 +53,5 @@ class Subtree(Gate):
         status = self.decorated.status
         self.feedback_message = self.decorated.feedback_message
         if status in (Status.SUCCESS, Status.FAILURE):
-            self._end(status)
+            self._end()
         return status

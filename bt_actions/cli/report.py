@@ -246,9 +246,14 @@ class Report:
         if self.status is not Status.FAILURE:
             return []
         return [
-            Culprit(path_of(leaf), self.message_of(leaf), place_of(leaf), self._rows.get(leaf.id))
+            Culprit(path_of(leaf), self._why(leaf), place_of(leaf), self._rows.get(leaf.id))
             for leaf in self._failed_leaves()
         ]
+
+    def _why(self, node: Behaviour) -> str:
+        """Return what a node says of its failure, which may not be its first of that status."""
+        as_it_ended = node.status is self.status_of(node)
+        return node.feedback_message if as_it_ended else self.message_of(node)
 
     def _stands(self, child: Behaviour) -> Status:
         """Return the status of a child when its parent failed.
@@ -257,7 +262,9 @@ class Report:
         had failed has no status in its children any more, and a Selector resets those that failed.
         """
         parent = child.parent
-        as_it_ended = parent is not None and parent.status is self.status_of(parent)
+        if parent is None:
+            return self.status
+        as_it_ended = parent.status is self.status_of(parent)
         if as_it_ended and not isinstance(parent, Selector):
             return child.status
         return self.status_of(child)
@@ -271,7 +278,9 @@ class Report:
         waiting = [self.root]
         while waiting:
             node = waiting.pop()
-            if isinstance(node, Composite):
+            if isinstance(node, Composite) and self._stands(node) is not Status.FAILURE:
+                below = []  # of an inverter, say
+            elif isinstance(node, Composite):
                 below = [c for c in node.children if self._stands(c) is Status.FAILURE]
             elif isinstance(node, Gate) and node.refused:
                 below = []

@@ -5,12 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
 from py_trees.behaviour import Behaviour
-from py_trees.common import OneShotPolicy, Status
+from py_trees.common import OneShotPolicy
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import FailureIsSuccess, Inverter, OneShot, SuccessIsFailure
 
@@ -163,7 +163,10 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     given = node.values.get("with", {})
     saved = table_of(node.values.get("save"))
     written = {declared.name for declared in included.outputs.values()}
-    written |= {each.name for inner in included.nodes() for each in writes_of(inner, included)}
+    written |= _writes(included, included.nodes())
+    for inner in included.nodes():
+        if inner.kind is not None and inner.kind.name == "run_once":
+            written -= _writes(included, inner.walk())  # which is not done again
 
     def begin() -> None:
         values = _resolved(given, context)
@@ -175,15 +178,20 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
                 scope.clear(name)
         scope.write_all(inputs)
 
-    def end(status: Status) -> None:
+    def end() -> None:
         for name, output in saved.items():
             try:
-                context.scope.write(name, scope.read(output))
-            except KeyError:  # a tree that failed may have nothing to give
-                if status is Status.SUCCESS:
-                    context.scope.clear(name)
+                value = scope.read(output)
+            except KeyError:
+                continue  # a tree that failed may have nothing to give
+            context.scope.write(name, value)
 
     return Subtree(node.name or included.name, child, begin, end)
+
+
+def _writes(document: Document, nodes: Iterable[TreeNode]) -> set[str]:
+    """The names of the variables that some nodes of a tree write."""
+    return {each.name for node in nodes for each in writes_of(node, document)}
 
 
 def _resolved(written: object, context: Context) -> object:

@@ -37,8 +37,11 @@ class Scope:
 
         Its variables are forgotten at a later load, when nothing of the tree is left.
         """
-        while _gone:
-            prefix = f"{_gone.popleft()}/"
+        while True:
+            try:
+                prefix = f"{_gone.popleft()}/"
+            except IndexError:
+                break
             for key in [key for key in list(Blackboard.storage) if key.startswith(prefix)]:
                 Blackboard.unset(key)
             for key in [key for key in list(Blackboard.metadata) if key.startswith(prefix)]:

@@ -209,6 +209,11 @@ ANOTHER_EACH_TIME = (
     " {check: $m != 2, name: A}, {check: $m != 1, name: B}]}}"
 )
 
+ANOTHER_REASON_EACH_TIME = (
+    "{retry: R, attempts: 2, child: {sequence: S, children: [{set: {m: = $m + 1, l: [1]}},"
+    " {check: '$m == 2 and $l[7] == 1', name: C}]}}"
+)
+
 
 @pytest.mark.parametrize(
     ("written", "culprits"),
@@ -217,9 +222,11 @@ ANOTHER_EACH_TIME = (
         ("{while: false, name: W, child: {wait: 1 s}}", {"W": "the condition does not hold"}),
         ("{repeat: R, times: $n, child: {success: S}}", {"R": "times"}),
         ("{invert: I, child: {success: S}}", {"S": ""}),
+        ("{invert: I, child: {fallback: F, children: [{failure: A}, {success: B}]}}", {"F": ""}),
+        (ANOTHER_REASON_EACH_TIME, {"C": "index 7 is outside"}),
         (ANOTHER_EACH_TIME, {"A": ""}),
     ],
-    ids=["timeout", "while", "repeat", "invert", "retry"],
+    ids=["timeout", "while", "repeat", "invert", "invert a fallback", "reasons", "retry"],
 )
 def test_who_failed_is_named_and_nobody_who_did_not_run(
     tmp_path: Path, written: str, culprits: dict[str, str]

@@ -304,12 +304,17 @@ root:
     assert tree_outputs(root) == {"last": 100}
 
 
-def test_an_output_that_a_subtree_has_not_given_is_not_that_of_the_time_before(load: Load) -> None:
-    sometimes = """
-tree: sometimes
+def test_what_a_subtree_does_once_it_knows_ever_after(load: Load) -> None:
+    inner = """
+tree: inner
 inputs: {k: int32}
 outputs: {r: int32}
-root: {force_success: F, child: {sequence: S, children: [{check: $k == 0}, {set: {r: $k}}]}}
+root:
+  sequence: S
+  children:
+    - run_once: Calibrate
+      child: {set: {offset: 100}}
+    - set: {r: = $k + $offset}
 """
     each = """
 tree: outer
@@ -317,11 +322,11 @@ outputs: {last: int32}
 root:
   for_each: Each
   in: [0, 1]
-  child: {subtree: sometimes.yaml, with: {k: $item}, save: {last: r}}
+  child: {subtree: inner.yaml, with: {k: $item}, save: {last: r}}
 """
-    root = load(each, sometimes=sometimes)
+    root = load(each, inner=inner)
     assert tick(root) is Status.SUCCESS
-    assert tree_outputs(root) == {}
+    assert tree_outputs(root) == {"last": 101}
 
 
 def test_what_a_tree_wrote_is_forgotten_when_nothing_of_it_is_left(load: Load) -> None:
