@@ -210,8 +210,8 @@ ANOTHER_EACH_TIME = (
 )
 
 ANOTHER_REASON_EACH_TIME = (
-    "{retry: R, attempts: 2, child: {sequence: S, children: [{set: {m: = $m + 1, l: [1]}},"
-    " {check: '$m == 2 and $l[7] == 1', name: C}]}}"
+    "{retry: R, attempts: 2, child: {sequence: S, children: [{set: {m: = $m + 1}},"
+    " {while: $m != 2, name: W, child: {failure: Z}}]}}"
 )
 
 
@@ -223,7 +223,7 @@ ANOTHER_REASON_EACH_TIME = (
         ("{repeat: R, times: $n, child: {success: S}}", {"R": "times"}),
         ("{invert: I, child: {success: S}}", {"S": ""}),
         ("{invert: I, child: {fallback: F, children: [{failure: A}, {success: B}]}}", {"F": ""}),
-        (ANOTHER_REASON_EACH_TIME, {"C": "index 7 is outside"}),
+        (ANOTHER_REASON_EACH_TIME, {"W": "the condition does not hold"}),
         (ANOTHER_EACH_TIME, {"A": ""}),
     ],
     ids=["timeout", "while", "repeat", "invert", "invert a fallback", "reasons", "retry"],
