@@ -523,11 +523,11 @@ class Line:
         if self.watch.wants_probe(now):
             self._probe()
         for ticket in list(self.goals.values()):
-            unseen = ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to)
-            if unseen and now < ticket.not_gone_before:
-                continue
+            gone = self.watch.gone(now, ticket.testimony.sent_to)
+            if gone and now < ticket.not_gone_before:
+                continue  # it has not been discovered yet, though its status may have come already
             if ticket.goal.sent:
-                if not ticket.goal.lost and self.watch.gone(now, ticket.testimony.sent_to):
+                if gone and not ticket.goal.lost:
                     self.pump()  # its last words
                 self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
         state = self.watch.state(now)

@@ -328,7 +328,6 @@ class TestStopped:
         assert canceled.t <= received.t
         record.outcome = "UNKNOWN; canceled before the goal on the other server is sent"
 
-    @pytest.mark.chaos
     def test_left_behind_where_the_next_node_has_not_discovered_its_server_yet(
         self, host: Host, name: str, record: Record, monkeypatch: pytest.MonkeyPatch
     ) -> None:
