@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import os
 import queue
 import select
 import threading
@@ -142,8 +143,11 @@ class Log:
                 self._say(*self._lines.get_nowait())
 
     def _say(self, logger: Any, level: str, text: str) -> None:
-        with contextlib.suppress(Exception):  # of a logger whose node is gone
+        try:
             WRITE[level](self._logger if logger is None else logger, text)
+        except Exception:  # noqa: BLE001 - of a logger whose node is gone, say: the line must not be
+            with contextlib.suppress(OSError):
+                os.write(STDERR, f"[{level.upper()}] {text}\n".encode(errors="replace"))
         self._written += 1
 
     def _room(self, patience: int | None) -> bool:

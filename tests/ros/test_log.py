@@ -86,17 +86,20 @@ def test_what_was_dropped_last_is_told_too(monkeypatch: pytest.MonkeyPatch) -> N
     until(lambda: written.lines and "were not logged" in written.lines[-1])
 
 
-def test_a_logger_of_a_node_that_is_gone_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_logger_of_a_node_that_is_gone_loses_nothing(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     class Gone:
         def __getattr__(self, level: str) -> Any:
             raise RuntimeError("its node was destroyed")
 
     log, written = Log("test"), Written()
     monkeypatch.setattr(log, "_logger", written)
-    log.by(Gone(), "info", "not written")
+    log.by(Gone(), "warn", "of a node")
     log.info("and on")
     log.flush(10.0)
     assert written.lines == ["info: and on"]
+    assert capfd.readouterr().err == "[WARN] of a node\n"
 
 
 def test_where_no_thread_can_be_started_the_line_is_written_at_once(
