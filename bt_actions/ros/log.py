@@ -145,7 +145,7 @@ class Log:
     def _say(self, logger: Any, level: str, text: str) -> None:
         try:
             WRITE[level](self._logger if logger is None else logger, text)
-        except Exception:  # noqa: BLE001 - of a logger whose node is gone, say: the line must not be
+        except Exception:  # noqa: BLE001 - its node is gone, say; the line is not lost
             with contextlib.suppress(OSError):
                 os.write(STDERR, f"[{level.upper()}] {text}\n".encode(errors="replace"))
         self._written += 1

@@ -277,56 +277,33 @@ def test_a_retry_without_a_pause_never_makes_one(load: Load) -> None:
     assert root.due_in() == 0.0  # type: ignore[attr-defined]
 
 
-INNER = """
-tree: inner
-inputs: {k: int32}
-outputs: {r: int32}
-root:
-  sequence: S
-  children:
-    - force_success: If it is the first
-      child: {sequence: First, children: [{check: $k == 0}, {set: {seen: = $k + 100}}]}
-    - set: {r: $seen}
-"""
+def visited_twice(load: Load, children: str) -> tuple[Status, dict[str, object]]:
+    """Run a subtree of these nodes, which computes `r` from `k`, for 0 and for 1."""
+    inner = (
+        "tree: inner\ninputs: {k: int32}\noutputs: {r: int32}\n"
+        f"root: {{sequence: S, children: [{children}]}}\n"
+    )
+    outer = (
+        "tree: outer\noutputs: {last: int32}\nroot:\n  for_each: Each\n  in: [0, 1]\n"
+        "  child: {subtree: inner.yaml, with: {k: $item}, save: {last: r}}\n"
+    )
+    root = load(outer, inner=inner)
+    return tick(root), tree_outputs(root)
 
 
 def test_a_subtree_begins_without_what_its_last_visit_wrote(load: Load) -> None:
-    each = """
-tree: outer
-outputs: {last: int32}
-root:
-  for_each: Each
-  in: [0, 1]
-  child: {subtree: inner.yaml, with: {k: $item}, save: {last: r}}
-"""
-    root = load(each, inner=INNER)
-    assert tick(root) is Status.FAILURE
-    assert tree_outputs(root) == {"last": 100}
+    seen_once = (
+        "{force_success: F, child: "
+        "{sequence: First, children: [{check: $k == 0}, {set: {seen: = $k + 100}}]}}"
+    )
+    ended = visited_twice(load, f"{seen_once}, {{set: {{r: $seen}}}}")
+    assert ended == (Status.FAILURE, {"last": 100})
 
 
 def test_what_a_subtree_does_once_it_knows_ever_after(load: Load) -> None:
-    inner = """
-tree: inner
-inputs: {k: int32}
-outputs: {r: int32}
-root:
-  sequence: S
-  children:
-    - run_once: Calibrate
-      child: {set: {offset: 100}}
-    - set: {r: = $k + $offset}
-"""
-    each = """
-tree: outer
-outputs: {last: int32}
-root:
-  for_each: Each
-  in: [0, 1]
-  child: {subtree: inner.yaml, with: {k: $item}, save: {last: r}}
-"""
-    root = load(each, inner=inner)
-    assert tick(root) is Status.SUCCESS
-    assert tree_outputs(root) == {"last": 101}
+    once = "{run_once: Calibrate, child: {set: {offset: 100}}}"
+    ended = visited_twice(load, f"{once}, {{set: {{r: = $k + $offset}}}}")
+    assert ended == (Status.SUCCESS, {"last": 101})
 
 
 def test_what_a_tree_wrote_is_forgotten_when_nothing_of_it_is_left(load: Load) -> None:
