@@ -334,6 +334,7 @@ class TreeRunner:
             self._running.release()
             self._is_down = True
             self._take_down()
+            _flush_log()  # what was said is written, whatever becomes of the process
         finally:
             self._shutting_down.release()
 

@@ -21,6 +21,7 @@ from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
+from bt_actions.ros.log import log
 from tests.support.processes import Host, Journal
 from tests.support.trees import Gate, Raises, in_sequence, state, together
 from tests.support.waiting import holds_for, until
@@ -354,8 +355,13 @@ class TestStart:
         assert returned == [Status.INVALID]
 
     def test_a_behaviour_that_raises_in_shutdown_keeps_no_client_alive(
-        self, name: str, node: Any, capfd: pytest.CaptureFixture[str]
+        self,
+        name: str,
+        node: Any,
+        capfd: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
+        monkeypatch.setattr(log, "_room", lambda _: not time.sleep(0.2))  # a slow reader
         leaf = MoveRobot("m", 9.0, action_name=name)
         runner = TreeRunner(in_sequence(Raises("culprit", "shutdown"), leaf), node=node)
         runner.interrupt()

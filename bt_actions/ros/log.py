@@ -25,6 +25,8 @@ MOST = 1000
 Half of them is for what is said of goals."""
 PACE = 0.1
 """Seconds, at most, that a tree which logs faster than it is written waits for room."""
+NAP = 0.001
+"""Seconds between two looks at how much has been written."""
 LINGER = 5.0
 """Seconds without a line until the thread ends."""
 AT_EXIT = 1.0
@@ -49,7 +51,7 @@ class Log:
     def __init__(self, name: str) -> None:
         self._logger = rclpy.logging.get_logger(name)
         self._lines: queue.Queue[tuple[Any, str, str]] = queue.Queue()
-        self._guard = threading.Lock()
+        self._guard = threading.RLock()
         self._thread: threading.Thread | None = None
         self._dropped = 0
         self._taken = 0
@@ -83,19 +85,23 @@ class Log:
     def flush(self, seconds: float = AT_EXIT) -> None:
         """Wait until all that was said by now has been written, but not for long.
 
-        Where that was in vain, not again before something has been written.
+        Where that was in vain, write here what there is room for, and do not wait again before
+        something has been written.
         """
         if self._written != self._stuck_at and not self._wait_for(self._taken, seconds):
             self._stuck_at = self._written
+            self._write_here()
 
     def _wait_for(self, lines: int, seconds: float) -> bool:
-        """Wait until so many lines have been written; return whether they were in time."""
-        end = time.monotonic() + seconds
-        while self._written < lines:
-            if time.monotonic() >= end:
-                return False
-            time.sleep(0.001)
-        return True
+        """Wait until so many lines have been written; return whether they were in time.
+
+        Counts its own naps: a process that was stopped meanwhile has not had the time.
+        """
+        for _ in range(int(seconds / NAP)):
+            if self._written >= lines:
+                return True
+            time.sleep(NAP)
+        return self._written >= lines
 
     def _put(self, level: str, text: str, logger: Any = None, most: int = MOST) -> None:
         with self._guard:
@@ -148,7 +154,8 @@ class Log:
         except Exception:  # noqa: BLE001 - its node is gone, say; the line is not lost
             with contextlib.suppress(OSError):
                 os.write(STDERR, f"[{level.upper()}] {text}\n".encode(errors="replace"))
-        self._written += 1
+        with self._guard:
+            self._written += 1
 
     def _room(self, patience: int | None) -> bool:
         """Wait until standard error takes a line: rclpy writes with the interpreter's lock held."""

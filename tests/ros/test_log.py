@@ -1,6 +1,8 @@
 """The log of goals never raises: what it would take along is the life of a goal."""
 
+import itertools
 import threading
+import time
 from typing import Any
 
 import pytest
@@ -47,7 +49,7 @@ def test_where_nobody_reads_a_tree_leaves_room_for_goals_and_what_was_dropped_is
 ) -> None:
     log, written, reads = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda _: reads.wait(60.0))
+    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
     for number in range(2 * MOST):
         log.by(written, "info", str(number))
     log.error("of a goal")
@@ -64,7 +66,7 @@ def test_a_reader_that_falters_is_waited_for_at_the_end(monkeypatch: pytest.Monk
     """A tree that logs has given up by then; what is said of goals at the end has not."""
     log, written, reads = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda _: reads.wait(60.0))
+    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
     for number in range(MOST):
         log.by(written, "info", str(number))
     assert log._slow_at == 0
@@ -76,10 +78,47 @@ def test_a_reader_that_falters_is_waited_for_at_the_end(monkeypatch: pytest.Monk
     assert "error: of a goal" in written.lines
 
 
+def test_where_its_thread_does_not_come_to_it_flush_writes_what_there_is_room_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, written, goes_on = Log("test"), Written(), threading.Event()
+    monkeypatch.setattr(log, "_logger", written)
+    monkeypatch.setattr(log, "_room", lambda patience: patience == 0 or goes_on.wait(60.0))
+    log.info("in its hands")
+    until(lambda: log._lines.empty())
+    log.error("a goal is not accounted for")
+    log.flush(0.01)
+    assert written.lines == ["error: a goal is not accounted for"]
+    goes_on.set()
+    until(lambda: written.lines[1:] == ["info: in its hands"])
+    log.flush(10.0)
+    assert log._written == log._taken == 2
+
+
+def test_the_time_that_a_process_was_stopped_for_is_not_the_logs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A machine that stood still for longer than `flush` waits: nothing has been in vain."""
+    log, written, passes = Log("test"), Written(), threading.Event()
+    monkeypatch.setattr(log, "_logger", written)
+    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and passes.wait(60.0))
+    log.error("a goal is not accounted for")
+    monkeypatch.setattr(time, "monotonic", itertools.count(0.0, 100.0).__next__)
+    nap = time.sleep
+
+    def goes_on(seconds: float) -> None:
+        passes.set()
+        nap(seconds)
+
+    monkeypatch.setattr(time, "sleep", goes_on)
+    log.flush(10.0)
+    assert written.lines == ["error: a goal is not accounted for"]
+
+
 def test_what_was_dropped_last_is_told_too(monkeypatch: pytest.MonkeyPatch) -> None:
     log, written, reads = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda _: reads.wait(60.0))
+    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
     for number in range(2 * MOST):
         log.info(str(number))
     reads.set()
