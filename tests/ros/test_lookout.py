@@ -14,6 +14,7 @@ import pytest
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros import line, lookout
+from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight
 from bt_actions.ros.shared import lock
 from tests.support.trees import in_turn
@@ -113,6 +114,7 @@ def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
         runner.run(5.0)
     assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
     until(nobody_looks)
+    log.flush(10.0)
     assert capfd.readouterr().err.count("no second look for lost servers") == 1
 
 
