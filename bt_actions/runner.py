@@ -191,7 +191,7 @@ class TreeRunner:
 
     def _mind_signals(self) -> contextlib.AbstractContextManager[None]:
         """With a node of the user's, its context's signal handling is the user's as well."""
-        if not self._spinner.owns_context:
+        if not self._spinner.owns_node:
             return contextlib.nullcontext()
         return self._ended_by_signals()
 
@@ -479,7 +479,7 @@ class TreeRunner:
                 self._leave_with(error)
                 for node in root.iterate():
                     if isinstance(node, ActionBehaviour):
-                        node.terminate(Status.INVALID)
+                        ActionBehaviour.terminate(node, Status.INVALID)
         self._patience.end()
         _drain(self._tickets, self._hurry)
         self._flush()

@@ -50,6 +50,7 @@ class ServerWatch:
         self._ready = False
         self._unready_since: float | None = None
         self._crowded_since: float | None = None
+        self._not_alone_before = float("-inf")
         self._probed_at = float("-inf")
         self._sent: dict[int, float] = {}  # probe: when it was sent
         self._answers: dict[int, tuple[int, float]] = {}  # probe: answers, time of the first
@@ -70,8 +71,19 @@ class ServerWatch:
             self._crowded_since = now if len(gids) > 1 else None
             self.gids = gids
         since = self._crowded_since
-        if since is not None and not self._both_answered and now - since >= SLOWEST_START:
+        if since is None or self._both_answered or now < self._not_alone_before:
+            return
+        if now - since >= SLOWEST_START:
             self.alone = self._answered_once(now, float("-inf"))
+
+    def stood_still(self, now: float) -> None:
+        """Take note that nobody listened for a while: answers of that time are yet to come in."""
+        self._not_alone_before = now + SETTLED_AFTER
+
+    @property
+    def is_crowded(self) -> bool:
+        """Whether more than one server is shown."""
+        return self._crowded_since is not None
 
     def _answered_once(self, now: float, sent_since: float) -> bool:
         return any(

@@ -719,6 +719,29 @@ class TestEvents:
         assert len(calls) == 1
         assert isinstance(events[-1], TreeFinished)
 
+    def test_a_terminate_of_an_action_that_raises_keeps_no_goal_from_its_drain(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        class Careless(MoveRobot):
+            def terminate(self, new_status: Status) -> None:
+                raise RuntimeError("on purpose in terminate")
+
+        class Breaks(py_trees.behaviours.Running):
+            def update(self) -> Status:
+                if state(leaf) == "EXECUTING":
+                    raise RuntimeError("on purpose in update")
+                return Status.RUNNING
+
+        events: list[Event] = []
+        leaf = Careless("m", 50.0, action_name=name)
+        runner = TreeRunner(together(Breaks("breaks"), leaf), node=node)
+        runner.observe(events.append)
+        with pytest.raises(TreeError, match="on purpose in update"):
+            runner.run(timeout=9.0)
+        assert (leaf.end, journal.count("canceled")) == (End.CANCELED, 1)
+        assert isinstance(events[-1], TreeFinished)
+        runner.shutdown()
+
     def test_a_terminate_that_ends_the_program_does_so_after_the_drain(
         self, journal: Journal, name: str, node: Any
     ) -> None:

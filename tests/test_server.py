@@ -194,3 +194,15 @@ def test_looking_seldom_is_not_being_away(watch: ServerWatch) -> None:
     assert not watch.gone(60.0, gids(OLD))
     watch.observe(61.0, False, gids(OLD))
     assert watch.gone(61.0, gids(OLD))
+
+
+def test_after_a_standstill_of_ours_answers_have_time_to_come_in(watch: ServerWatch) -> None:
+    """One had answered; the other's answer may lie in a socket."""
+    crowd(watch).probe_answered(1.1, 1)
+    late = 1.0 + SLOWEST_START
+    watch.stood_still(late)
+    for now in (late, late + 0.9 * SETTLED_AFTER):
+        watch.observe(now, True, gids(OLD, NEW))
+        assert watch.state(now) is Server.SETTLING
+    watch.observe(late + SETTLED_AFTER, True, gids(OLD, NEW))
+    assert watch.state(late + SETTLED_AFTER) is Server.READY

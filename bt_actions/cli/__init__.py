@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import sys
 from collections.abc import Sequence
 from types import ModuleType
@@ -106,6 +107,7 @@ def _dispatch(argv: Sequence[str] | None) -> int:
         return Exit.BAD_INPUT
     args = parser.parse(arguments)
     prepare(_reach(args))
+    os.environ.pop("RCUTILS_LOGGING_USE_STDOUT", None)  # standard output is for results
     return int(COMMANDS[args.command].run(args))
 
 

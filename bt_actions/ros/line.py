@@ -40,6 +40,8 @@ LOOK_WHILE_LOST = 1.0
 PUMP_EVERY = 0.01
 """Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
+STOOD_STILL = 0.5
+"""Seconds that a look is late by where this process, or the machine, seems to have stood still."""
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
 SILENT_FOR = 40.0
@@ -512,6 +514,10 @@ class Line:
         if not is_valid(self.traffic.node):
             self._orphan()
             return Server.ABSENT
+        if self.watch.is_crowded:  # what answers came in time count, though nobody spun the node
+            if self._look_at and now - self._look_at > STOOD_STILL:
+                self.watch.stood_still(now)
+            self.pump()
         before = self.watch.state(now)
         try:
             self._observe(now)

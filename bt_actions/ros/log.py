@@ -2,8 +2,10 @@
 
 Most of it is told under the one lock. Whoever reads standard error may stop to read: then the log
 waits, and nothing else does; rclpy's own loggers would hold up the whole process, so no other part
-of this package calls them, but for the simulation, which has no real robot behind it. Decides
-nothing and keeps nothing that was written.
+of this package calls them, but for the simulation, which has no real robot behind it. They are
+called here where a line is sure to have room: not on a terminal, of which nobody can tell, and not
+where they write to a buffer (RCUTILS_LOGGING_USE_STDOUT). There what is said of goals is written by
+hand. Decides nothing and keeps nothing that was written.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy.logging
+from rclpy.logging import LoggingSeverity
 
 MOST = 1000
 """Lines that wait to be written; of a reader that has stopped, newer ones are only counted.
@@ -43,13 +46,21 @@ WRITE: dict[str, Callable[[Any, str], object]] = {
     "fatal": lambda logger, text: logger.fatal(text),
 }
 """How a line of each level is written. rclpy keeps to one level for each line of code that logs."""
+COLOURS = {"warn": "33", "error": "31", "fatal": "31"}
+"""As rclpy's loggers have them on a terminal."""
 
 
 class Log:
     """Takes lines from any thread; never raises and, but for `by` and `flush`, never waits."""
 
     def __init__(self, name: str) -> None:
+        self._name = name
         self._logger = rclpy.logging.get_logger(name)
+        self._begin()
+        atexit.register(self.flush)
+        os.register_at_fork(after_in_child=self._begin)  # what waits is the parent's to write
+
+    def _begin(self) -> None:
         self._lines: queue.Queue[tuple[Any, str, str]] = queue.Queue()
         self._guard = threading.RLock()
         self._thread: threading.Thread | None = None
@@ -58,7 +69,7 @@ class Log:
         self._written = 0
         self._slow_at = -1  # lines written when `by` last waited in vain
         self._stuck_at = -1  # and `flush`
-        atexit.register(self.flush)
+        self._in_hand = False  # the thread writes a line
 
     def info(self, text: str) -> None:
         """Log something worth knowing."""
@@ -138,33 +149,56 @@ class Log:
                         return
                 continue
             self._room(None)
+            self._in_hand = True
             self._say(logger, level, text)
+            self._in_hand = False
             with self._guard:
                 if self._lines.empty():
                     self._tell_dropped()
 
     def _write_here(self) -> None:
+        """Write what waits as long as there is room, and not beside a thread that waits for it."""
         with contextlib.suppress(queue.Empty):
-            while self._room(0):
+            while not self._in_hand and self._room(0):
                 self._say(*self._lines.get_nowait())
 
     def _say(self, logger: Any, level: str, text: str) -> None:
         try:
-            WRITE[level](self._logger if logger is None else logger, text)
+            if logger is None and (os.isatty(STDERR) or _uses_stdout()):
+                if self._logger.is_enabled_for(LoggingSeverity[level.upper()]):
+                    _write_by_hand(level, self._name, text)
+            else:
+                WRITE[level](logger or self._logger, text)
         except Exception:  # noqa: BLE001 - its node is gone, say; the line is not lost
             with contextlib.suppress(OSError):
-                os.write(STDERR, f"[{level.upper()}] {text}\n".encode(errors="replace"))
+                _write_by_hand(level, self._name, text)
         with self._guard:
             self._written += 1
 
     def _room(self, patience: int | None) -> bool:
-        """Wait until standard error takes a line: rclpy writes with the interpreter's lock held."""
+        """Wait until a pipe takes a line: rclpy writes with the interpreter's lock held."""
         poll = select.poll()
         poll.register(STDERR, select.POLLOUT)
         try:
             return bool(poll.poll(patience))
         except OSError:
             return True
+
+
+def _uses_stdout() -> bool:
+    """Whether rclpy's loggers write to standard output, of which a signal may leave a part."""
+    return os.environ.get("RCUTILS_LOGGING_USE_STDOUT") == "1"
+
+
+def _write_by_hand(level: str, name: str, text: str) -> None:
+    """Write a line to standard error as rclpy's loggers do, but holding up no other thread."""
+    seconds, nanoseconds = divmod(time.time_ns(), 1_000_000_000)
+    line = f"[{level.upper()}] [{seconds}.{nanoseconds:09}] [{name}]: {text}"
+    if level in COLOURS and os.isatty(STDERR) and os.environ.get("RCUTILS_COLORIZED_OUTPUT") != "0":
+        line = f"\x1b[{COLOURS[level]}m{line}\x1b[0m"
+    left = f"{line}\n".encode(errors="replace")
+    while left:
+        left = left[os.write(STDERR, left) :]
 
 
 def _cut(text: str) -> str:

@@ -114,6 +114,8 @@ class Ticket:
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     testimony: Testimony = field(init=False)
+    told_unknown: bool = False
+    """The log says that it is not accounted for; and later, on whatever node, that it is."""
     paused_at: float | None = None
     begun_at: float = NEVER
     not_gone_before: float = NEVER

@@ -95,9 +95,9 @@ class Spinner:
             self._added = False
 
     @property
-    def owns_context(self) -> bool:
-        """Whether the ROS context was made here."""
-        return self._context is not None
+    def owns_node(self) -> bool:
+        """Whether the node was made here."""
+        return self._own_node
 
     def start(self) -> None:
         """Begin to spin; where somebody else should be spinning, make sure that they do.

@@ -63,7 +63,6 @@ class Traffic:
         self._name = node.get_name()
         self._lines: dict[str, Line] = {}
         self._observers: list[Observer] = []
-        self._unaccounted: set[Ticket] = set()  # told of in the log; some may still end
 
     @classmethod
     def of(cls, node: Node) -> Traffic:
@@ -260,14 +259,11 @@ class Traffic:
         """Report a goal's change to the log and the observers."""
         goal = ticket.goal
         unknown = goal.outcome is not None and goal.end is End.UNKNOWN
-        known_of = ticket in self._unaccounted
-        if unknown and not known_of:
-            self._unaccounted.add(ticket)
+        if unknown and not ticket.told_unknown:
             log.error(f"{goal!r}: not accounted for, it may still be running: {goal.reason}")
-        elif not unknown and known_of:
+        elif not unknown and ticket.told_unknown:
             log.info(f"{goal!r}: accounted for at last")
-        if not unknown or goal.state is State.DONE:
-            self._unaccounted.discard(ticket)
+        ticket.told_unknown = unknown
         now = self.clocks.now().ros
         self.notify(Change(now, ticket, goal.state, goal.outcome, goal.end, goal.reason))
 

@@ -107,6 +107,17 @@ class TestExitCode0:
             assert 0.0 < action["duration"] < 30.0
 
 
+    def test_standard_output_is_for_results_wherever_rclpys_loggers_are_to_write(
+        self, start: Start, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("RCUTILS_LOGGING_USE_STDOUT", "1")
+        faulty = ("--fault", "move_robot:1:reject", "--sim", "--speed", "20", "--json")
+        run = start("run", "pick_and_place", *faulty)
+        assert run.wait() == 0, run
+        assert [json.loads(line)["event"] for line in run.lines][-1] == "finished"
+        assert any("[sim" in line or "[move_robot" in line for line in run.errors), run
+
+
 class TestExitCode1:
     def test_a_failure_s_summary_comes_last(self, start: Start) -> None:
         run = start(

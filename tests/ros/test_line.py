@@ -12,9 +12,12 @@ from typing import Any
 
 import pytest
 
-from bt_actions.ros import alarm
+from bt_actions import End, Outcome
+from bt_actions.ros import alarm, traffic
 from bt_actions.ros import line as module
 from bt_actions.ros.line import LEASE, Line
+from bt_actions.ros.shared import lock
+from bt_actions.ros.traffic import Traffic
 from bt_actions.server import ServerWatch
 
 OURS, NEW = b"ours", b"new"
@@ -85,3 +88,65 @@ def test_a_goal_that_was_left_is_waited_for_as_long_whoever_adopts_it(
     first = adopt()
     assert first >= began + LEASE
     assert adopt() == first
+
+
+def look(line: Any, seen: ServerWatch, now: float) -> None:
+    """As far as the watch is concerned: then the node is gone."""
+
+    def observe(now: float) -> None:
+        seen.observe(now, True, seen.gids)
+        raise RuntimeError
+
+    line.watch, line._observe = seen, observe
+    line.traffic, line._come_home = SimpleNamespace(node=None), lambda: None
+    Line.look(line, now)
+
+
+def test_an_answer_that_lies_there_counts_before_a_server_is_called_the_only_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nobody has spun the node since it came."""
+    monkeypatch.setattr(module, "is_valid", lambda _: True)
+    seen = watch(OURS, NEW)
+    seen.probe_answered(0.5, 1)
+    line: Any = SimpleNamespace(_look_at=3.0, pump=lambda: seen.probe_answered(3.0, 1))
+    look(line, seen, 3.0)
+    assert seen.both_live
+    assert not seen.alone
+
+
+@pytest.mark.parametrize(("due", "alone"), [(3.0, True), (2.4, False)])
+def test_a_look_that_comes_late_decides_nothing_about_who_is_alone(
+    monkeypatch: pytest.MonkeyPatch, due: float, alone: bool
+) -> None:
+    """The process stood still: what came meanwhile is not in its reader yet."""
+    monkeypatch.setattr(module, "is_valid", lambda _: True)
+    seen = watch(OURS, NEW)
+    seen.probe_answered(0.5, 1)
+    line: Any = SimpleNamespace(_look_at=due, pump=lambda: None)
+    look(line, seen, 3.0)
+    assert seen.alone is alone
+
+
+def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was told on another node that it is not."""
+    said: list[str] = []
+    monkeypatch.setattr(traffic.log, "error", said.append)
+    monkeypatch.setattr(traffic.log, "info", said.append)
+    clocks = SimpleNamespace(now=lambda: SimpleNamespace(ros=0.0))
+    first, next_one = (Traffic.__new__(Traffic) for _ in range(2))
+    for each in (first, next_one):
+        each.clocks, each._observers = clocks, []  # type: ignore[assignment]
+    goal: Any = SimpleNamespace(outcome=Outcome.CANCELED, end=End.UNKNOWN, reason="", state=None)
+    ticket: Any = SimpleNamespace(goal=goal, told_unknown=False)
+    with lock:
+        first.note(ticket)
+        next_one.note(ticket)
+        goal.end = End.CANCELED
+        next_one.note(ticket)
+        next_one.note(ticket)
+    first_word, last_word = said
+    assert "not accounted for" in first_word
+    assert "accounted for at last" in last_word

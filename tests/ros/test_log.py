@@ -1,13 +1,20 @@
 """The log of goals never raises: what it would take along is the life of a goal."""
 
 import itertools
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
 import threading
 import time
 from typing import Any
 
 import pytest
+import rclpy.logging
 
-from bt_actions.ros.log import LONGEST, MOST, Log
+from bt_actions.ros.log import LONGEST, MOST, WRITE, Log
 from tests.support.waiting import until
 
 
@@ -138,7 +145,7 @@ def test_a_logger_of_a_node_that_is_gone_loses_nothing(
     log.info("and on")
     log.flush(10.0)
     assert written.lines == ["info: and on"]
-    assert capfd.readouterr().err == "[WARN] of a node\n"
+    assert re.fullmatch(r"\[WARN\] \[\d+\.\d{9}\] \[test\]: of a node\n", capfd.readouterr().err)
 
 
 def test_where_no_thread_can_be_started_the_line_is_written_at_once(
@@ -156,3 +163,97 @@ def test_where_no_thread_can_be_started_the_line_is_written_at_once(
     assert written.lines == ["error: a goal is not accounted for", "info: and on"]
     log.flush(0.0)
     assert log._written == log._taken
+
+
+ONE_THAT_GOES_ON = """
+import os, threading, time
+from bt_actions.ros.log import log
+logged = threading.Thread(target=lambda: [log.error("x" * 500 + f"-{n}") for n in range(500)])
+logged.start()
+logged.join()
+beats = 0
+for _ in range(200):
+    time.sleep(0.005)
+    beats += 1
+print("went on", flush=True)
+input()
+log.flush(60.0)
+os._exit(0)
+"""
+
+
+def test_a_terminal_that_nobody_reads_holds_up_nothing() -> None:
+    """It says that it has room for a byte, and a line does not fit: rclpy would wait for it."""
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-c", ONE_THAT_GOES_ON],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=theirs, text=True,
+    )  # fmt: skip
+    os.close(theirs)
+    said = b""
+    try:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        assert process.stdout.readline() == "went on\n"
+        process.stdin.write("\n")
+        process.stdin.flush()
+        while b"-499" not in said:
+            said += os.read(ours, 65536)
+        assert process.wait(20.0) == 0
+    finally:
+        process.kill()
+        process.wait()
+        os.close(ours)
+    assert [n for n in range(500) if f"x-{n}\x1b[0m\r\n".encode() not in said] == []
+    assert said.startswith(b"\x1b[31m[ERROR] [")
+
+
+@pytest.mark.parametrize("level", WRITE)
+def test_a_line_by_hand_looks_as_one_of_rclpys(
+    level: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    WRITE[level](rclpy.logging.get_logger("test"), "of a goal")
+    by_rclpy = capfd.readouterr().err
+    monkeypatch.setenv("RCUTILS_LOGGING_USE_STDOUT", "1")  # which rclpy has looked for by now
+    log = Log("test")
+    log._put(level, "of a goal")
+    log.flush(10.0)
+    by_hand = capfd.readouterr().err
+    numbers = re.compile(r"\d+\.\d{9}")
+    assert numbers.sub("", by_hand) == numbers.sub("", by_rclpy)
+    assert bool(by_hand) is (level != "debug")
+
+
+def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, written, reads = Log("test"), Written(), threading.Event()
+    monkeypatch.setattr(log, "_logger", written)
+    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
+    log.info("in its hands")
+    log.error("of the parent's goal")
+    held, forked = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with log._guard:
+            held.set()
+            forked.wait(60.0)
+
+    holder = threading.Thread(target=hold)  # which is not there in the child
+    holder.start()
+    held.wait(60.0)
+    child = os.fork()
+    if not child:
+        try:
+            signal.alarm(20)
+            reads.set()
+            log.info("of the child")
+            log.flush(10.0)
+            os._exit(0 if written.lines == ["info: of the child"] else 1)
+        finally:
+            os._exit(2)
+    assert os.waitpid(child, 0)[1] == 0
+    forked.set()
+    holder.join()
+    reads.set()
+    until(lambda: written.lines == ["info: in its hands", "error: of the parent's goal"])

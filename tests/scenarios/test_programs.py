@@ -90,6 +90,37 @@ def test_rclpys_signal_handlers_are_in_force_again_after_a_run(
     record.outcome = "canceled, by the loop that rclpy's handler ended"
 
 
+ON_THE_USERS_CONTEXT = """
+    from rclpy.executors import SingleThreadedExecutor
+    rclpy.init()
+    leaf = MoveRobot("m", 9.0, action_name=name, timeout=T)
+    runner = TreeRunner(leaf, executor=SingleThreadedExecutor())
+    runner.observe(said)
+    runner.run()
+"""
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGHUP,  # for which rclpy has no handler
+        pytest.param(signal.SIGTERM, marks=pytest.mark.chaos),
+        pytest.param(signal.SIGINT, marks=pytest.mark.chaos),
+    ],
+)
+def test_a_node_of_its_own_in_the_users_context_ends_its_goals_before_a_signal_takes_effect(
+    host: Host, name: str, program: Callable[[str], Process], number: signal.Signals, record: Record
+) -> None:
+    """rclpy.init(), a runner with an executor of the user's and no node; a signal in run()"""
+    journal = host.open(name)
+    process = program(ON_THE_USERS_CONTEXT)
+    process.line("executing", within=60.0)
+    process.send(number)
+    process.wait()
+    assert journal.ends() == ["canceled"], process
+    record.outcome = "canceled, then the signal takes effect"
+
+
 TWO_RUNNERS = """
     leaves = [MoveRobot(x, 9.0, action_name=name + x, timeout=T) for x in ("", "_b")]
     runners = [TreeRunner(leaf) for leaf in leaves]
