@@ -34,13 +34,22 @@ __all__ = ["BUILDERS", "build"]
 
 
 def build(
-    document: Document, scope: Scope, *, namespace: str = "", types: bool = True
+    document: Document,
+    scope: Scope,
+    *,
+    namespace: str = "",
+    types: bool = True,
+    python: bool = True,
 ) -> Behaviour:
-    """The behaviours of a document; each has the place it was written at in `place`."""
+    """The behaviours of a document; each has the place it was written at in `place`.
+
+    What cannot be made is reported to the document's source. Raises TooManyErrors. With
+    `python=False` that holds for every ``python:`` node.
+    """
     assert document.root is not None
     inner = join_names(namespace, document.namespace)
     topics = {declared.name: _topic(declared, inner) for declared in document.topics.values()}
-    context = Context(document, scope, inner, types, topics)
+    context = Context(document, scope, inner, types, topics, python)
     root = _node(document.root, context)
     if topics:
         _connect(root, list(topics.values()))
@@ -159,7 +168,7 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     assert included is not None
     scope = context.scope.inner(included.name)
     namespace = join_names(context.namespace, text_of(node.values, "namespace"))
-    child = build(included, scope, namespace=namespace, types=context.types)
+    child = build(included, scope, namespace=namespace, types=context.types, python=context.python)
     given = node.values.get("with", {})
     saved = table_of(node.values.get("save"))
     written = {declared.name for declared in included.outputs.values()}

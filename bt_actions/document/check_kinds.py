@@ -19,7 +19,9 @@ from bt_actions.suggest import did_you_mean, listing
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker
 
-__all__ = ["CHECKS"]
+__all__ = ["CHECKS", "NO_PYTHON"]
+
+NO_PYTHON = "python: is not allowed here, because it runs code that the tree names"
 
 
 def _subtree(checker: Checker, node: TreeNode) -> None:
@@ -224,8 +226,7 @@ def _log(checker: Checker, node: TreeNode) -> None:
 def _python(checker: Checker, node: TreeNode) -> None:
     path, arguments = node.values.get("python"), node.values.get("arguments", {})
     if not checker.python:
-        text = "python: is not allowed here, because it runs code that the tree names"
-        checker.source.report("BT214", span_of(node.key), text)
+        checker.source.report("BT214", span_of(node.key), NO_PYTHON)
         return
     computed = list(computed_in(arguments))
     for one in computed:

@@ -27,6 +27,8 @@ class Context:
     namespace: str
     types: bool
     topics: Mapping[str, TopicValue]
+    python: bool = True
+    """Whether ``python:`` nodes may be made."""
 
     def read(self, name: str) -> object:
         """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.

@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from bt_actions.document.findings import Place, Related, Span
-from bt_actions.document.source import Source
+from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.syntax import report_syntax
 
 __all__ = [
@@ -129,8 +129,8 @@ def _number(text: str) -> object:
 def compose(source: Source) -> Node | None:
     """The document in a source, or None when it has none or cannot be read.
 
-    What is wrong is reported to the source; after a syntax error nothing can be read on. Raises
-    ImportError, with the name libyaml, where that is missing.
+    What is wrong is reported to the source; after a syntax error, or too many of others, nothing
+    can be read on. Raises ImportError, with the name libyaml, where that is missing.
     """
     source.root = _composed(_Composer(source), source)
     return source.root
@@ -152,6 +152,8 @@ def _composed(composer: _Composer, source: Source) -> Node | None:
         composer.read(yaml.CSafeLoader(source.text).get_event)
     except yaml.YAMLError as error:
         report_syntax(source, error)
+        return None
+    except TooManyErrors:
         return None
     return None if composer.gave_up else composer.root
 

@@ -227,6 +227,63 @@ def test_a_document_full_of_errors_is_answered_in_bounded_time(line: str) -> Non
     assert time.monotonic() - started < 30
 
 
+def test_after_a_thousand_warnings_an_error_is_told_and_a_thousandth_says_that_there_may_be_more(
+    tmp_path: Path,
+) -> None:
+    head = "tree: t\nroot:\n  sequence: S\n  children:\n"
+    warned = head + "    - success: Part #0\n" * (MAX_ERRORS + 10)
+    (*warnings, error) = check_bytes(f"{warned}    - sucess: A\n".encode())
+    assert {finding.code for finding in warnings} == {"BT116"}
+    assert (error.code, error.hint) == ("BT201", None)
+
+    *_, last = check_bytes((head + "    - sucess: A\n" * 2 * MAX_ERRORS).encode())
+    assert last.line == 4 + MAX_ERRORS
+    assert last.hint == "after 1,000 errors the rest of a file is not checked"
+
+    path = tmp_path / "tree.yaml"
+    path.write_text(warned + "    - sucess: A\n" * 2 * MAX_ERRORS, encoding="utf-8")
+    with pytest.raises(DocumentError) as caught:
+        load_tree(path)
+    assert len(caught.value.findings) == MAX_ERRORS
+
+
+def test_what_one_file_has_too_much_of_keeps_no_other_from_being_checked(tmp_path: Path) -> None:
+    (tmp_path / "b.yaml").write_text("tree: b\nroot: {check: $nobody > 1}\n")
+    checks = "    - check: $missing > 1\n" * 2 * MAX_ERRORS
+    (tmp_path / "a.yaml").write_text(
+        f"tree: a\nroot:\n  sequence: S\n  children:\n    - subtree: b.yaml\n{checks}"
+    )
+    findings = check_file(tmp_path / "a.yaml")
+    assert len(findings) == MAX_ERRORS + 1
+    assert "$nobody" in findings[-1].message
+
+
+def test_data_with_too_many_errors_is_refused_where_it_is_named(tmp_path: Path) -> None:
+    (tmp_path / "data.yaml").write_text("a: 1\n" * 2 * MAX_ERRORS)
+    (tmp_path / "tree.yaml").write_text("tree: t\nroot: {set: {x: '@data.yaml'}}\n")
+    with pytest.raises(DocumentError, match=r"data\.yaml:2:1: the key 'a' is here twice") as caught:
+        load_tree(tmp_path / "tree.yaml")
+    assert len(caught.value.findings) == 1
+
+
+def test_classes_that_fail_when_they_are_made_are_refused_whatever_their_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "failing_thousandfold.py").write_text(
+        "import py_trees\n"
+        "class Fails(py_trees.behaviours.Success):\n"
+        "    def __init__(self, name):\n"
+        "        raise RuntimeError('broken')\n"
+    )
+    nodes = "    - python: failing_thousandfold.Fails\n" * (MAX_ERRORS + 10)
+    path = tmp_path / "tree.yaml"
+    path.write_text(f"tree: t\nroot:\n  sequence: S\n  children:\n{nodes}")
+    with pytest.raises(DocumentError, match="broken") as caught:
+        load_tree(path)
+    assert len(caught.value.findings) == MAX_ERRORS
+
+
 def test_a_long_line_is_shown_cut() -> None:
     (finding,) = check_bytes(b"tree: t\nroot: {success: A, x" + b"x" * 100_000 + b": 1}\n")
     assert len(str(finding)) < 200_000
