@@ -122,7 +122,7 @@ def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
 
 
 def _number_of(
-    key: str, wanted: FieldType, least: float = 0
+    key: str, wanted: FieldType, least: float = 0, *, zero: bool = True
 ) -> Callable[[Checker, TreeNode], None]:
     def check(checker: Checker, node: TreeNode) -> None:
         value = node.values.get(key)
@@ -137,6 +137,8 @@ def _number_of(
         if isinstance(number, (int, float)) and not least <= number < float("inf"):
             text = f"at least {least:g} is needed, not {number}"
             checker.source.report("BT110", span_of(value.node), text)
+        elif number == 0 and not zero:
+            checker.source.report("BT110", span_of(value.node), "more than zero is needed, not 0")
 
     return check
 
@@ -264,7 +266,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "service": _service,
         "set": _set,
         "subtree": _subtree,
-        "timeout": _number_of("after", FLOAT),
+        "timeout": _number_of("after", FLOAT, zero=False),
         "wait": _number_of("wait", FLOAT),
         "wait_for_message": _wait_for_message,
         "wait_until": _condition_of("wait_until"),
