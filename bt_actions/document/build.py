@@ -96,7 +96,10 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
 
 
 def _children(node: TreeNode, context: Context) -> list[Behaviour]:
-    return [_node(child, context) for child in node.children]
+    built = []
+    for child in node.children:  # a comprehension would take a level of recursion of its own
+        built.append(_node(child, context))  # noqa: PERF401
+    return built
 
 
 def _sequence(node: TreeNode, context: Context) -> Behaviour:

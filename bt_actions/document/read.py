@@ -123,18 +123,31 @@ def read_root(document: Document) -> None:
     """Read the nodes of a document whose actions are all known (its imports' among them)."""
     written = document.node.get("root")
     if written is not None:
-        document.root = _Reader(document).node(written)
+        document.root = _Reader(document).tree(written)
 
 
 class _Reader:
-    """Reads nodes; recursion is bounded by the depth that `compose` allows."""
+    """Reads nodes. No recursion: trees inside each other are read while others wait."""
 
     def __init__(self, document: Document) -> None:
         self._source = document.source
         self._actions = document.actions
         self._doubts = Doubts(document)
+        self._waiting: list[tuple[TreeNode, Node]] = []
+        """Children to be read, each with its parent; the next is the last."""
+
+    def tree(self, written: Node) -> TreeNode | None:
+        """The tree that begins with a node."""
+        root = self.node(written)
+        while self._waiting:
+            parent, item = self._waiting.pop()
+            child = self.node(item)
+            if child is not None:
+                parent.children.append(child)
+        return root
 
     def node(self, written: Node) -> TreeNode | None:
+        """A node by itself; its children wait."""
         node = self._node(written)
         if node is None:
             self._source.unread.nodes.append(written)
@@ -291,10 +304,7 @@ class _Reader:
             if not written:
                 self._source.report("BT110", span_of(inner), "there must be a child at least")
                 self._source.unread.nodes.append(inner)
-        for item in written:
-            child = self.node(item)
-            if child is not None:
-                node.children.append(child)
+        self._waiting += [(node, item) for item in reversed(written)]
 
 
 _ACTION_NAME = KINDS["sequence"]

@@ -9,16 +9,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from bt_actions.document.find import TreeNotFoundError, find_tree
-from bt_actions.document.findings import DocumentError, Finding, Place, Related
-from bt_actions.document.nodes import Listing, Node, Scalar, span_of
+from bt_actions.document.findings import DocumentError, Finding, Related
+from bt_actions.document.nodes import Listing, Node, span_of
 from bt_actions.document.read import read_document, read_root
 from bt_actions.document.source import Source, read_source
 from bt_actions.document.tree import Declared, Document, TreeNode
 
-__all__ = ["MAX_TREE_NODES", "Workspace"]
+__all__ = ["MAX_LEVELS", "MAX_TREE_NODES", "Workspace"]
 
 MAX_TREE_NODES = 1_000_000
 """Nodes of a tree after all that it includes was unfolded."""
+MAX_LEVELS = 200
+"""Nodes inside each other after all that a tree includes was unfolded: py_trees ticks and stops a
+tree by recursion, and Python has 1,000 levels of that for everything."""
 _MAX_CHAIN = 50
 _MAX_FILES = 2 * _MAX_CHAIN
 """Trees inside each other, and then files that import each other."""
@@ -31,6 +34,7 @@ class Workspace:
         self._documents: dict[tuple[Path, bool], Document | None] = {}
         self._sources: list[Source] = []
         self._sizes: dict[int, int] = {}
+        self._heights: dict[int, int] = {}
         self._unreadable: list[Finding] = []
 
     def open(self, path: Path, name: str | None = None) -> Document | None:
@@ -69,18 +73,30 @@ class Workspace:
             return None
         self._import(document, chain)
         read_root(document)
-        size = 0
+        size = height = 0
+        levels = {id(document.root): 1}
         for node in document.nodes():
             size += 1
+            level = levels.pop(id(node))
+            levels.update((id(child), level + 1) for child in node.children)
+            height = max(height, level)
             if node.kind is not None and node.kind.name == "subtree":
                 node.included = self._include(node, chain)
                 if node.included is not None:
                     size += self._sizes.get(id(node.included), 0)
+                    below = level + self._heights.get(id(node.included), 0)
+                    if below > MAX_LEVELS:
+                        message = f"the tree unfolds to more than {MAX_LEVELS} levels of nodes"
+                        source.report("BT105", span_of(node.key), message)
+                        node.included = None
+                        below = level
+                    height = max(height, below)
                 if size > MAX_TREE_NODES:
                     message = f"the tree unfolds to more than {MAX_TREE_NODES:,} nodes"
                     source.report("BT105", span_of(node.key), message)
                     break
         self._sizes[id(document)] = min(size, MAX_TREE_NODES + 1)
+        self._heights[id(document)] = height
         return document
 
     def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:
@@ -200,11 +216,6 @@ def merged(base: object, over: object) -> dict[str, object]:
         both = isinstance(earlier, dict) and isinstance(value, dict)
         result[name] = merged(earlier, value) if both else value
     return result
-
-
-def place_of_scalar(node: Scalar, source: Source) -> Place:
-    """Where a scalar is written."""
-    return Place(source.name, node.line, node.column)
 
 
 def _key(path: Path) -> Path:

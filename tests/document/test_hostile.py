@@ -6,13 +6,17 @@ import os
 import random
 import time
 import tracemalloc
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
 
+from bt_actions import render
 from bt_actions.document import (
     DocumentError,
     Finding,
@@ -22,6 +26,7 @@ from bt_actions.document import (
     source_of,
 )
 from bt_actions.document.source import MAX_BYTES, MAX_ERRORS
+from bt_actions.document.workspace import MAX_LEVELS
 from tests.document.test_wrong_documents import CASES
 
 EMPTY = '""'
@@ -165,9 +170,108 @@ def test_ten_thousand_levels_of_nesting_are_one_finding(text: str) -> None:
     assert "error[BT105]: nested deeper than 200 levels" in only(check_bytes(text.encode()))
 
 
-def test_the_deepest_tree_that_is_allowed_is_checked() -> None:
+def test_the_deepest_tree_that_is_allowed_in_one_file_is_checked_loaded_and_ticked(
+    tmp_path: Path,
+) -> None:
     text = "tree: t\nroot: " + "{invert: a, child: " * 198 + "{success: A}" + "}" * 198 + "\n"
     assert check_bytes(text.encode()) == []
+    path = tmp_path / "tree.yaml"
+    path.write_text(text)
+    root = load_tree(path)
+    root.tick_once()
+    assert root.status is Status.SUCCESS
+
+
+@pytest.mark.parametrize("text", [
+    "tree: t\nroot:\n  log: {inner}\n",
+    "tree: t\nroot:\n  <<: {inner}\n",
+    "a: {inner}\nb: *x2\n",
+])  # fmt: skip
+def test_aliases_of_aliases_are_no_deeper_than_what_is_written_out(text: str) -> None:
+    inner = "[&x0 " + "[" * 90 + "]" * 90
+    for n in range(1, 20):
+        inner += f", &x{n} " + "[" * 90 + f"*x{n - 1}" + "]" * 90
+    said = only(check_bytes(text.replace("{inner}", inner + "]").encode()))
+    assert "error[BT105]: nested deeper than 200 levels" in said
+
+
+def test_an_alias_may_reach_as_deep_as_what_is_written_out() -> None:
+    def checked(below: int) -> list[Finding]:
+        shared = "{invert: a, child: " * 100 + "{success: A}" + "}" * 100
+        around = "{invert: b, child: " * below + "*shared" + "}" * below
+        return check_bytes(
+            f"tree: t\nroot: {{sequence: s, children: [&shared {shared}, {around}]}}\n".encode()
+        )
+
+    assert checked(96) == []
+    assert "nested deeper than 200 levels" in only(checked(97))
+
+
+def deep_down(levels: int, call: Callable[[], object]) -> object:
+    return call() if levels == 0 else deep_down(levels - 1, call)
+
+
+def write_deep(folder: Path, node: str, levels: int, per_file: int) -> Path:
+    """A tree of so many levels, of which each file holds some, and a subtree below them."""
+    head, tail = node.split("CHILD")
+    number = 0
+    while True:
+        nodes = min(per_file, levels - 1)
+        levels -= nodes + 1
+        inner = f"{{subtree: f{number + 1}.yaml}}" if levels else "{running: Wait}"
+        text = f"tree: t\nroot: {head * nodes}{inner}{tail * nodes}\n"
+        (folder / f"f{number}.yaml").write_text(text, encoding="utf-8")
+        number += 1
+        if not levels:
+            return folder / "f0.yaml"
+
+
+@pytest.mark.parametrize("per_file", [97, 3])
+@pytest.mark.parametrize("node", [
+    "{sequence: a, children: [CHILD, {success: }]}",
+    "{fallback: a, memory: false, children: [CHILD, {success: }]}",
+    "{parallel: a, children: [CHILD]}",
+    "{invert: a, child: CHILD}",
+    "{run_once: a, child: CHILD}",
+    "{for_each: a, in: [1, 2], child: CHILD}",
+    "{timeout: a, after: 9 s, child: CHILD}",
+    "{retry: a, attempts: 2, child: CHILD}",
+])  # fmt: skip
+def test_the_deepest_tree_that_is_allowed_runs_and_is_drawn_from_deep_within_a_program(
+    tmp_path: Path, node: str, per_file: int
+) -> None:
+    path = write_deep(tmp_path, node, MAX_LEVELS, per_file)
+
+    def use() -> None:
+        assert {finding.severity for finding in check_file(path)} <= {"warning"}
+        root = load_tree(path)
+        tree = BehaviourTree(root)
+        tree.setup()
+        tree.tick()
+        assert root.status is Status.RUNNING
+        assert root.tip() is not None
+        assert "Wait" in render.text(root)
+        assert "Wait" in render.dot(root)
+        root.stop(Status.INVALID)
+        tree.shutdown()
+
+    deep_down(100, use)
+
+
+@pytest.mark.parametrize("per_file", [97, 4])
+def test_a_tree_that_is_deeper_with_what_it_includes_is_one_finding(
+    tmp_path: Path, per_file: int
+) -> None:
+    path = write_deep(tmp_path, "{invert: a, child: CHILD}", MAX_LEVELS + 1, per_file)
+    assert only(check_file(path)).endswith("the tree unfolds to more than 200 levels of nodes")
+    with pytest.raises(DocumentError, match="more than 200 levels"):
+        load_tree(path)
+
+
+def test_a_chain_of_deep_trees_is_checked_without_an_end_of_recursion(tmp_path: Path) -> None:
+    path = write_deep(tmp_path, "{invert: a, child: CHILD}", 49 * 198, 197)
+    (*_, finding) = check_file(path)
+    assert finding.code == "BT105"
 
 
 def test_a_billion_laughs_are_one_finding() -> None:
