@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +20,7 @@ from bt_actions.behaviours.loops import ForEach, Repeat, RetryChild
 from bt_actions.behaviours.parallel import Parallel
 from bt_actions.behaviours.subtree import Subtree
 from bt_actions.behaviours.topics import TopicValue
+from bt_actions.document.bounds import refuse_large
 from bt_actions.document.build_leaves import LEAVES, build_action
 from bt_actions.document.build_names import join_names, text_of
 from bt_actions.document.context import Context, plain_name, table_of, written_text
@@ -152,9 +154,7 @@ def _for_each(node: TreeNode, context: Context) -> Behaviour:
     item_name, index_name = text_of(values, "as") or "item", text_of(values, "index")
 
     def begin(item: object, index: int) -> None:
-        context.scope.write(item_name, item)
-        if index_name:
-            context.scope.write(index_name, index)
+        context.write({item_name: item} | ({index_name: index} if index_name else {}))
 
     keep_going = values.get("on_failure") == "continue"
     items = context.value(values["in"])
@@ -184,6 +184,10 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
         values = _resolved(given, context)
         if not isinstance(values, dict):
             raise ValueError(f"'with' needs a mapping of inputs to values, not {values!r:.60}")
+        try:
+            refuse_large(values)
+        except ValueError as error:
+            raise ValueError(f"'with': {error}") from None
         inputs = check_inputs(included, values, types=context.types)
         for name in written:
             if name not in inputs:
@@ -191,12 +195,11 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
         scope.write_all(inputs)
 
     def end() -> None:
+        values = {}
         for name, output in saved.items():
-            try:
-                value = scope.read(output)
-            except KeyError:
-                continue  # a tree that failed may have nothing to give
-            context.scope.write(name, value)
+            with contextlib.suppress(KeyError):  # a tree that failed may have nothing to give
+                values[name] = scope.read(output)
+        context.write(values)
 
     return Subtree(node.name or included.name, child, begin, end)
 

@@ -37,6 +37,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         context.scope.key(name): place.expression
         for name, place in table_of(settings.get("save")).items()
     }
+    names = {context.scope.key(name): name for name in table_of(settings.get("save"))}
     given = settings.get("resources")
     resources = given if isinstance(given, list) else []
     return ActionBehaviour(
@@ -48,6 +49,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         retry=_retry(settings, context),
         expect=context.condition(settings.get("expect"), "result"),
         save=save,
+        fit=lambda key, value: context.fitting(names[key], value),
         busy=text_of(settings, "busy") or "wait",
         resources=[context.joined(settings, str(each)) for each in resources],
     )

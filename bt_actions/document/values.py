@@ -15,6 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from bt_actions.document.bounds import refuse_large
 from bt_actions.document.braces import report_braces
 from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError
@@ -22,6 +23,7 @@ from bt_actions.document.inner import inner_span
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
 from bt_actions.document.source import Source, read_source
 from bt_actions.expression import Expression, ExpressionError
+from bt_actions.expression_values import MAX_ITEMS as MAX_TEXT
 
 __all__ = [
     "BAD",
@@ -72,13 +74,18 @@ class Interpolated:
     node: Scalar
 
     def evaluate(self, variable: Lookup) -> str:
-        """The text. Raises ExpressionError."""
-        return "".join(
-            part if isinstance(part, str) else _as_text(part.evaluate(variable))
-            for part in self.parts
-        )
+        """The text. Raises ExpressionError, also for one longer than an expression may make it."""
+        texts, left = [], MAX_TEXT
+        for part in self.parts:
+            text = part if isinstance(part, str) else _as_text(part.evaluate(variable))
+            texts.append(text)
+            left -= len(text)
+            if left < 0:
+                raise ExpressionError(_TOO_LONG)
+        return "".join(texts)
 
 
+_TOO_LONG = f"the text would be longer than {MAX_TEXT:,} characters"
 _DATA_FILES = (".yaml", ".yml", ".json")
 _VARIABLE = re.compile(r"\$[A-Za-z_]\w*(?:\.\w+|\[-?\d+\])*", re.ASCII)
 _DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
@@ -312,4 +319,8 @@ def resolve(value: object, variable: Lookup) -> object:
 def _as_text(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
+    try:
+        refuse_large(value, items=MAX_TEXT, characters=MAX_TEXT)  # an item takes a character
+    except ValueError:
+        raise ExpressionError(_TOO_LONG) from None
     return str(value)
