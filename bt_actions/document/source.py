@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from bt_actions.document.nodes import Node
 
 __all__ = [
-    "MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "Unread", "read_source", "read_stream",
-    "source_of",
+    "MAX_BYTES", "MAX_ERRORS", "Char", "Source", "TooManyErrors", "Unread", "read_source",
+    "read_stream", "source_of",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
@@ -30,6 +30,8 @@ MAX_ERRORS = 1000
 """After so many errors in a file the checker stops: each costs time to explain."""
 PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
+Char = tuple[str, int, int]
+"""A character of a text, and the line and column where it is written, from 1."""
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -70,6 +72,8 @@ class Source:
     unread: Unread = field(default_factory=Unread)
     settled: set[Span] = field(default_factory=set)
     """Scalars about which enough was said."""
+    decoded: tuple[Node, list[Char]] | None = None
+    """The scalar that inner.py was last asked about, and where its characters are written."""
     errors: int = 0
     """How many of the findings keep the tree from running."""
     _lines: list[str] | None = None

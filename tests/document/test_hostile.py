@@ -473,3 +473,35 @@ def test_the_time_for_ignores_grows_with_their_number_and_no_faster(alone: bool)
         return time.process_time() - started
 
     assert seconds(8000) < 8 * seconds(2000) + 0.5
+
+
+@pytest.mark.parametrize(("head", "each", "tail"), [
+    ("root: {log: '", "$(x)", "'}\ninputs: {x: {type: int32, default: 1}}\n"),
+    ("root:\n  set:\n", "    v{n}: 1\n", ""),
+    ("root:\n  sequence: S\n  memory: false\n  children:\n", "    - log: a\n", ""),
+    (
+        "root:\n  sequence: S\n  memory: false\n  children:\n",
+        "    - {action: a, type: a/action/B, server: s, timeout: 1 s}\n",
+        "",
+    ),
+])  # fmt: skip
+def test_the_time_for_many_of_one_thing_grows_with_their_number_and_no_faster(
+    head: str, each: str, tail: str
+) -> None:
+    def seconds(count: int) -> float:
+        text = (
+            f"tree: t\n{head}" + "".join(each.replace("{n}", str(n)) for n in range(count)) + tail
+        )
+        source = source_of(text.encode(), "tree.yaml")
+        started = time.process_time()
+        check_source(source, types=False)
+        return time.process_time() - started
+
+    assert seconds(8000) < 8 * seconds(2000) + 0.5
+
+
+def test_a_thousand_errors_in_one_long_text_are_told_in_bounded_time() -> None:
+    text = "tree: t\nroot: {log: '" + "nothing is called $(x); " * 8000 + "'}\n"
+    started = time.process_time()
+    assert len(check_bytes(text.encode())) == MAX_ERRORS
+    assert time.process_time() - started < 5
