@@ -20,14 +20,16 @@ if TYPE_CHECKING:
     from bt_actions.document.nodes import Node
 
 __all__ = [
-    "MAX_BYTES", "MAX_ERRORS", "Char", "Source", "TooManyErrors", "Unread", "read_source",
-    "read_stream", "source_of",
+    "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
+    "read_source", "read_stream", "source_of",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
 """The largest file that is read; a tree of 100,000 nodes has about a third of it."""
 MAX_ERRORS = 1000
 """After so many errors in a file the checker stops: each costs time to explain."""
+SUFFIXES = (".yaml", ".yml", ".json")
+"""How the files end that a tree may name."""
 PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
 Char = tuple[str, int, int]
@@ -137,13 +139,19 @@ class Source:
         return self.errors > 0
 
 
-def read_source(path: Path, name: str | None = None) -> Source:
-    """The source in a file. Raises DocumentError when it cannot be read as text."""
+def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> Source:
+    """The source in a file. Raises DocumentError when it cannot be read as text.
+
+    Whoever writes to a pipe may keep its reader waiting: with `pipes=False` none is read, as where
+    the path stands in a tree and was not given by the user.
+    """
     name = name or str(path)
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
             raise _unreadable(name, "this is a directory, not a tree")
+        if stat.S_ISFIFO(mode) and not pipes:
+            raise _unreadable(name, "this is a pipe, which a tree cannot name")
         if stat.S_ISFIFO(mode):
             return source_of(_read_pipe(path, name), name, path)
         if not stat.S_ISREG(mode):

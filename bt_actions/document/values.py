@@ -21,7 +21,7 @@ from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError
 from bt_actions.document.inner import inner_span
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
-from bt_actions.document.source import Source, read_source
+from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.expression_values import MAX_ITEMS as MAX_TEXT
 
@@ -86,7 +86,6 @@ class Interpolated:
 
 
 _TOO_LONG = f"the text would be longer than {MAX_TEXT:,} characters"
-_DATA_FILES = (".yaml", ".yml", ".json")
 _VARIABLE = re.compile(r"\$[A-Za-z_]\w*(?:\.\w+|\[-?\d+\])*", re.ASCII)
 _DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
 
@@ -155,15 +154,15 @@ def _computes(text: str) -> bool:
 
 def names_file(text: str) -> bool:
     """Whether a text stands for the data in a file: ``@points.yaml``."""
-    return text.startswith("@") and text.endswith(_DATA_FILES)
+    return text.startswith("@") and text.endswith(SUFFIXES)
 
 
-def read_data(path: Path) -> object:
+def read_data(path: Path, *, pipes: bool = False) -> object:
     """The data in a YAML or JSON file; a dollar sign means nothing in it.
 
-    Raises DocumentError, with the place in that file.
+    Raises DocumentError, with the place in that file. `pipes` as for `read_source`.
     """
-    source = read_source(path)
+    source = read_source(path, pipes=pipes)
     node = compose(source)
     if source.findings:
         raise DocumentError(source.findings)

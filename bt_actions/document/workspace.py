@@ -12,7 +12,7 @@ from bt_actions.document.find import TreeNotFoundError, find_tree
 from bt_actions.document.findings import DocumentError, Finding, Related
 from bt_actions.document.nodes import Listing, Node, span_of
 from bt_actions.document.read import read_document, read_root
-from bt_actions.document.source import Source, read_source
+from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.document.tree import Declared, Document, TreeNode
 
 __all__ = ["MAX_LEVELS", "MAX_TREE_NODES", "Workspace"]
@@ -130,14 +130,19 @@ class Workspace:
     def _find(self, wanted: str, written: Node, source: Source) -> Path | None:
         beside = source.path.parent if source.path is not None else None
         try:
-            return find_tree(wanted, beside=beside)
+            path = find_tree(wanted, beside=beside)
         except TreeNotFoundError as error:
             source.report("BT209", span_of(written), str(error))
             return None
+        if path.suffix not in SUFFIXES and _is_file(path):
+            text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"
+            source.report("BT209", span_of(written), text)
+            return None
+        return path
 
     def _read(self, path: Path, written: Node, source: Source) -> Source | None:
         try:
-            return read_source(path, _shown(path, source))
+            return read_source(path, _shown(path, source), pipes=False)
         except DocumentError as error:
             first = error.findings[0]
             if first.code == "BT101":  # told where it stands in that file, as all that is wrong
@@ -216,6 +221,13 @@ def merged(base: object, over: object) -> dict[str, object]:
         both = isinstance(earlier, dict) and isinstance(value, dict)
         result[name] = merged(earlier, value) if both else value
     return result
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def _key(path: Path) -> Path:

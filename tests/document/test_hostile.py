@@ -125,6 +125,41 @@ def test_a_pipe_that_nobody_writes_to_is_not_waited_for(
     assert "nobody wrote to this pipe within 0.05 s" in only(check_file(path))
 
 
+@pytest.mark.parametrize(("line", "told"), [
+    ("root: {subtree: pipe.yaml}", "pipe.yaml: this is a pipe, which a tree cannot name"),
+    ("root: {subtree: /dev/fd/READER}", "READER: this is a pipe, which a tree cannot name"),
+    ("import: pipe.yaml\nroot: {success: }", "pipe.yaml: this is a pipe, which a tree cannot name"),
+    (
+        "outputs: {x: string}\nroot: {set: {x: '@pipe.yaml'}}",
+        "pipe.yaml:1:1: this is a pipe, which a tree cannot name",
+    ),
+])  # fmt: skip
+def test_a_pipe_that_a_tree_names_is_not_waited_for(tmp_path: Path, line: str, told: str) -> None:
+    reader, writer = os.pipe()
+    os.mkfifo(tmp_path / "pipe.yaml")
+    held = os.open(tmp_path / "pipe.yaml", os.O_RDWR)  # a writer who says nothing
+    try:
+        path = tmp_path / "tree.yaml"
+        path.write_text(f"tree: t\n{line.replace('READER', str(reader))}\n", encoding="utf-8")
+        (finding,) = check_file(path)
+    finally:
+        for descriptor in (reader, writer, held):
+            os.close(descriptor)
+    assert finding.code == "BT209"
+    assert finding.message == told.replace("READER", str(reader))
+
+
+@pytest.mark.parametrize("line", ["root: {subtree: NAME}", "import: NAME\nroot: {success: }"])
+@pytest.mark.parametrize("name", ["shadow", "notes.txt", "shadow.yaml.bak"])
+def test_of_other_files_a_tree_shows_nothing(tmp_path: Path, line: str, name: str) -> None:
+    (tmp_path / name).write_text("root:secret:1\n")
+    path = tmp_path / "tree.yaml"
+    path.write_text(f"tree: t\n{line.replace('NAME', name)}\n", encoding="utf-8")
+    (finding,) = check_file(path)
+    assert finding.message == f"{name}: a tree names files that end in .yaml, .yml, .json only"
+    assert "secret" not in str(finding)
+
+
 def test_a_huge_file_is_refused_without_being_read(tmp_path: Path) -> None:
     path = tmp_path / "huge.yaml"
     with path.open("wb") as stream:
