@@ -28,6 +28,7 @@ __all__ = [
     "Scalar",
     "compose",
     "compose_written",
+    "data_of",
     "span_of",
 ]
 
@@ -111,6 +112,16 @@ class Alias(Node):
 def span_of(node: Node) -> Span:
     """The range of a node."""
     return Span(node.line, node.column, node.end_line, node.end_column)
+
+
+def data_of(node: Node) -> object:
+    """What a node says, as plain data: a dollar sign means nothing in it."""
+    if isinstance(node, Scalar):
+        return node.value
+    if isinstance(node, Listing):
+        return [data_of(item) for item in node.items]
+    assert isinstance(node, Mapping)
+    return {key.text: data_of(value) for key, value in node.pairs}
 
 
 def _number(text: str) -> object:

@@ -20,7 +20,7 @@ from bt_actions.document.braces import report_braces
 from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError
 from bt_actions.document.inner import inner_span
-from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, data_of, span_of
 from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.expression_values import MAX_ITEMS as MAX_TEXT
@@ -166,16 +166,7 @@ def read_data(path: Path, *, pipes: bool = False) -> object:
     node = compose(source)
     if source.findings:
         raise DocumentError(source.findings)
-    return None if node is None else _data(node)
-
-
-def _data(node: Node) -> object:
-    if isinstance(node, Scalar):
-        return node.value
-    if isinstance(node, Listing):
-        return [_data(item) for item in node.items]
-    assert isinstance(node, Mapping)
-    return {key.text: _data(value) for key, value in node.pairs}
+    return None if node is None else data_of(node)
 
 
 def _read_file(node: Scalar, source: Source) -> object:
