@@ -243,7 +243,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("inputs: {level: float64}\nroot: {check: $level > 1}\n"),
         ),
         "BT208": Page(
-            "An action's name may not be that of a kind: nobody could tell them apart.",
+            "An action's name may not be that of a kind, or of a key that nodes have: nobody could "
+            "tell them apart.",
             "tree: example\n" + _MOVE.replace("  move:", "  wait:") + "root: {wait: 5 s}\n",
             _move("root:\n  sequence: Work\n  children: [{move: Go}, {wait: 5 s}]\n"),
         ),
