@@ -220,8 +220,11 @@ class _Hazards:
         for node in document.nodes():
             if node.kind is not None and node.kind.name == "for_each":
                 continue
+            writes = self._checker.writes_of(node)
+            if known.issuperset(write.name for write in writes):
+                continue
             keys = _keys_of(node)
-            for write in self._checker.writes_of(node):
+            for write in writes:
                 if write.name not in known and not doubts.mentions(write.name):
                     known.add(write.name)
                     own = write.written if write.written is not node.node else node.key

@@ -331,7 +331,8 @@ class _Composer:
             return
         frame = self._stack[-1]
         frame.size += size
-        frame.height = max(frame.height, height + 1)
+        if height >= frame.height:
+            frame.height = height + 1
         if frame.items is not None:
             frame.items.append(node)
         elif (key := frame.key) is None:

@@ -78,8 +78,10 @@ class Workspace:
         for node in document.nodes():
             size += 1
             level = levels.pop(id(node))
-            levels.update((id(child), level + 1) for child in node.children)
-            height = max(height, level)
+            for child in node.children:
+                levels[id(child)] = level + 1
+            if level > height:
+                height = level
             if node.kind is not None and node.kind.name == "subtree":
                 node.included = self._include(node, chain)
                 if node.included is not None:
