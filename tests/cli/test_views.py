@@ -22,7 +22,8 @@ from bt_actions.cli.common import Exit
 from bt_actions.cli.live import LiveView, suits
 from bt_actions.cli.report import Report
 from bt_actions.cli.views import JsonView, LineView, View
-from bt_actions.cli.words import Closing, fields_text, result_lines
+from bt_actions.cli.words import Closing, fields_text, last_words, result_lines
+from bt_actions.document import load_tree
 from bt_actions.events import Event
 from bt_actions.policy import End, Outcome
 from tests.cli.fakes import FakeAction, FakeProgress, Story
@@ -123,6 +124,18 @@ def test_what_a_tree_says_forges_no_line_and_gives_the_terminal_no_commands(
     feed(report, view, *news)
     view.finish(Closing(Exit.FAILURE))
     assert f"✗ Recover  {TAMED}" in screen.lines()
+
+
+def test_an_output_is_one_line_whatever_it_holds(tmp_path: Path, story: Story) -> None:
+    path = tmp_path / "tree.yaml"
+    path.write_text(
+        f"tree: t\noutputs: {{x: string}}\nroot: {{set: {{x: {json.dumps(HOSTILE)}}}}}\n"
+    )
+    root = load_tree(path)
+    root.tick_once()
+    report = Report(root)
+    report.observe(story.finish(Status.SUCCESS))
+    assert f"x: {TAMED}" in last_words(report, Closing(Exit.SUCCESS))
 
 
 def test_what_one_tick_ended_comes_before_what_it_began(
