@@ -33,6 +33,7 @@ TOOLS = {
     "suggest",
     "ticking",
     "units",
+    "whole_file",
 }
 """Small modules that anybody may import; they import no part but behaviours' and policy's names."""
 MAY_IMPORT_RCLPY = {"ros", "simulation"}

@@ -20,7 +20,7 @@ from py_trees.common import ParallelPolicy, Status
 from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import Inverter
 
-from bt_actions import render
+from bt_actions import load_tree, render
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -52,6 +52,24 @@ def root() -> Behaviour:
             ),
         ],
     )
+
+
+@pytest.mark.parametrize(("policy", "words"), [
+    ("", "parallel, all"),
+    ("policy: all, ", "parallel, all"),
+    ("policy: one, ", "parallel, one"),
+    ("policy: {at_least: 1}, ", "parallel, one"),
+    ("policy: {at_least: 2}, ", "parallel, at least 2"),
+])  # fmt: skip
+def test_a_parallel_says_how_many_children_must_succeed(
+    tmp_path: Path, policy: str, words: str
+) -> None:
+    path = tmp_path / "tree.yaml"
+    children = "[{success: }, {success: }, {success: }]"
+    path.write_text(f"tree: t\nroot: {{parallel: Both, {policy}children: {children}}}\n")
+    root = load_tree(path)
+    assert render.kind(root) == words
+    assert f"Both  ({words})" in render.text(root)
 
 
 def test_levels_that_are_left_out_are_counted(root: Behaviour) -> None:

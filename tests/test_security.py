@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,23 +12,29 @@ import pytest
 from bt_actions import load_tree
 from bt_actions.cli import main
 from bt_actions.document import DocumentError
+from bt_actions.document.build import build
+from bt_actions.document.scope import Scope
+from bt_actions.document.source import MAX_ERRORS
+from bt_actions.document.workspace import Workspace
 
 PACKAGE = Path(__file__).parents[1] / "bt_actions"
 
 NEVER_CALLED = {"eval", "exec", "compile", "__import__", "system", "popen", "Popen", "check_output"}
 NEVER_IMPORTED = {"pickle", "marshal", "shelve", "subprocess", "pty", "dill"}
+_numbers = itertools.count()
 
 
 @pytest.fixture
 def trap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A tree that includes one with a `python:` node whose module leaves a mark when imported."""
     mark = tmp_path / "imported"
-    (tmp_path / "trap.py").write_text(
+    module = f"trap_{next(_numbers)}"  # a module is imported once, whatever test asks for it
+    (tmp_path / f"{module}.py").write_text(
         "import pathlib, py_trees\n"
         f"pathlib.Path({str(mark)!r}).touch()\n"
         "class Trap(py_trees.behaviours.Success):\n    pass\n"
     )
-    (tmp_path / "inner.yaml").write_text("tree: inner\nroot: {python: trap.Trap}\n")
+    (tmp_path / "inner.yaml").write_text(f"tree: inner\nroot: {{python: {module}.Trap}}\n")
     (tmp_path / "outer.yaml").write_text(
         "tree: outer\ninputs: {x: {type: float64, default: 1.0}}\n"
         "root:\n  sequence: Work\n  children:\n    - subtree: inner.yaml\n"
@@ -68,6 +75,27 @@ def test_load_tree_refuses_it_as_well_with_and_without_types(trap: Path) -> None
     for types in (True, False):
         with pytest.raises(DocumentError, match="not allowed"):
             load_tree(trap / "outer.yaml", types=types, python=False)
+    assert not (trap / "imported").exists()
+
+
+@pytest.mark.parametrize("included", [False, True])
+def test_no_number_of_warnings_hides_a_python_node(trap: Path, included: bool) -> None:
+    node = (trap / "inner.yaml").read_text().partition("root: ")[2]
+    text = "tree: t\nroot:\n  sequence: S\n  children:\n"
+    text += "    - success: Part #0\n" * (MAX_ERRORS + 10) + f"    - {node}"
+    (trap / "many.yaml").write_text(text)
+    (trap / "around.yaml").write_text("tree: around\nroot: {subtree: many.yaml}\n")
+    with pytest.raises(DocumentError, match="not allowed"):
+        load_tree(trap / ("around.yaml" if included else "many.yaml"), python=False)
+    assert not (trap / "imported").exists()
+
+
+def test_building_refuses_what_the_checker_let_through(trap: Path) -> None:
+    workspace = Workspace()
+    document = workspace.open(trap / "outer.yaml")
+    assert document is not None
+    build(document, Scope.of_load("outer"), python=False)
+    assert [one.code for one in workspace.findings] == ["BT214"]
     assert not (trap / "imported").exists()
 
 

@@ -74,6 +74,8 @@ class ActionBehaviour(Behaviour):
             or an expression over ``result`` and blackboard variables (``result.stalled``).
         save: blackboard keys, and the place in the result that each is set from on success
             (``{"final_pose": "result.final_pose"}``).
+        fit: called with each key of `save` and its value; returns the value to set. Raising
+            ValueError makes the result an unexpected one.
         busy: what to do when the resources are taken: wait, replace, fail or share.
         resources: what the goal occupies, in place of the action server; named as servers are, so
             a relative name is expanded with the node's namespace.
@@ -93,6 +95,7 @@ class ActionBehaviour(Behaviour):
         retry: Retry | int = 1,
         expect: Callable[[Any], bool] | str | None = None,
         save: Mapping[str, str | Expression] | None = None,
+        fit: Callable[[str, Any], Any] | None = None,
         busy: Busy | str = "wait",
         resources: Iterable[str] | None = None,
         on_feedback: Callable[[Any], None] | None = None,
@@ -116,6 +119,7 @@ class ActionBehaviour(Behaviour):
             target: expression_of(place, "save") for target, place in (save or {}).items()
         }
         self.save = {target: place.text for target, place in self._save.items()}
+        self._fit = fit
         self._to_save: dict[str, Any] = {}
         self._traffic: Traffic | None = None
         self._line: Any = None
@@ -409,6 +413,11 @@ class ActionBehaviour(Behaviour):
             }
         except ExpressionError as error:
             return str(error)
+        if self._fit is not None:
+            try:
+                self._to_save = {key: self._fit(key, value) for key, value in self._to_save.items()}
+            except ValueError as error:
+                return str(error)
         return ""
 
     def _unexpected(self, result: Any) -> str:

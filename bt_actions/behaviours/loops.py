@@ -131,7 +131,8 @@ class ForEach(Gate):
         name: as in py_trees.
         child: what to do for each item.
         items: gives the list, when the node starts; may raise ValueError, which fails the node.
-        begin: called with item and index before each round, to write them where the child reads.
+        begin: called with item and index before each round, to write them where the child reads;
+            may raise ValueError, which fails the node.
         keep_going: whether an item that failed is left behind; the node then succeeds if any item
             did, or the list was empty.
     """
@@ -167,8 +168,8 @@ class ForEach(Gate):
             self.feedback_message = str(error)
             return
         self._items = list(items)
-        if self._items:
-            self._begin(self._items[0], 0)
+        if self._items and not self._begins():
+            self._items = None
 
     def gate(self) -> Status | None:
         if self._items is None:
@@ -191,8 +192,17 @@ class ForEach(Gate):
             self.feedback_message += f", {self.failures} failed"
         if self.index >= len(self._items):
             return Status.FAILURE if self.failures == len(self._items) else Status.SUCCESS
-        self._begin(self._items[self.index], self.index)
-        return Status.RUNNING
+        return Status.RUNNING if self._begins() else Status.FAILURE
+
+    def _begins(self) -> bool:
+        """Whether the next item is where the child reads it."""
+        assert self._items is not None
+        try:
+            self._begin(self._items[self.index], self.index)
+        except ValueError as error:
+            self.feedback_message = f"item {self.index}: {error}"
+            return False
+        return True
 
     def due_in(self) -> float | None:
         """Zero when the next item can begin at once."""

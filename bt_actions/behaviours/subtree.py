@@ -24,7 +24,8 @@ class Subtree(Gate):
         child: the root of the tree.
         begin: writes the inputs, each time the tree starts; raises ValueError for one that has no
             value or does not fit, which fails the subtree before its first tick.
-        end: gives back the outputs, when the tree has succeeded or failed.
+        end: gives back the outputs, when the tree has succeeded or failed; raises ValueError for
+            one that does not fit, which fails the subtree.
     """
 
     def __init__(
@@ -53,5 +54,10 @@ class Subtree(Gate):
         status = self.decorated.status
         self.feedback_message = self.decorated.feedback_message
         if status in (Status.SUCCESS, Status.FAILURE):
-            self._end()
+            try:
+                self._end()
+            except ValueError as error:
+                failed = self.feedback_message if status is Status.FAILURE else ""
+                self.feedback_message = f"{failed}; {error}" if failed else str(error)
+                return Status.FAILURE
         return status

@@ -77,7 +77,8 @@ class WaitForMessage(Behaviour):
         qos: as the tree language calls it.
         until: a condition on the message; any message does where not given.
         timeout: seconds on the node's clock after which it fails; never where not given.
-        save: called with the message that it waited for; raising ExpressionError fails it.
+        save: called with such a message; where it raises ValueError (ExpressionError is one), that
+            message was not the one waited for.
     """
 
     def __init__(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, findings_text, note, write
+from bt_actions.whole_file import replace_file
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -86,14 +86,7 @@ def _formatted(name: str) -> tuple[str, str]:
 
 
 def _replace(path: Path, text: str) -> None:
-    """Write the new text beside the old one, then put it in its place: never half a file."""
-    path = path.resolve()
     try:
-        with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", dir=path.parent, delete=False, newline="\n"
-        ) as stream:
-            stream.write(text)
-        Path(stream.name).chmod(path.stat().st_mode & 0o7777)
-        Path(stream.name).replace(path)
+        replace_file(path, text.encode())
     except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
+        raise BadInput(f"{path}: cannot be written: {error.strerror or error}") from None

@@ -20,6 +20,7 @@ from bt_actions.cli.choosing import branches, choose, fork_of, is_below
 from bt_actions.cli.report import Report, Row
 from bt_actions.cli.stderr import CaughtStderr
 from bt_actions.cli.words import Closing, feedback_text, goal_text, last_words
+from bt_actions.render.look import clean
 
 if TYPE_CHECKING:
     from bt_actions.events import Event
@@ -155,10 +156,10 @@ class LiveView:
         text = Text.assemble((self._glyph(status), _STYLES[status]), " ", node.name)
         action = render.action_of(node)
         if action is None:
-            text.append(f"  {message}" if message else "", style="dim")
+            text.append(f"  {clean(message)}" if message else "", style="dim")
         else:
             row = self._report.row(node)
-            text.append(f"  {row.server}  {goal_text(row)}", style="dim")
+            text.append(f"  {row.server}  {clean(goal_text(row))}", style="dim")
             text.append(f"  {row.duration:.2f} s", style="dim")
         return text
 
@@ -219,7 +220,7 @@ class LiveView:
         if status is Status.RUNNING and not node.children:
             row = self._report.row(node) if render.action_of(node) else None
             told = self._doing(row) if row else self._report.message_of(node)
-            text.append(f"  {told}" if told else "", style="cyan")
+            text.append(f"  {clean(told)}" if told else "", style="cyan")
         return text
 
     def _doing(self, row: Row) -> str:

@@ -20,6 +20,7 @@ from py_trees.composites import Composite, Selector
 from bt_actions.behaviours.gate import Gate
 from bt_actions.cli.common import path_of, place_of
 from bt_actions.policy import End, Outcome
+from bt_actions.render.look import clean
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -344,4 +345,4 @@ def summary(report: Report) -> list[str]:
 
 
 def _because(reason: str) -> str:
-    return f": {reason}" if reason else ""
+    return f": {clean(reason)}" if reason else ""

@@ -28,7 +28,7 @@ def value(text: str, where: str) -> object:
 
     Raises BadInput.
     """
-    from bt_actions.document.nodes import Scalar, compose
+    from bt_actions.document.nodes import Scalar, compose, data_of
     from bt_actions.document.source import Source
 
     stripped = text.strip()
@@ -40,7 +40,7 @@ def value(text: str, where: str) -> object:
         if source.findings or node is None:
             why = source.findings[0].message if source.findings else "not a value"
             raise BadInput(f"{where}: {why}")
-        return _plain(node)
+        return data_of(node)
     scalar = Scalar()
     scalar.text, scalar.plain = stripped, True
     return scalar.value
@@ -64,15 +64,3 @@ def nested(values: dict[str, object]) -> dict[str, object]:
             raise BadInput(f"field {name!r}: parts of it have values already")
         at[last] = given
     return tree
-
-
-def _plain(node: object) -> object:
-    """Plain data from YAML nodes; their nesting is bounded by `compose`."""
-    from bt_actions.document.nodes import Listing, Mapping, Scalar
-
-    if isinstance(node, Mapping):
-        return {key.text: _plain(item) for key, item in node.pairs}
-    if isinstance(node, Listing):
-        return [_plain(item) for item in node.items]
-    assert isinstance(node, Scalar)
-    return node.value

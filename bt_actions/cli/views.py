@@ -20,6 +20,7 @@ from bt_actions.cli.report import DONE, Report, Row
 from bt_actions.cli.words import Closing, goal_text, last_words, outputs_of, troubles
 from bt_actions.policy import End, Outcome
 from bt_actions.render import action_of
+from bt_actions.render.look import clean
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, GoalChanged
@@ -161,7 +162,7 @@ class LineView:
         return ends if action_of(node) else (Status.RUNNING, *ends)
 
     def _line(self, what: str, text: str) -> None:
-        self._write(f"{self._report.now - self._report.started:8.2f} s  {what:<8} {text}")
+        self._write(f"{self._report.now - self._report.started:8.2f} s  {what:<8} {clean(text)}")
 
     def _write(self, line: str) -> None:
         self._out.write(f"{line}\n")

@@ -13,6 +13,7 @@ from py_trees.common import Status
 from bt_actions.cli.common import Exit
 from bt_actions.cli.report import Report, Row, summary, table
 from bt_actions.policy import End, Outcome
+from bt_actions.render.look import clean
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -48,7 +49,7 @@ class Closing:
 def last_words(report: Report, closing: Closing, width: int | None = None) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     lines = ["", *table(report, width)] if report.rows else []
-    outputs = [f"{name}: {value}" for name, value in outputs_of(report).items()]
+    outputs = [clean(f"{name}: {value}") for name, value in outputs_of(report).items()]
     lines += ["", *outputs] if outputs else []
     lines += ["", closing.verdict] if closing.verdict else []
     word = report.status.value if report.status is not Status.INVALID else "STOPPED"

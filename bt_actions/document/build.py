@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +20,7 @@ from bt_actions.behaviours.loops import ForEach, Repeat, RetryChild
 from bt_actions.behaviours.parallel import Parallel
 from bt_actions.behaviours.subtree import Subtree
 from bt_actions.behaviours.topics import TopicValue
+from bt_actions.document.bounds import refuse_large
 from bt_actions.document.build_leaves import LEAVES, build_action
 from bt_actions.document.build_names import join_names, text_of
 from bt_actions.document.context import Context, plain_name, table_of, written_text
@@ -34,13 +36,22 @@ __all__ = ["BUILDERS", "build"]
 
 
 def build(
-    document: Document, scope: Scope, *, namespace: str = "", types: bool = True
+    document: Document,
+    scope: Scope,
+    *,
+    namespace: str = "",
+    types: bool = True,
+    python: bool = True,
 ) -> Behaviour:
-    """The behaviours of a document; each has the place it was written at in `place`."""
+    """The behaviours of a document; each has the place it was written at in `place`.
+
+    What cannot be made is reported to the document's source. Raises TooManyErrors. With
+    `python=False` that holds for every ``python:`` node.
+    """
     assert document.root is not None
     inner = join_names(namespace, document.namespace)
     topics = {declared.name: _topic(declared, inner) for declared in document.topics.values()}
-    context = Context(document, scope, inner, types, topics)
+    context = Context(document, scope, inner, types, topics, python)
     root = _node(document.root, context)
     if topics:
         _connect(root, list(topics.values()))
@@ -87,7 +98,10 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
 
 
 def _children(node: TreeNode, context: Context) -> list[Behaviour]:
-    return [_node(child, context) for child in node.children]
+    built = []
+    for child in node.children:  # a comprehension would take a level of recursion of its own
+        built.append(_node(child, context))  # noqa: PERF401
+    return built
 
 
 def _sequence(node: TreeNode, context: Context) -> Behaviour:
@@ -140,9 +154,7 @@ def _for_each(node: TreeNode, context: Context) -> Behaviour:
     item_name, index_name = text_of(values, "as") or "item", text_of(values, "index")
 
     def begin(item: object, index: int) -> None:
-        context.scope.write(item_name, item)
-        if index_name:
-            context.scope.write(index_name, index)
+        context.write({item_name: item} | ({index_name: index} if index_name else {}))
 
     keep_going = values.get("on_failure") == "continue"
     items = context.value(values["in"])
@@ -159,7 +171,7 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     assert included is not None
     scope = context.scope.inner(included.name)
     namespace = join_names(context.namespace, text_of(node.values, "namespace"))
-    child = build(included, scope, namespace=namespace, types=context.types)
+    child = build(included, scope, namespace=namespace, types=context.types, python=context.python)
     given = node.values.get("with", {})
     saved = table_of(node.values.get("save"))
     written = {declared.name for declared in included.outputs.values()}
@@ -172,6 +184,10 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
         values = _resolved(given, context)
         if not isinstance(values, dict):
             raise ValueError(f"'with' needs a mapping of inputs to values, not {values!r:.60}")
+        try:
+            refuse_large(values)
+        except ValueError as error:
+            raise ValueError(f"'with': {error}") from None
         inputs = check_inputs(included, values, types=context.types)
         for name in written:
             if name not in inputs:
@@ -179,12 +195,11 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
         scope.write_all(inputs)
 
     def end() -> None:
+        values = {}
         for name, output in saved.items():
-            try:
-                value = scope.read(output)
-            except KeyError:
-                continue  # a tree that failed may have nothing to give
-            context.scope.write(name, value)
+            with contextlib.suppress(KeyError):  # a tree that failed may have nothing to give
+                values[name] = scope.read(output)
+        context.write(values)
 
     return Subtree(node.name or included.name, child, begin, end)
 

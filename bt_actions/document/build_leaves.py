@@ -17,6 +17,7 @@ from bt_actions.behaviours.service import CallService
 from bt_actions.behaviours.topics import Publish, WaitForMessage
 from bt_actions.behaviours.waiting import Wait, WaitUntil
 from bt_actions.document.build_names import settings_of, text_of
+from bt_actions.document.check_kinds import NO_PYTHON
 from bt_actions.document.classes import ClassError, make_behaviour
 from bt_actions.document.context import Context, plain_name, table_of, written_text
 from bt_actions.document.nodes import span_of
@@ -36,6 +37,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         context.scope.key(name): place.expression
         for name, place in table_of(settings.get("save")).items()
     }
+    names = {context.scope.key(name): name for name in table_of(settings.get("save"))}
     given = settings.get("resources")
     resources = given if isinstance(given, list) else []
     return ActionBehaviour(
@@ -47,6 +49,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         retry=_retry(settings, context),
         expect=context.condition(settings.get("expect"), "result"),
         save=save,
+        fit=lambda key, value: context.fitting(names[key], value),
         busy=text_of(settings, "busy") or "wait",
         resources=[context.joined(settings, str(each)) for each in resources],
     )
@@ -170,10 +173,13 @@ def _log(node: TreeNode, context: Context) -> Behaviour:
     return Log(name, context.value(node.values["log"]), level)
 
 
-def _python(node: TreeNode, _context: Context) -> Behaviour:
+def _python(node: TreeNode, context: Context) -> Behaviour:
     """What cannot be made is reported to the document's source, and `Failure` stands for it."""
     path = text_of(node.values, "python")
     name = node.name or path.rpartition(".")[2]
+    if not context.python:  # the checker said so before; here nothing is imported whatever it said
+        node.source.report("BT214", span_of(node.key), NO_PYTHON)
+        return Failure(name)
     try:
         return make_behaviour(path, name, table_of(node.values.get("arguments")))
     except ClassError as error:

@@ -19,7 +19,9 @@ from bt_actions.suggest import did_you_mean, listing
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker
 
-__all__ = ["CHECKS"]
+__all__ = ["CHECKS", "NO_PYTHON"]
+
+NO_PYTHON = "python: is not allowed here, because it runs code that the tree names"
 
 
 def _subtree(checker: Checker, node: TreeNode) -> None:
@@ -120,7 +122,7 @@ def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
 
 
 def _number_of(
-    key: str, wanted: FieldType, least: float = 0
+    key: str, wanted: FieldType, least: float = 0, *, zero: bool = True
 ) -> Callable[[Checker, TreeNode], None]:
     def check(checker: Checker, node: TreeNode) -> None:
         value = node.values.get(key)
@@ -135,6 +137,8 @@ def _number_of(
         if isinstance(number, (int, float)) and not least <= number < float("inf"):
             text = f"at least {least:g} is needed, not {number}"
             checker.source.report("BT110", span_of(value.node), text)
+        elif number == 0 and not zero:
+            checker.source.report("BT110", span_of(value.node), "more than zero is needed, not 0")
 
     return check
 
@@ -224,8 +228,7 @@ def _log(checker: Checker, node: TreeNode) -> None:
 def _python(checker: Checker, node: TreeNode) -> None:
     path, arguments = node.values.get("python"), node.values.get("arguments", {})
     if not checker.python:
-        text = "python: is not allowed here, because it runs code that the tree names"
-        checker.source.report("BT214", span_of(node.key), text)
+        checker.source.report("BT214", span_of(node.key), NO_PYTHON)
         return
     computed = list(computed_in(arguments))
     for one in computed:
@@ -263,7 +266,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "service": _service,
         "set": _set,
         "subtree": _subtree,
-        "timeout": _number_of("after", FLOAT),
+        "timeout": _number_of("after", FLOAT, zero=False),
         "wait": _number_of("wait", FLOAT),
         "wait_for_message": _wait_for_message,
         "wait_until": _condition_of("wait_until"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bt_actions.behaviours.topics import TopicValue
+from bt_actions.document.bounds import refuse_large
 from bt_actions.document.build_names import join_names, text_of
 from bt_actions.document.inputs import convert
 from bt_actions.document.nodes import Scalar
@@ -27,6 +28,8 @@ class Context:
     namespace: str
     types: bool
     topics: Mapping[str, TopicValue]
+    python: bool = True
+    """Whether ``python:`` nodes may be made."""
 
     def read(self, name: str) -> object:
         """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.
@@ -37,17 +40,21 @@ class Context:
         return self.scope.read(name) if topic is None else topic.read()
 
     def write(self, values: Mapping[str, object]) -> None:
-        """Give variables their values, as the declared ones' types want them; all or none."""
-        declared = {**self.document.inputs, **self.document.outputs}
-        converted = {}
-        for name, value in values.items():
-            kind = declared[name].values.get("type") if name in declared else None
-            try:
-                fitting = convert(value, kind, types=self.types) if isinstance(kind, str) else value
-            except ValueError as error:
-                raise ValueError(f"{name}: {error}") from None
-            converted[name] = fitting
-        self.scope.write_all(converted)
+        """Give variables their values, as `fitting` has them; all or none."""
+        self.scope.write_all({name: self.fitting(name, value) for name, value in values.items()})
+
+    def fitting(self, name: str, value: object) -> object:
+        """A value as the variable's declared type wants it.
+
+        Raises ValueError for one that does not fit, or is too large to be kept.
+        """
+        declared = self.document.outputs.get(name) or self.document.inputs.get(name)
+        kind = None if declared is None else declared.values.get("type")
+        try:
+            refuse_large(value)
+            return convert(value, kind, types=self.types) if isinstance(kind, str) else value
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
     def name(self, values: Mapping[str, object], key: str) -> str:
         """A ROS name in the namespaces that hold here."""

@@ -11,7 +11,7 @@ from bt_actions.document.build_names import resources_below, settings_of
 from bt_actions.document.check import Checker
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.nodes import Mapping as YamlMapping
-from bt_actions.document.nodes import span_of
+from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.order import find_early_reads
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
@@ -146,17 +146,21 @@ class _Hazards:
                 return
 
     def _reactive(self, node: TreeNode, kind: str) -> None:
-        for at, child in enumerate(node.children[:-1]):
-            action = _restarted(child)
-            later = any(_takes_time(n) for other in node.children[at + 1 :] for n in other.walk())
-            can = self._verdicts.of(child)
-            again = can.succeed if kind == "sequence" else can.fail
-            if action is not None and later and again and not self._doubts.below(node):
-                self._report(
-                    "BT306", span_of(action.key),
-                    f"this starts again at each tick while a later child of {node.name!r} runs",
-                    related=Related(node.place, "because of 'memory: false' here"),
-                )  # fmt: skip
+        slow = (any(_takes_time(inner) for inner in child.walk()) for child in node.children)
+        last = max((at for at, takes in enumerate(slow) if takes), default=0)
+        begun_anew = []
+        for child in node.children[:last]:
+            action, can = _restarted(child), self._verdicts.of(child)
+            if action is not None and (can.succeed if kind == "sequence" else can.fail):
+                begun_anew.append(action)
+        if not begun_anew or self._doubts.below(node):
+            return
+        for action in begun_anew:
+            self._report(
+                "BT306", span_of(action.key),
+                f"this starts again at each tick while a later child of {node.name!r} runs",
+                related=Related(node.place, "because of 'memory: false' here"),
+            )  # fmt: skip
 
     def _short(self, node: TreeNode) -> None:
         after = node.values.get("after")
@@ -216,25 +220,31 @@ class _Hazards:
         for node in document.nodes():
             if node.kind is not None and node.kind.name == "for_each":
                 continue
-            for write in self._checker.writes_of(node):
+            writes = self._checker.writes_of(node)
+            if known.issuperset(write.name for write in writes):
+                continue
+            keys = _keys_of(node)
+            for write in writes:
                 if write.name not in known and not doubts.mentions(write.name):
                     known.add(write.name)
-                    at = _key_of(write.written, node, write.name)
+                    own = write.written if write.written is not node.node else node.key
+                    at = keys.get((write.name, id(write.written)), own)
                     text = f"nothing reads ${write.name}"
-                    self._report("BT310", span_of(at), text)  # type: ignore[arg-type]
+                    self._report("BT310", span_of(at), text)
 
     def _own(self, table: dict[str, Declared]) -> Iterator[str]:
         return (name for name, declared in table.items() if declared.source is self._source)
 
 
-def _key_of(written: object, node: TreeNode, name: str) -> object:
-    for table in ("save", "set"):
-        mapping = node.written.get(table)
-        if isinstance(mapping, YamlMapping):
-            for key, value in mapping.pairs:
-                if key.text == name and value is written:
-                    return key
-    return written if written is not node.node else node.key
+def _keys_of(node: TreeNode) -> dict[tuple[str, int], Node]:
+    """The keys under which a node writes variables, by their names and the ids of their values."""
+    tables = [node.written.get(table) for table in ("set", "save")]
+    return {
+        (key.text, id(value)): key
+        for table in tables
+        if isinstance(table, YamlMapping)
+        for key, value in table.pairs
+    }
 
 
 def _is_action(node: TreeNode) -> bool:

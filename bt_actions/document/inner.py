@@ -12,21 +12,18 @@ from collections.abc import Iterator
 from bt_actions.document.comments import block_header
 from bt_actions.document.findings import Span
 from bt_actions.document.nodes import Scalar, span_of
-from bt_actions.document.source import Source
+from bt_actions.document.source import Char, Source
 
 __all__ = ["inner_span"]
 
-Char = tuple[str, int, int]
-"""A character of the text, and the line and column where it is written, from 1."""
 _ESCAPE = re.compile(r"\\(?:x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))")
 _SHORT = {'"': '"', "\\": "\\", "/": "/", " ": " ", "n": "\n", "t": "\t", "r": "\r", "0": "\0"}
 
 
 def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
     """The range of a part of a scalar's text; the whole scalar where that cannot be told."""
-    chars = _written(node, source)
-    text = "".join(char for char, _, _ in chars)
-    if not chars or text.rstrip("\n ") != node.text.rstrip("\n "):
+    chars = _decoded(node, source)
+    if not chars:
         return span_of(node)
     if start >= len(chars):  # what is missing would stand behind it
         _, line, column = chars[-1]
@@ -37,6 +34,16 @@ def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
     behind = chars[last + 1] if last + 1 < len(chars) else None
     width = behind[2] - end_column if behind is not None and behind[1] == end_line else 1
     return Span(line, column, end_line, end_column + max(width, 1))
+
+
+def _decoded(node: Scalar, source: Source) -> list[Char]:
+    """The characters of a text as they are written, or none where that cannot be told."""
+    if source.decoded is None or source.decoded[0] is not node:
+        chars = _written(node, source)
+        text = "".join(char for char, _, _ in chars)
+        same = text.rstrip("\n ") == node.text.rstrip("\n ")
+        source.decoded = (node, chars if same else [])
+    return source.decoded[1]
 
 
 def _written(node: Scalar, source: Source) -> list[Char]:

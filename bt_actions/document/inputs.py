@@ -95,7 +95,7 @@ def parse_input(text: str, type_name: str) -> object:
     if isinstance(kind, Scalar) and kind.name == "string":
         return convert(text, type_name)
     if names_file(text):
-        return convert(read_data(Path(text[1:])), type_name)
+        return convert(read_data(Path(text[1:]), pipes=True), type_name)
     source = Source("value", text)
     node = compose(source)
     if source.findings:

@@ -79,8 +79,11 @@ def load_tree(
     values = check_inputs(document, inputs or {}, types=types)
     scope = Scope.of_load(document.name)
     scope.write_all(values)
-    root = build(document, scope, types=types)
-    _refuse(workspace.findings)  # a class of one's own may fail when it is made
+    try:
+        root = build(document, scope, types=types, python=python)
+    except TooManyErrors:
+        raise DocumentError(_errors(workspace)) from None
+    _refuse(workspace)  # a class of one's own may fail when it is made
     setattr(root, LOADED, Loaded(document, scope))
     return root
 
@@ -135,15 +138,13 @@ def check_source(source: Source, *, types: bool = True, python: bool = True) -> 
 
 
 def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[Finding]:
-    try:
-        for document in workspace.documents:
+    for document in workspace.documents:
+        with contextlib.suppress(TooManyErrors):  # which are errors of this document: it is refused
             checker = Checker(document, types=types, python=python)
             checker.check()
             doubts = Doubts(document)  # anew: the checker found more
             find_hazards(checker, doubts)
             apply_ignores(document.source, complete=not doubts.any)
-    except TooManyErrors:
-        return workspace.findings
     return workspace.findings
 
 
@@ -152,10 +153,10 @@ def _open(path: PathLike, *, types: bool, python: bool = True) -> tuple[Workspac
     try:
         found = _found(path)
         document = workspace.open(found, _shown(path, found))
-        findings = _checked(workspace, types=types, python=python)
     except TooManyErrors:
-        document, findings = None, workspace.findings
-    _refuse(findings)
+        raise DocumentError(_errors(workspace)) from None
+    _checked(workspace, types=types, python=python)
+    _refuse(workspace)
     assert document is not None
     if document.root is None:
         message = "this file is for trees to import: it holds no tree itself"
@@ -164,11 +165,15 @@ def _open(path: PathLike, *, types: bool, python: bool = True) -> tuple[Workspac
     return workspace, document
 
 
-def _refuse(findings: list[Finding]) -> None:
-    """Raise DocumentError with the errors among findings, each once, if there are any."""
-    errors = dict.fromkeys(one for one in findings if one.severity is Severity.ERROR)
+def _refuse(workspace: Workspace) -> None:
+    """Raise DocumentError with the errors that were found, if there are any."""
+    errors = _errors(workspace)
     if errors:
         raise DocumentError(errors)
+
+
+def _errors(workspace: Workspace) -> list[Finding]:
+    return [one for one in workspace.findings if one.severity is Severity.ERROR]
 
 
 def _found(path: PathLike) -> Path:

@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from bt_actions.document.findings import Place, Related, Span
-from bt_actions.document.source import Source
+from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.syntax import report_syntax
 
 __all__ = [
@@ -28,11 +28,12 @@ __all__ = [
     "Scalar",
     "compose",
     "compose_written",
+    "data_of",
     "span_of",
 ]
 
 MAX_DEPTH = 200
-"""Levels of YAML nesting; a level of the tree takes two."""
+"""Levels of YAML nesting, aliases unfolded; a level of the tree takes two."""
 MAX_NODES = 2_000_000
 """Nodes of a text, its aliases unfolded; a tree of 100,000 nodes has about a third of it."""
 NO_LIBYAML = (
@@ -113,6 +114,16 @@ def span_of(node: Node) -> Span:
     return Span(node.line, node.column, node.end_line, node.end_column)
 
 
+def data_of(node: Node) -> object:
+    """What a node says, as plain data: a dollar sign means nothing in it."""
+    if isinstance(node, Scalar):
+        return node.value
+    if isinstance(node, Listing):
+        return [data_of(item) for item in node.items]
+    assert isinstance(node, Mapping)
+    return {key.text: data_of(value) for key, value in node.pairs}
+
+
 def _number(text: str) -> object:
     if len(text) > _MAX_DIGITS:
         return text
@@ -129,8 +140,8 @@ def _number(text: str) -> object:
 def compose(source: Source) -> Node | None:
     """The document in a source, or None when it has none or cannot be read.
 
-    What is wrong is reported to the source; after a syntax error nothing can be read on. Raises
-    ImportError, with the name libyaml, where that is missing.
+    What is wrong is reported to the source; after a syntax error, or too many of others, nothing
+    can be read on. Raises ImportError, with the name libyaml, where that is missing.
     """
     source.root = _composed(_Composer(source), source)
     return source.root
@@ -153,13 +164,15 @@ def _composed(composer: _Composer, source: Source) -> Node | None:
     except yaml.YAMLError as error:
         report_syntax(source, error)
         return None
+    except TooManyErrors:
+        return None
     return None if composer.gave_up else composer.root
 
 
 class _Open:
     """A collection whose end has not come yet."""
 
-    __slots__ = ("anchor", "items", "key", "keys", "node", "pairs", "size")
+    __slots__ = ("anchor", "height", "items", "key", "keys", "node", "pairs", "size")
 
     def __init__(self, node: Mapping | Listing, anchor: str | None) -> None:
         self.node = node
@@ -169,6 +182,8 @@ class _Open:
         self.key: Scalar | None = None
         self.keys: dict[str, Scalar] = {}
         self.size = 1
+        self.height = 1
+        """Collections inside each other, this one among them."""
 
 
 class _Composer:
@@ -181,7 +196,8 @@ class _Composer:
         self.anchored: dict[int, str] = {}
         self._unfold = unfold
         self._stack: list[_Open] = []
-        self._anchors: dict[str, tuple[Node, int] | None] = {}
+        self._anchors: dict[str, tuple[Node, int, int] | None] = {}
+        """What names stand for, with its size and its height; None while it is open."""
         self._documents = 0
         self._size = 0
 
@@ -226,8 +242,8 @@ class _Composer:
         if event.anchor is not None:
             self._source.anchored = True
             self.anchored[id(node)] = event.anchor
-            self._anchors[event.anchor] = (node, 1)
-        self._add(node, 1)
+            self._anchors[event.anchor] = (node, 1, 0)
+        self._add(node, 1, 0)
 
     def _tag(self, node: Scalar, event: Any) -> None:
         node.plain = False
@@ -248,8 +264,7 @@ class _Composer:
 
     def _begin(self, node: Mapping | Listing, event: Any) -> None:
         if len(self._stack) >= MAX_DEPTH:
-            self._report("BT105", event, f"nested deeper than {MAX_DEPTH} levels")
-            self.gave_up = True
+            self._too_deep(event)
             return
         if event.tag is not None and event.tag != "!":
             self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
@@ -260,6 +275,10 @@ class _Composer:
             self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = None
         self._stack.append(_Open(node, event.anchor))
+
+    def _too_deep(self, event: Any) -> None:
+        self._report("BT105", event, f"nested deeper than {MAX_DEPTH} levels")
+        self.gave_up = True
 
     def _end(self, event: Any) -> None:
         done = self._stack.pop()
@@ -278,8 +297,8 @@ class _Composer:
         if isinstance(node, Mapping) and "<<" in done.keys and self._unfold:
             self._merge(node)
         if done.anchor is not None:
-            self._anchors[done.anchor] = (node, done.size)
-        self._add(node, done.size)
+            self._anchors[done.anchor] = (node, done.size, done.height)
+        self._add(node, done.size, done.height)
 
     def _alias(self, event: Any) -> None:
         if event.anchor not in self._anchors:
@@ -295,12 +314,16 @@ class _Composer:
             alias = Alias()
             alias.name = event.anchor
             _place(alias, event)
-            self._add(alias, 1)
+            self._add(alias, 1, 0)
             return
-        self._size += found[1] - 1
-        self._add(*found)
+        node, size, height = found
+        if len(self._stack) + height > MAX_DEPTH:
+            self._too_deep(event)
+            return
+        self._size += size - 1
+        self._add(node, size, height)
 
-    def _add(self, node: Node, size: int) -> None:
+    def _add(self, node: Node, size: int, height: int) -> None:
         self._size += 1
         if not self._stack:
             if self.root is None:
@@ -308,6 +331,8 @@ class _Composer:
             return
         frame = self._stack[-1]
         frame.size += size
+        if height >= frame.height:
+            frame.height = height + 1
         if frame.items is not None:
             frame.items.append(node)
         elif (key := frame.key) is None:

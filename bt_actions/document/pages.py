@@ -91,9 +91,9 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("root:\n  success: Done\n"),
         ),
         "BT105": Page(
-            "The document is nested deeper than 200 levels, stands in more than 50 trees or 100 "
-            "files, an anchor holds itself, or aliases and subtrees unfold to more nodes than a "
-            "tree can have.",
+            "The document is nested deeper than 200 levels, its tree and all that it includes is "
+            "more than 200 nodes deep, it stands in more than 50 trees or 100 files, an anchor "
+            "holds itself, or aliases and subtrees unfold to more nodes than a tree can have.",
             _tree("root: &loop\n  sequence: Loop\n  children: [*loop]\n"),
             _tree("root:\n  repeat: Loop\n  times: 3\n  child: {success: Done}\n"),
         ),
@@ -243,7 +243,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("inputs: {level: float64}\nroot: {check: $level > 1}\n"),
         ),
         "BT208": Page(
-            "An action's name may not be that of a kind: nobody could tell them apart.",
+            "An action's name may not be that of a kind, or of a key that nodes have: nobody could "
+            "tell them apart.",
             "tree: example\n" + _MOVE.replace("  move:", "  wait:") + "root: {wait: 5 s}\n",
             _move("root:\n  sequence: Work\n  children: [{move: Go}, {wait: 5 s}]\n"),
         ),

@@ -23,6 +23,10 @@ from bt_actions.suggest import closest, did_you_mean, listing
 __all__ = ["read_document", "read_root"]
 
 _CHILDREN = ("child", "children")
+_NODE_KEYS = frozenset(
+    {*ACTION_KEYS, *_CHILDREN, *(key for kind in KINDS.values() for key in kind.keys)}
+)
+"""All that may stand in a node beside its kind."""
 _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
 _MEMORY = "with 'memory: false'"
@@ -112,9 +116,10 @@ def _declare(document: Document, table: str, into: dict[str, Declared]) -> None:
         if read is BAD:
             own = {"type": BAD}
         into[key.text] = Declared(key.text, own, key, node, document.source)
-        if table == "actions" and key.text in KINDS:
+        if table == "actions" and (key.text in KINDS or key.text in _NODE_KEYS):
+            what = "a kind of node" if key.text in KINDS else "a key of nodes"
             document.source.report(
-                "BT208", span_of(key), f"{key.text!r} is a kind of node and cannot name an action"
+                "BT208", span_of(key), f"{key.text!r} is {what} and cannot name an action"
             )
             del into[key.text]
 
@@ -123,18 +128,35 @@ def read_root(document: Document) -> None:
     """Read the nodes of a document whose actions are all known (its imports' among them)."""
     written = document.node.get("root")
     if written is not None:
-        document.root = _Reader(document).node(written)
+        document.root = _Reader(document).tree(written)
 
 
 class _Reader:
-    """Reads nodes; recursion is bounded by the depth that `compose` allows."""
+    """Reads nodes. No recursion: trees inside each other are read while others wait."""
 
     def __init__(self, document: Document) -> None:
         self._source = document.source
         self._actions = document.actions
         self._doubts = Doubts(document)
+        actions = document.node.get("actions")
+        own = actions.pairs if isinstance(actions, Mapping) else []
+        self._refused = {key.text for key, _ in own} & _NODE_KEYS
+        """Names of actions that were reported: what looks like a key may be meant for one."""
+        self._waiting: list[tuple[TreeNode, Node]] = []
+        """Children to be read, each with its parent; the next is the last."""
+
+    def tree(self, written: Node) -> TreeNode | None:
+        """The tree that begins with a node."""
+        root = self.node(written)
+        while self._waiting:
+            parent, item = self._waiting.pop()
+            child = self.node(item)
+            if child is not None:
+                parent.children.append(child)
+        return root
 
     def node(self, written: Node) -> TreeNode | None:
+        """A node by itself; its children wait."""
         node = self._node(written)
         if node is None:
             self._source.unread.nodes.append(written)
@@ -184,8 +206,7 @@ class _Reader:
                 hint="begin a new item with '-'", related=Related(place, "the first is here"),
             )  # fmt: skip
             return None
-        settings = {*ACTION_KEYS, *_CHILDREN, *(key for k in KINDS.values() for key in k.keys)}
-        words = [key for key, _ in written.pairs if key.text not in settings]
+        words = [key for key, _ in written.pairs if key.text not in _NODE_KEYS]
         beside = [key for key, _ in written.pairs if key.text in _BESIDE_CHILD]
         if len(beside) == 1 and not words and written.get("children") is not None:
             return beside[0]  # with 'children' in the place of 'child'
@@ -193,6 +214,9 @@ class _Reader:
         return None
 
     def _report_no_kind(self, written: Mapping, words: list[Scalar]) -> None:
+        if not words and any(key.text in self._refused for key, _ in written.pairs):
+            self._source.unread.actions = True
+            return
         if not words:
             hint = "one key of a node is its kind, such as 'sequence: name'"
             self._source.report("BT111", _first(written), "this node has no kind", hint=hint)
@@ -291,10 +315,7 @@ class _Reader:
             if not written:
                 self._source.report("BT110", span_of(inner), "there must be a child at least")
                 self._source.unread.nodes.append(inner)
-        for item in written:
-            child = self.node(item)
-            if child is not None:
-                node.children.append(child)
+        self._waiting += [(node, item) for item in reversed(written)]
 
 
 _ACTION_NAME = KINDS["sequence"]

@@ -60,7 +60,7 @@ RULES = MappingProxyType(
             Rule("BT205", "a type is not installed"),
             Rule("BT206", "an expression does not fit its types"),
             Rule("BT207", "unknown type"),
-            Rule("BT208", "an action's name hides a kind"),
+            Rule("BT208", "an action's name hides a kind or a key of nodes"),
             Rule("BT209", "a tree that is included cannot be read"),
             Rule("BT210", "a tree that includes itself"),
             Rule("BT211", "an input is missing"),

@@ -10,7 +10,14 @@ from dataclasses import dataclass
 
 from bt_actions.document.cut import warn_cut
 from bt_actions.document.nodes import Node, Scalar, span_of
-from bt_actions.document.shape import Schema, is_computed, or_variable, words_for, wrong_form
+from bt_actions.document.shape import (
+    Schema,
+    is_computed,
+    or_variable,
+    read_computed,
+    words_for,
+    wrong_form,
+)
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD, Computed, read_expression, read_value
 from bt_actions.suggest import did_you_mean
@@ -128,7 +135,7 @@ class Whole:
 
     def read(self, node: Node, source: Source) -> object:
         if self.values and is_computed(node):
-            return read_value(node, source)
+            return read_computed(self, node, source)
         value = node.value if isinstance(node, Scalar) else None
         if isinstance(value, bool) or not isinstance(value, int):
             return wrong_form(self, node, source)
@@ -187,7 +194,7 @@ class Duration:
         if self.or_none and node.text == "none":
             return None
         if self.values and is_computed(node):
-            return read_value(node, source)
+            return read_computed(self, node, source)
         try:
             seconds = parse_duration(node.value)
         except ValueError as error:

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from typing import Protocol
 
 from bt_actions.document.braces import report_braces
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.source import Source
-from bt_actions.document.values import BAD
+from bt_actions.document.values import BAD, Computed, read_value
 
 __all__ = [
     "Schema",
     "Shape",
     "is_computed",
     "or_variable",
+    "read_computed",
     "words_for",
     "wrong_form",
 ]
 
 Schema = dict[str, object]
+_ALONE = re.compile(r"\$\(\s*([^()$]*?)\s*\)")
 
 
 class Shape(Protocol):
@@ -50,14 +53,14 @@ def words_for(node: Node) -> str:
     return node.text if len(node.text) <= 40 else f"{node.text[:37]}..."
 
 
-def wrong_form(shape: Shape, node: Node, source: Source, code: str = "BT109") -> object:
+def wrong_form(shape: Shape, node: Node, source: Source, *, hint: str | None = None) -> object:
     """Report that a node is not of a form."""
     if report_braces(node, source):
         return BAD
-    hint = None
     if isinstance(node, Scalar) and "text" in shape.words and not isinstance(node.value, str):
         hint = f'to mean the text, write "{node.text}"' if node.text else None
-    source.report(code, span_of(node), f"{shape.words} is needed, not {words_for(node)}", hint=hint)
+    message = f"{shape.words} is needed, not {words_for(node)}"
+    source.report("BT109", span_of(node), message, hint=hint)
     return BAD
 
 
@@ -66,8 +69,19 @@ def is_computed(node: Node) -> bool:
     return isinstance(node, Scalar) and node.text.startswith(("$", "= "))
 
 
+def read_computed(shape: Shape, node: Node, source: Source) -> object:
+    """What is computed in the place of a value of a form; a text with `$(name)` in it is not."""
+    value = read_value(node, source)
+    if value is BAD or isinstance(value, Computed):
+        return value
+    assert isinstance(node, Scalar)
+    alone = _ALONE.fullmatch(node.text)
+    hint = f"write '${alone[1]}'" if alone else "write '$name', or '= ' before an expression"
+    return wrong_form(shape, node, source, hint=f"$(...) stands inside a text: {hint}")
+
+
 def or_variable(schema: Schema, values: bool) -> Schema:
     """A schema that lets a variable stand for the value, where `values` says so."""
     if not values:
         return schema
-    return {"anyOf": [schema, {"type": "string", "pattern": r"^(\$|= )"}]}
+    return {"anyOf": [schema, {"type": "string", "pattern": r"^(\$[A-Za-z_]|= )"}]}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.scalars import Choice, Name
-from bt_actions.document.shape import Schema, Shape, is_computed, wrong_form
+from bt_actions.document.shape import Schema, Shape, is_computed, read_computed, wrong_form
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD, read_value
 from bt_actions.suggest import did_you_mean
@@ -42,8 +42,8 @@ class Values:
     words: str = "a mapping of fields to values"
 
     def read(self, node: Node, source: Source) -> object:
-        if isinstance(node, Scalar) and is_computed(node):
-            return read_value(node, source)
+        if is_computed(node):
+            return read_computed(self, node, source)
         if not isinstance(node, Mapping):
             return wrong_form(self, node, source)
         return read_value(node, source)
@@ -59,7 +59,9 @@ class ListValue:
     words: str = "a list"
 
     def read(self, node: Node, source: Source) -> object:
-        if isinstance(node, Listing) or is_computed(node):
+        if is_computed(node):
+            return read_computed(self, node, source)
+        if isinstance(node, Listing):
             return read_value(node, source)
         return wrong_form(self, node, source)
 

@@ -20,21 +20,28 @@ if TYPE_CHECKING:
     from bt_actions.document.nodes import Node
 
 __all__ = [
-    "MAX_BYTES", "MAX_ERRORS", "Source", "TooManyErrors", "Unread", "read_source", "read_stream",
-    "source_of",
+    "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
+    "read_source", "read_stream", "source_of",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
 """The largest file that is read; a tree of 100,000 nodes has about a third of it."""
 MAX_ERRORS = 1000
-"""After so many errors the checker stops: each costs time to explain."""
+"""After so many errors in a file the checker stops: each costs time to explain."""
+SUFFIXES = (".yaml", ".yml", ".json")
+"""How the files end that a tree may name."""
 PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
+Char = tuple[str, int, int]
+"""A character of a text, and the line and column where it is written, from 1."""
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 class TooManyErrors(Exception):
-    """A document has more errors than anybody wants to read; they are in its source."""
+    """A document has more errors than anybody wants to read: they are in its source.
+
+    Whoever catches it must refuse the document: what follows in it was not looked at.
+    """
 
 
 @dataclass(slots=True)
@@ -67,6 +74,10 @@ class Source:
     unread: Unread = field(default_factory=Unread)
     settled: set[Span] = field(default_factory=set)
     """Scalars about which enough was said."""
+    decoded: tuple[Node, list[Char]] | None = None
+    """The scalar that inner.py was last asked about, and where its characters are written."""
+    errors: int = 0
+    """How many of the findings keep the tree from running."""
     _lines: list[str] | None = None
     _commented: frozenset[int] | None = None
 
@@ -99,11 +110,17 @@ class Source:
         hint: str | None = None,
         related: Related | None = None,
     ) -> None:
-        """File a finding; its severity is its rule's. Raises TooManyErrors after `MAX_ERRORS`."""
+        """File a finding; its severity is its rule's. Raises TooManyErrors with `MAX_ERRORS`."""
         if span in self.settled:
             return
-        if len(self.findings) >= MAX_ERRORS and RULES[code].severity is Severity.ERROR:
-            raise TooManyErrors
+        is_error = RULES[code].severity is Severity.ERROR
+        if is_error:
+            if self.errors >= MAX_ERRORS:
+                raise TooManyErrors
+            self.errors += 1
+            if self.errors == MAX_ERRORS:
+                rest = f"after {MAX_ERRORS:,} errors the rest of a file is not checked"
+                hint = f"{hint}; {rest}" if hint else rest
         line = self.line(span.line)
         if (span.end_line, span.end_column) <= (span.line, span.column):
             span = Span(span.line, span.column, span.line, span.column + 1)
@@ -113,20 +130,28 @@ class Source:
                 RULES[code].severity, message, hint, related, line,
             )
         )  # fmt: skip
+        if is_error and self.errors == MAX_ERRORS:
+            raise TooManyErrors
 
     @property
     def has_errors(self) -> bool:
         """Whether anything found so far keeps the tree from running."""
-        return any(finding.severity is Severity.ERROR for finding in self.findings)
+        return self.errors > 0
 
 
-def read_source(path: Path, name: str | None = None) -> Source:
-    """The source in a file. Raises DocumentError when it cannot be read as text."""
+def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> Source:
+    """The source in a file. Raises DocumentError when it cannot be read as text.
+
+    Whoever writes to a pipe may keep its reader waiting: with `pipes=False` none is read, as where
+    the path stands in a tree and was not given by the user.
+    """
     name = name or str(path)
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
             raise _unreadable(name, "this is a directory, not a tree")
+        if stat.S_ISFIFO(mode) and not pipes:
+            raise _unreadable(name, "this is a pipe, which a tree cannot name")
         if stat.S_ISFIFO(mode):
             return source_of(_read_pipe(path, name), name, path)
         if not stat.S_ISREG(mode):

@@ -36,7 +36,7 @@ _SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{
 
 
 class TypeNameError(ValueError):
-    """A text that names no type; `installed` is False when it could be one elsewhere."""
+    """A text that names no type; `missing` is True for one that may be installed elsewhere."""
 
     def __init__(self, message: str, *, missing: bool = False) -> None:
         super().__init__(message)
@@ -95,7 +95,7 @@ def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
         return (
             isinstance(given, Listing)
             and fits(given.item, wanted.item)
-            and (wanted.size is None or given.size is None or given.size == wanted.size)
+            and _fits_size(given, wanted)
         )
     if not isinstance(given, Scalar) or not isinstance(wanted, Scalar):
         return False
@@ -106,6 +106,15 @@ def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
     if wanted.name in ("string", "wstring"):
         return given.name in ("string", "wstring")
     return given.name == wanted.name
+
+
+def _fits_size(given: Listing, wanted: Listing) -> bool:
+    """Whether a list can have as many items as are needed, as far as both are known."""
+    if given.size is None:
+        return wanted.size is None or given.limit is None or given.limit >= wanted.size
+    if wanted.size is not None:
+        return given.size == wanted.size
+    return wanted.limit is None or given.size <= wanted.limit
 
 
 def _fills(given: FieldType, cls: type) -> bool:

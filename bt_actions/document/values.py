@@ -15,13 +15,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from bt_actions.document.bounds import refuse_large
 from bt_actions.document.braces import report_braces
 from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError
 from bt_actions.document.inner import inner_span
-from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
-from bt_actions.document.source import Source, read_source
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, data_of, span_of
+from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.expression import Expression, ExpressionError
+from bt_actions.expression_values import MAX_ITEMS as MAX_TEXT
 
 __all__ = [
     "BAD",
@@ -72,14 +74,18 @@ class Interpolated:
     node: Scalar
 
     def evaluate(self, variable: Lookup) -> str:
-        """The text. Raises ExpressionError."""
-        return "".join(
-            part if isinstance(part, str) else _as_text(part.evaluate(variable))
-            for part in self.parts
-        )
+        """The text. Raises ExpressionError, also for one longer than an expression may make it."""
+        texts, left = [], MAX_TEXT
+        for part in self.parts:
+            text = part if isinstance(part, str) else _as_text(part.evaluate(variable))
+            texts.append(text)
+            left -= len(text)
+            if left < 0:
+                raise ExpressionError(_TOO_LONG)
+        return "".join(texts)
 
 
-_DATA_FILES = (".yaml", ".yml", ".json")
+_TOO_LONG = f"the text would be longer than {MAX_TEXT:,} characters"
 _VARIABLE = re.compile(r"\$[A-Za-z_]\w*(?:\.\w+|\[-?\d+\])*", re.ASCII)
 _DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
 
@@ -148,28 +154,19 @@ def _computes(text: str) -> bool:
 
 def names_file(text: str) -> bool:
     """Whether a text stands for the data in a file: ``@points.yaml``."""
-    return text.startswith("@") and text.endswith(_DATA_FILES)
+    return text.startswith("@") and text.endswith(SUFFIXES)
 
 
-def read_data(path: Path) -> object:
+def read_data(path: Path, *, pipes: bool = False) -> object:
     """The data in a YAML or JSON file; a dollar sign means nothing in it.
 
-    Raises DocumentError, with the place in that file.
+    Raises DocumentError, with the place in that file. `pipes` as for `read_source`.
     """
-    source = read_source(path)
+    source = read_source(path, pipes=pipes)
     node = compose(source)
     if source.findings:
         raise DocumentError(source.findings)
-    return None if node is None else _data(node)
-
-
-def _data(node: Node) -> object:
-    if isinstance(node, Scalar):
-        return node.value
-    if isinstance(node, Listing):
-        return [_data(item) for item in node.items]
-    assert isinstance(node, Mapping)
-    return {key.text: _data(value) for key, value in node.pairs}
+    return None if node is None else data_of(node)
 
 
 def _read_file(node: Scalar, source: Source) -> object:
@@ -312,4 +309,8 @@ def resolve(value: object, variable: Lookup) -> object:
 def _as_text(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
+    try:
+        refuse_large(value, items=MAX_TEXT, characters=MAX_TEXT)  # an item takes a character
+    except ValueError:
+        raise ExpressionError(_TOO_LONG) from None
     return str(value)

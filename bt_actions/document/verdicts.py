@@ -66,13 +66,17 @@ class Verdicts:
     @staticmethod
     def _decorated(kind: str, inner: Can, node: TreeNode) -> Can:
         ends = inner.succeed or inner.fail
-        limited = "attempts" in node.values or "times" in node.values
+        limit = node.values.get("times" if kind == "repeat" else "attempts")
+        known = isinstance(limit, int)  # a limit that is computed may be none, and may be zero
         return {
             "invert": Can(inner.fail, inner.succeed),
             "force_success": Can(ends, False),
             "force_failure": Can(False, ends),
-            "retry": inner if limited else Can(inner.succeed, False),
-            "repeat": inner if limited else Can(False, inner.fail),
+            "retry": Can(inner.succeed, limit is not None and (inner.fail or not known)),
+            "repeat": Can(
+                limit is not None and (inner.succeed or limit == 0 or not known),
+                (inner.fail and limit != 0) or not (known or limit is None),
+            ),
             "timeout": Can(inner.succeed, True),
             "while": Can(inner.succeed, True),
             "run_once": inner,

@@ -9,16 +9,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from bt_actions.document.find import TreeNotFoundError, find_tree
-from bt_actions.document.findings import DocumentError, Finding, Place, Related
-from bt_actions.document.nodes import Listing, Node, Scalar, span_of
+from bt_actions.document.findings import DocumentError, Finding, Related
+from bt_actions.document.nodes import Listing, Node, span_of
 from bt_actions.document.read import read_document, read_root
-from bt_actions.document.source import Source, read_source
+from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.document.tree import Declared, Document, TreeNode
 
-__all__ = ["MAX_TREE_NODES", "Workspace"]
+__all__ = ["MAX_LEVELS", "MAX_TREE_NODES", "Workspace"]
 
 MAX_TREE_NODES = 1_000_000
 """Nodes of a tree after all that it includes was unfolded."""
+MAX_LEVELS = 200
+"""Nodes inside each other after all that a tree includes was unfolded: py_trees ticks and stops a
+tree by recursion, and Python has 1,000 levels of that for everything."""
 _MAX_CHAIN = 50
 _MAX_FILES = 2 * _MAX_CHAIN
 """Trees inside each other, and then files that import each other."""
@@ -31,6 +34,7 @@ class Workspace:
         self._documents: dict[tuple[Path, bool], Document | None] = {}
         self._sources: list[Source] = []
         self._sizes: dict[int, int] = {}
+        self._heights: dict[int, int] = {}
         self._unreadable: list[Finding] = []
 
     def open(self, path: Path, name: str | None = None) -> Document | None:
@@ -69,18 +73,32 @@ class Workspace:
             return None
         self._import(document, chain)
         read_root(document)
-        size = 0
+        size = height = 0
+        levels = {id(document.root): 1}
         for node in document.nodes():
             size += 1
+            level = levels.pop(id(node))
+            for child in node.children:
+                levels[id(child)] = level + 1
+            if level > height:
+                height = level
             if node.kind is not None and node.kind.name == "subtree":
                 node.included = self._include(node, chain)
                 if node.included is not None:
                     size += self._sizes.get(id(node.included), 0)
+                    below = level + self._heights.get(id(node.included), 0)
+                    if below > MAX_LEVELS:
+                        message = f"the tree unfolds to more than {MAX_LEVELS} levels of nodes"
+                        source.report("BT105", span_of(node.key), message)
+                        node.included = None
+                        below = level
+                    height = max(height, below)
                 if size > MAX_TREE_NODES:
                     message = f"the tree unfolds to more than {MAX_TREE_NODES:,} nodes"
                     source.report("BT105", span_of(node.key), message)
                     break
         self._sizes[id(document)] = min(size, MAX_TREE_NODES + 1)
+        self._heights[id(document)] = height
         return document
 
     def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:
@@ -114,14 +132,19 @@ class Workspace:
     def _find(self, wanted: str, written: Node, source: Source) -> Path | None:
         beside = source.path.parent if source.path is not None else None
         try:
-            return find_tree(wanted, beside=beside)
+            path = find_tree(wanted, beside=beside)
         except TreeNotFoundError as error:
             source.report("BT209", span_of(written), str(error))
             return None
+        if path.suffix not in SUFFIXES and _is_file(path):
+            text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"
+            source.report("BT209", span_of(written), text)
+            return None
+        return path
 
     def _read(self, path: Path, written: Node, source: Source) -> Source | None:
         try:
-            return read_source(path, _shown(path, source))
+            return read_source(path, _shown(path, source), pipes=False)
         except DocumentError as error:
             first = error.findings[0]
             if first.code == "BT101":  # told where it stands in that file, as all that is wrong
@@ -202,9 +225,11 @@ def merged(base: object, over: object) -> dict[str, object]:
     return result
 
 
-def place_of_scalar(node: Scalar, source: Source) -> Place:
-    """Where a scalar is written."""
-    return Place(source.name, node.line, node.column)
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def _key(path: Path) -> Path:

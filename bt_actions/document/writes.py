@@ -85,9 +85,9 @@ def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
                 yield Write(name, node, node.node, value, "result")
     saved = values.get("save")
     if isinstance(saved, dict):
-        table = node.written.get("save")
+        table = _values_in(node.written.get("save"))
         for name, value in saved.items():
-            inner = table.get(name) if isinstance(table, Mapping) else None
+            inner = table.get(name)
             root = None if node.kind is not None and node.kind.name == "subtree" else "result"
             if node.kind is not None and node.kind.name == "wait_for_message":
                 root = "message"
@@ -95,9 +95,9 @@ def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
     if node.kind is None:
         return
     if node.kind.name == "set" and isinstance(values.get("set"), dict):
-        table = node.written.get("set")
+        table = _values_in(node.written.get("set"))
         for name, value in values["set"].items():  # type: ignore[attr-defined]
-            inner = table.get(name) if isinstance(table, Mapping) else None
+            inner = table.get(name)
             yield Write(name, node, inner or node.node, value)
     if node.kind.name == "for_each":
         item = values.get("as", "item")
@@ -106,6 +106,13 @@ def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
         index = values.get("index")
         if isinstance(index, str):
             yield Write(index, node, node.written["index"], 0)
+
+
+def _values_in(table: Node | None) -> dict[str, Node]:
+    """The YAML nodes of a mapping's values, by their keys."""
+    if not isinstance(table, Mapping):
+        return {}
+    return {key.text: value for key, value in table.pairs}
 
 
 def items_inside(

@@ -9,7 +9,6 @@ Never ticks, sets up or changes a tree, and never imports rclpy.
 from __future__ import annotations
 
 import html
-import os
 from pathlib import Path
 
 from py_trees.behaviour import Behaviour
@@ -29,6 +28,7 @@ from bt_actions.render.look import (
     rows,
 )
 from bt_actions.render.outline import text
+from bt_actions.whole_file import replace_file
 
 __all__ = [
     "DOWN_UP_TO",
@@ -122,17 +122,8 @@ def write(
     Raises RenderError when the suffix is unknown, or the file cannot be drawn or written.
     """
     data = content(root, form_of(path), direction=direction, depth=depth)
-    target = Path(os.path.realpath(path))
-    new = target.with_name(f".{target.name}.{os.getpid()}")
     try:
-        try:
-            new.write_bytes(data)
-            if target.exists():
-                new.chmod(target.stat().st_mode & 0o777)
-            new.replace(target)
-        except BaseException:
-            new.unlink(missing_ok=True)
-            raise
+        replace_file(path, data)
     except OSError as error:
         raise RenderError(f"{path}: cannot be written: {error.strerror or error}") from error
 

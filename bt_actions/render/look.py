@@ -16,6 +16,8 @@ from py_trees.common import BlackBoxLevel
 from py_trees.composites import Composite, Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
+from bt_actions.behaviours.parallel import Parallel as OwnParallel
+
 __all__ = [
     "DOWN_UP_TO",
     "Row",
@@ -105,6 +107,9 @@ def kind(node: Behaviour) -> str:
             break
     if isinstance(node, Selector | Sequence) and not node.memory:
         return f"reactive {word}"
+    if isinstance(node, OwnParallel):
+        some = "one" if node.at_least == 1 else f"at least {node.at_least}"
+        return f"{word}, {'all' if node.at_least is None else some}"
     if isinstance(node, Parallel):
         policy = type(node.policy).__name__.removeprefix("SuccessOn").lower()
         return f"{word}, {policy}"

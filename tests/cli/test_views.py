@@ -22,7 +22,8 @@ from bt_actions.cli.common import Exit
 from bt_actions.cli.live import LiveView, suits
 from bt_actions.cli.report import Report
 from bt_actions.cli.views import JsonView, LineView, View
-from bt_actions.cli.words import Closing, fields_text, result_lines
+from bt_actions.cli.words import Closing, fields_text, last_words, result_lines
+from bt_actions.document import load_tree
 from bt_actions.events import Event
 from bt_actions.policy import End, Outcome
 from tests.cli.fakes import FakeAction, FakeProgress, Story
@@ -87,6 +88,54 @@ def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_i
         "    5.50 s  goal     Deliver / Work / Step 1: executing on move_robot",
         "    6.50 s  goal     Deliver / Work / Step 1: ABORTED: a fault",
     ]
+
+
+HOSTILE = "done\n    9.99 s  SUCCESS  Deliver\x1b[2J\x9b1A"
+TAMED = "done     9.99 s  SUCCESS  Deliver [2J 1A"
+"""What a tree may log, and what of it is shown."""
+
+
+def test_what_a_tree_says_forges_no_line_and_gives_the_terminal_no_commands(
+    root: Behaviour, leaves: list[FakeAction], story: Story
+) -> None:
+    recover = root.children[1]
+    failed = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": HOSTILE}
+    news = [
+        story.start(),
+        story.goal(leaves[0], "DONE", **failed),  # type: ignore[arg-type]
+        story.node(leaves[0], Status.FAILURE, HOSTILE),
+        story.node(recover, Status.FAILURE, HOSTILE),
+        story.node(root, Status.FAILURE),
+        story.finish(Status.FAILURE),
+    ]
+    lines = Lines(root)
+    lines.feed(*news)
+    lines.view.finish(Closing(Exit.FAILURE))
+    written = lines.out.getvalue()
+    assert f"Deliver / Recover: {TAMED}\n" in written
+    assert f"  failed: {TAMED}\n" in written
+    assert "\x1b" not in written
+    assert "\x9b" not in written
+    assert not any(line.startswith("    9.99 s") for line in written.splitlines())
+
+    screen = Screen(24)
+    report = Report(root)
+    view = LiveView(report, screen.console)
+    feed(report, view, *news)
+    view.finish(Closing(Exit.FAILURE))
+    assert f"✗ Recover  {TAMED}" in screen.lines()
+
+
+def test_an_output_is_one_line_whatever_it_holds(tmp_path: Path, story: Story) -> None:
+    path = tmp_path / "tree.yaml"
+    path.write_text(
+        f"tree: t\noutputs: {{x: string}}\nroot: {{set: {{x: {json.dumps(HOSTILE)}}}}}\n"
+    )
+    root = load_tree(path)
+    root.tick_once()
+    report = Report(root)
+    report.observe(story.finish(Status.SUCCESS))
+    assert f"x: {TAMED}" in last_words(report, Closing(Exit.SUCCESS))
 
 
 def test_what_one_tick_ended_comes_before_what_it_began(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import re
@@ -191,6 +192,25 @@ def test_format_rewrites_files_and_check_changes_nothing(
     assert path.read_text() == "tree: t\nroot: {success: A}\n"
     assert main(["format", "--check", str(path)]) == 0
     assert "would change" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("fails", ["chmod", "replace"])
+def test_format_leaves_nothing_behind_where_it_cannot_write(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    fails: str,
+) -> None:
+    def fail(*_args: object) -> None:
+        raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+    path = tmp_path / "t.yaml"
+    path.write_text("root: {success: A}\ntree: t\n")
+    monkeypatch.setattr(Path, fails, fail)
+    assert main(["format", str(path)]) == 2
+    assert "t.yaml: cannot be written: Disk quota exceeded" in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["t.yaml"]
+    assert path.read_text() == "root: {success: A}\ntree: t\n"
 
 
 def test_format_leaves_alone_what_it_cannot_format(

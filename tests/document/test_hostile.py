@@ -6,13 +6,17 @@ import os
 import random
 import time
 import tracemalloc
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
 
+from bt_actions import render
 from bt_actions.document import (
     DocumentError,
     Finding,
@@ -22,6 +26,7 @@ from bt_actions.document import (
     source_of,
 )
 from bt_actions.document.source import MAX_BYTES, MAX_ERRORS
+from bt_actions.document.workspace import MAX_LEVELS
 from tests.document.test_wrong_documents import CASES
 
 EMPTY = '""'
@@ -120,6 +125,41 @@ def test_a_pipe_that_nobody_writes_to_is_not_waited_for(
     assert "nobody wrote to this pipe within 0.05 s" in only(check_file(path))
 
 
+@pytest.mark.parametrize(("line", "told"), [
+    ("root: {subtree: pipe.yaml}", "pipe.yaml: this is a pipe, which a tree cannot name"),
+    ("root: {subtree: /dev/fd/READER}", "READER: this is a pipe, which a tree cannot name"),
+    ("import: pipe.yaml\nroot: {success: }", "pipe.yaml: this is a pipe, which a tree cannot name"),
+    (
+        "outputs: {x: string}\nroot: {set: {x: '@pipe.yaml'}}",
+        "pipe.yaml:1:1: this is a pipe, which a tree cannot name",
+    ),
+])  # fmt: skip
+def test_a_pipe_that_a_tree_names_is_not_waited_for(tmp_path: Path, line: str, told: str) -> None:
+    reader, writer = os.pipe()
+    os.mkfifo(tmp_path / "pipe.yaml")
+    held = os.open(tmp_path / "pipe.yaml", os.O_RDWR)  # a writer who says nothing
+    try:
+        path = tmp_path / "tree.yaml"
+        path.write_text(f"tree: t\n{line.replace('READER', str(reader))}\n", encoding="utf-8")
+        (finding,) = check_file(path)
+    finally:
+        for descriptor in (reader, writer, held):
+            os.close(descriptor)
+    assert finding.code == "BT209"
+    assert finding.message == told.replace("READER", str(reader))
+
+
+@pytest.mark.parametrize("line", ["root: {subtree: NAME}", "import: NAME\nroot: {success: }"])
+@pytest.mark.parametrize("name", ["shadow", "notes.txt", "shadow.yaml.bak"])
+def test_of_other_files_a_tree_shows_nothing(tmp_path: Path, line: str, name: str) -> None:
+    (tmp_path / name).write_text("root:secret:1\n")
+    path = tmp_path / "tree.yaml"
+    path.write_text(f"tree: t\n{line.replace('NAME', name)}\n", encoding="utf-8")
+    (finding,) = check_file(path)
+    assert finding.message == f"{name}: a tree names files that end in .yaml, .yml, .json only"
+    assert "secret" not in str(finding)
+
+
 def test_a_huge_file_is_refused_without_being_read(tmp_path: Path) -> None:
     path = tmp_path / "huge.yaml"
     with path.open("wb") as stream:
@@ -165,9 +205,108 @@ def test_ten_thousand_levels_of_nesting_are_one_finding(text: str) -> None:
     assert "error[BT105]: nested deeper than 200 levels" in only(check_bytes(text.encode()))
 
 
-def test_the_deepest_tree_that_is_allowed_is_checked() -> None:
+def test_the_deepest_tree_that_is_allowed_in_one_file_is_checked_loaded_and_ticked(
+    tmp_path: Path,
+) -> None:
     text = "tree: t\nroot: " + "{invert: a, child: " * 198 + "{success: A}" + "}" * 198 + "\n"
     assert check_bytes(text.encode()) == []
+    path = tmp_path / "tree.yaml"
+    path.write_text(text)
+    root = load_tree(path)
+    root.tick_once()
+    assert root.status is Status.SUCCESS
+
+
+@pytest.mark.parametrize("text", [
+    "tree: t\nroot:\n  log: {inner}\n",
+    "tree: t\nroot:\n  <<: {inner}\n",
+    "a: {inner}\nb: *x2\n",
+])  # fmt: skip
+def test_aliases_of_aliases_are_no_deeper_than_what_is_written_out(text: str) -> None:
+    inner = "[&x0 " + "[" * 90 + "]" * 90
+    for n in range(1, 20):
+        inner += f", &x{n} " + "[" * 90 + f"*x{n - 1}" + "]" * 90
+    said = only(check_bytes(text.replace("{inner}", inner + "]").encode()))
+    assert "error[BT105]: nested deeper than 200 levels" in said
+
+
+def test_an_alias_may_reach_as_deep_as_what_is_written_out() -> None:
+    def checked(below: int) -> list[Finding]:
+        shared = "{invert: a, child: " * 100 + "{success: A}" + "}" * 100
+        around = "{invert: b, child: " * below + "*shared" + "}" * below
+        return check_bytes(
+            f"tree: t\nroot: {{sequence: s, children: [&shared {shared}, {around}]}}\n".encode()
+        )
+
+    assert checked(96) == []
+    assert "nested deeper than 200 levels" in only(checked(97))
+
+
+def deep_down(levels: int, call: Callable[[], object]) -> object:
+    return call() if levels == 0 else deep_down(levels - 1, call)
+
+
+def write_deep(folder: Path, node: str, levels: int, per_file: int) -> Path:
+    """A tree of so many levels, of which each file holds some, and a subtree below them."""
+    head, tail = node.split("CHILD")
+    number = 0
+    while True:
+        nodes = min(per_file, levels - 1)
+        levels -= nodes + 1
+        inner = f"{{subtree: f{number + 1}.yaml}}" if levels else "{running: Wait}"
+        text = f"tree: t\nroot: {head * nodes}{inner}{tail * nodes}\n"
+        (folder / f"f{number}.yaml").write_text(text, encoding="utf-8")
+        number += 1
+        if not levels:
+            return folder / "f0.yaml"
+
+
+@pytest.mark.parametrize("per_file", [97, 3])
+@pytest.mark.parametrize("node", [
+    "{sequence: a, children: [CHILD, {success: }]}",
+    "{fallback: a, memory: false, children: [CHILD, {success: }]}",
+    "{parallel: a, children: [CHILD]}",
+    "{invert: a, child: CHILD}",
+    "{run_once: a, child: CHILD}",
+    "{for_each: a, in: [1, 2], child: CHILD}",
+    "{timeout: a, after: 9 s, child: CHILD}",
+    "{retry: a, attempts: 2, child: CHILD}",
+])  # fmt: skip
+def test_the_deepest_tree_that_is_allowed_runs_and_is_drawn_from_deep_within_a_program(
+    tmp_path: Path, node: str, per_file: int
+) -> None:
+    path = write_deep(tmp_path, node, MAX_LEVELS, per_file)
+
+    def use() -> None:
+        assert {finding.severity for finding in check_file(path)} <= {"warning"}
+        root = load_tree(path)
+        tree = BehaviourTree(root)
+        tree.setup()
+        tree.tick()
+        assert root.status is Status.RUNNING
+        assert root.tip() is not None
+        assert "Wait" in render.text(root)
+        assert "Wait" in render.dot(root)
+        root.stop(Status.INVALID)
+        tree.shutdown()
+
+    deep_down(100, use)
+
+
+@pytest.mark.parametrize("per_file", [97, 4])
+def test_a_tree_that_is_deeper_with_what_it_includes_is_one_finding(
+    tmp_path: Path, per_file: int
+) -> None:
+    path = write_deep(tmp_path, "{invert: a, child: CHILD}", MAX_LEVELS + 1, per_file)
+    assert only(check_file(path)).endswith("the tree unfolds to more than 200 levels of nodes")
+    with pytest.raises(DocumentError, match="more than 200 levels"):
+        load_tree(path)
+
+
+def test_a_chain_of_deep_trees_is_checked_without_an_end_of_recursion(tmp_path: Path) -> None:
+    path = write_deep(tmp_path, "{invert: a, child: CHILD}", 49 * 198, 197)
+    (*_, finding) = check_file(path)
+    assert finding.code == "BT105"
 
 
 def test_a_billion_laughs_are_one_finding() -> None:
@@ -225,6 +364,63 @@ def test_a_document_full_of_errors_is_answered_in_bounded_time(line: str) -> Non
     assert len(findings) == MAX_ERRORS
     assert max(len(finding.hint or "") for finding in findings) < 300
     assert time.monotonic() - started < 30
+
+
+def test_after_a_thousand_warnings_an_error_is_told_and_a_thousandth_says_that_there_may_be_more(
+    tmp_path: Path,
+) -> None:
+    head = "tree: t\nroot:\n  sequence: S\n  children:\n"
+    warned = head + "    - success: Part #0\n" * (MAX_ERRORS + 10)
+    (*warnings, error) = check_bytes(f"{warned}    - sucess: A\n".encode())
+    assert {finding.code for finding in warnings} == {"BT116"}
+    assert (error.code, error.hint) == ("BT201", None)
+
+    *_, last = check_bytes((head + "    - sucess: A\n" * 2 * MAX_ERRORS).encode())
+    assert last.line == 4 + MAX_ERRORS
+    assert last.hint == "after 1,000 errors the rest of a file is not checked"
+
+    path = tmp_path / "tree.yaml"
+    path.write_text(warned + "    - sucess: A\n" * 2 * MAX_ERRORS, encoding="utf-8")
+    with pytest.raises(DocumentError) as caught:
+        load_tree(path)
+    assert len(caught.value.findings) == MAX_ERRORS
+
+
+def test_what_one_file_has_too_much_of_keeps_no_other_from_being_checked(tmp_path: Path) -> None:
+    (tmp_path / "b.yaml").write_text("tree: b\nroot: {check: $nobody > 1}\n")
+    checks = "    - check: $missing > 1\n" * 2 * MAX_ERRORS
+    (tmp_path / "a.yaml").write_text(
+        f"tree: a\nroot:\n  sequence: S\n  children:\n    - subtree: b.yaml\n{checks}"
+    )
+    findings = check_file(tmp_path / "a.yaml")
+    assert len(findings) == MAX_ERRORS + 1
+    assert "$nobody" in findings[-1].message
+
+
+def test_data_with_too_many_errors_is_refused_where_it_is_named(tmp_path: Path) -> None:
+    (tmp_path / "data.yaml").write_text("a: 1\n" * 2 * MAX_ERRORS)
+    (tmp_path / "tree.yaml").write_text("tree: t\nroot: {set: {x: '@data.yaml'}}\n")
+    with pytest.raises(DocumentError, match=r"data\.yaml:2:1: the key 'a' is here twice") as caught:
+        load_tree(tmp_path / "tree.yaml")
+    assert len(caught.value.findings) == 1
+
+
+def test_classes_that_fail_when_they_are_made_are_refused_whatever_their_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "failing_thousandfold.py").write_text(
+        "import py_trees\n"
+        "class Fails(py_trees.behaviours.Success):\n"
+        "    def __init__(self, name):\n"
+        "        raise RuntimeError('broken')\n"
+    )
+    nodes = "    - python: failing_thousandfold.Fails\n" * (MAX_ERRORS + 10)
+    path = tmp_path / "tree.yaml"
+    path.write_text(f"tree: t\nroot:\n  sequence: S\n  children:\n{nodes}")
+    with pytest.raises(DocumentError, match="broken") as caught:
+        load_tree(path)
+    assert len(caught.value.findings) == MAX_ERRORS
 
 
 def test_a_long_line_is_shown_cut() -> None:
@@ -312,3 +508,35 @@ def test_the_time_for_ignores_grows_with_their_number_and_no_faster(alone: bool)
         return time.process_time() - started
 
     assert seconds(8000) < 8 * seconds(2000) + 0.5
+
+
+@pytest.mark.parametrize(("head", "each", "tail"), [
+    ("root: {log: '", "$(x)", "'}\ninputs: {x: {type: int32, default: 1}}\n"),
+    ("root:\n  set:\n", "    v{n}: 1\n", ""),
+    ("root:\n  sequence: S\n  memory: false\n  children:\n", "    - log: a\n", ""),
+    (
+        "root:\n  sequence: S\n  memory: false\n  children:\n",
+        "    - {action: a, type: a/action/B, server: s, timeout: 1 s}\n",
+        "",
+    ),
+])  # fmt: skip
+def test_the_time_for_many_of_one_thing_grows_with_their_number_and_no_faster(
+    head: str, each: str, tail: str
+) -> None:
+    def seconds(count: int) -> float:
+        text = (
+            f"tree: t\n{head}" + "".join(each.replace("{n}", str(n)) for n in range(count)) + tail
+        )
+        source = source_of(text.encode(), "tree.yaml")
+        started = time.process_time()
+        check_source(source, types=False)
+        return time.process_time() - started
+
+    assert seconds(8000) < 8 * seconds(2000) + 0.5
+
+
+def test_a_thousand_errors_in_one_long_text_are_told_in_bounded_time() -> None:
+    text = "tree: t\nroot: {log: '" + "nothing is called $(x); " * 8000 + "'}\n"
+    started = time.process_time()
+    assert len(check_bytes(text.encode())) == MAX_ERRORS
+    assert time.process_time() - started < 5

@@ -337,6 +337,123 @@ def test_a_subtree_that_starts_again_has_forgotten_its_values(load: Load) -> Non
     assert tick(root) is Status.SUCCESS
 
 
+def test_whatever_writes_an_output_converts_it_to_its_type(load: Load) -> None:
+    root = load(
+        """
+        tree: t
+        outputs: {a: float64, b: float64}
+        root:
+          sequence: S
+          children:
+            - {subtree: inner.yaml, save: {a: x}}
+            - {for_each: F, in: [1, 2], as: b, child: {success: }}
+        """,
+        inner="tree: inner\noutputs: {x: int32}\nroot: {set: {x: 3}}\n",
+    )
+    assert tick(root) is Status.SUCCESS
+    assert [(name, type(value)) for name, value in tree_outputs(root).items()] == [
+        ("a", float), ("b", float)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("child", ["success", "failure"])
+def test_an_output_of_a_subtree_that_does_not_fit_fails_it(load: Load, child: str) -> None:
+    root = load(
+        "tree: t\noutputs: {a: int8, b: int8}\nroot: {subtree: inner.yaml, save: {a: x, b: y}}\n",
+        inner=f"""
+        tree: inner
+        outputs: {{x: int32, y: int32}}
+        root: {{sequence: S, children: [{{set: {{x: 3, y: 300}}}}, {{{child}: }}]}}
+        """,
+    )
+    assert tick(root) is Status.FAILURE
+    assert root.feedback_message.startswith("b: ")
+    assert "300" in root.feedback_message
+    assert tree_outputs(root) == {}
+
+
+@pytest.mark.parametrize(("items", "told"), [
+    ("[300, 1]", "item 0: n: "),
+    ("[1, 300]", "item 1: n: "),
+])  # fmt: skip
+def test_an_item_that_does_not_fit_its_variable_fails_the_loop(
+    load: Load, items: str, told: str
+) -> None:
+    root = load(
+        "tree: t\noutputs: {n: int8}\n"
+        f"root: {{for_each: F, in: {items}, as: n, on_failure: continue, child: {{success: }}}}\n"
+    )
+    assert tick(root) is Status.FAILURE
+    assert root.feedback_message.startswith(told)
+
+
+def test_what_an_action_saves_is_converted_and_fails_it_where_that_cannot_be(load: Load) -> None:
+    from test_msgs.action import Fibonacci
+
+    leaf = load(
+        """
+        tree: t
+        outputs: {wide: float64, narrow: int8}
+        root:
+          action: A
+          type: test_msgs/action/Fibonacci
+          server: fibonacci
+          timeout: 1 s
+          save: {wide: "result.sequence[0]", narrow: "result.sequence[1]"}
+        """
+    )
+    assert isinstance(leaf, ActionBehaviour)
+    assert leaf._read_result(Fibonacci.Result(sequence=[7, 8])) == ""
+    assert sorted(map(repr, leaf._to_save.values())) == ["7.0", "8"]
+    assert leaf._read_result(Fibonacci.Result(sequence=[7, 300])).startswith("narrow: ")
+
+
+@pytest.mark.parametrize(("first", "again", "told"), [
+    ("abc", '"$(x)$(x)"', "the text would be longer than 10,000 characters"),
+    ("abc", "[$x, $x]", "x: the value is too large"),
+    ("abc", "{a: $x, b: {c: $x}}", "x: the value is too large"),
+    ("abc", "[$x]", "x: the value is nested deeper than 100 levels"),
+    ("abc", "'= [$x, $x]'", "x: the value is too large"),
+    ("[a, b]", '["$(x)"]', "the text would be longer than 10,000 characters"),
+])  # fmt: skip
+def test_a_variable_cannot_grow_without_bound(
+    load: Load, first: str, again: str, told: str
+) -> None:
+    root = load(
+        f"""
+        tree: t
+        root:
+          sequence: S
+          children:
+            - {{set: {{x: {first}}}}}
+            - {{repeat: Grow, times: 3000, child: {{set: {{x: {again}}}}}}}
+            - {{check: $x == $x}}
+        """
+    )
+    assert tick(root, 4000) is Status.FAILURE
+    assert root.children[1].children[0].feedback_message == told
+
+
+def test_inputs_of_a_subtree_and_texts_made_of_lists_are_bounded_as_well(load: Load) -> None:
+    many = ", ".join(["$x"] * 200)
+    root = load(
+        f"""
+        tree: t
+        root:
+          sequence: S
+          children:
+            - {{set: {{x: 1}}}}  # so that nobody knows its type
+            - {{set: {{x: [{", ".join(["text"] * 9000)}]}}}}
+            - {{invert: Text, child: {{log: "$(x)"}}}}
+            - {{subtree: inner.yaml, with: {{y: [{many}]}}}}
+        """,
+        inner='tree: inner\ninputs: {y: "string[]"}\nroot: {check: len($y) > 0}\n',
+    )
+    assert tick(root) is Status.FAILURE
+    assert root.children[2].children[0].feedback_message.startswith("the text would be longer")
+    assert root.children[3].feedback_message == "'with': the value is too large"
+
+
 def test_a_tree_that_includes_itself_is_an_error_that_shows_the_chain(
     load: Load, tmp_path: Path
 ) -> None:
