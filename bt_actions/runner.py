@@ -477,9 +477,7 @@ class TreeRunner:
             except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
                 _error(f"terminate of a behaviour raised: {error!r}")
                 self._leave_with(error)
-                for node in root.iterate():
-                    if isinstance(node, ActionBehaviour):
-                        ActionBehaviour.terminate(node, Status.INVALID)
+                self._let_go()
         self._patience.end()
         _drain(self._tickets, self._hurry)
         self._flush()
@@ -489,6 +487,18 @@ class TreeRunner:
         self._tickets = {ticket for ticket in self._tickets if not ticket.accounted_for}
         _flush_log()  # who tells of the end tells it last
         self._emit(TreeFinished(time.monotonic(), status))
+
+    def _let_go(self) -> None:
+        """Interrupt every action, though one's own class of it may raise in that."""
+        for node in self.tree.root.iterate():
+            if isinstance(node, ActionBehaviour):
+                try:
+                    if node.status is Status.RUNNING:
+                        node.terminate(Status.INVALID)
+                except BaseException as error:  # noqa: BLE001 - the user's: any
+                    _error(f"terminate of {node.name} raised: {error!r}")
+                    self._leave_with(error)
+                ActionBehaviour.terminate(node, Status.INVALID)
 
     def _hurry(self) -> bool:
         self._flush()

@@ -732,13 +732,21 @@ class TestEvents:
                     raise RuntimeError("on purpose in update")
                 return Status.RUNNING
 
+        class Tidy(MoveRobot):
+            def terminate(self, new_status: Status) -> None:
+                tidied.append(self.name)
+                super().terminate(new_status)
+
         events: list[Event] = []
+        tidied: list[str] = []
         leaf = Careless("m", 50.0, action_name=name)
-        runner = TreeRunner(together(Breaks("breaks"), leaf), node=node)
+        behind = Tidy("behind", 50.0, action_name=f"{name}_b")
+        runner = TreeRunner(together(Breaks("breaks"), leaf, behind), node=node)
         runner.observe(events.append)
         with pytest.raises(TreeError, match="on purpose in update"):
             runner.run(timeout=9.0)
         assert (leaf.end, journal.count("canceled")) == (End.CANCELED, 1)
+        assert "behind" in tidied
         assert isinstance(events[-1], TreeFinished)
         runner.shutdown()
 

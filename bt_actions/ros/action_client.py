@@ -294,6 +294,11 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         else:
             tell.probe_answered(about)
 
+    @property
+    def closed(self) -> bool:
+        """Whether it takes and sends nothing any more."""
+        return self._closed
+
     def destroy(self) -> None:
         """Destroy the client. Answers that are still under way are lost."""
         with self._lock:

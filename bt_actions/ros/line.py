@@ -301,6 +301,7 @@ class Line:
                 self._keep_in_mind(ticket)
         if not self.goals:
             alarm.forget(self)
+            self._look_at = 0.0  # no look is due any more, and none will be late
             self.traffic.drop_if_unused(self)
 
     def _keep_in_mind(self, ticket: Ticket) -> None:
@@ -518,6 +519,8 @@ class Line:
             if self._look_at and now - self._look_at > STOOD_STILL:
                 self.watch.stood_still(now)
             self.pump()
+            if self.client.closed:  # by what came, and nobody used the line
+                return Server.ABSENT
         before = self.watch.state(now)
         try:
             self._observe(now)

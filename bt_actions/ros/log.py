@@ -28,8 +28,8 @@ MOST = 1000
 Half of them is for what is said of goals."""
 PACE = 0.1
 """Seconds, at most, that a tree which logs faster than it is written waits for room."""
-NAP = 0.001
-"""Seconds between two looks at how much has been written."""
+NAP, LONGEST_NAP = 0.001, 0.05
+"""Seconds between two looks at how much has been written, and those on a machine that is busy."""
 LINGER = 5.0
 """Seconds without a line until the thread ends."""
 AT_EXIT = 1.0
@@ -69,7 +69,7 @@ class Log:
         self._written = 0
         self._slow_at = -1  # lines written when `by` last waited in vain
         self._stuck_at = -1  # and `flush`
-        self._in_hand = False  # the thread writes a line
+        self._pen = threading.Lock()  # of who writes
 
     def info(self, text: str) -> None:
         """Log something worth knowing."""
@@ -101,17 +101,20 @@ class Log:
         """
         if self._written != self._stuck_at and not self._wait_for(self._taken, seconds):
             self._stuck_at = self._written
-            self._write_here()
+            if not os.isatty(STDERR):  # which may have room, but not for a line
+                self._write_here()
 
     def _wait_for(self, lines: int, seconds: float) -> bool:
         """Wait until so many lines have been written; return whether they were in time.
 
-        Counts its own naps: a process that was stopped meanwhile has not had the time.
+        No nap counts for more than `LONGEST_NAP`: who was stopped meanwhile has not had the time.
         """
-        for _ in range(int(seconds / NAP)):
-            if self._written >= lines:
-                return True
+        before = time.monotonic()
+        while self._written < lines and seconds > 0.0:
             time.sleep(NAP)
+            now = time.monotonic()
+            seconds -= min(now - before, LONGEST_NAP)
+            before = now
         return self._written >= lines
 
     def _put(self, level: str, text: str, logger: Any = None, most: int = MOST) -> None:
@@ -148,19 +151,27 @@ class Log:
                         self._thread = None
                         return
                 continue
-            self._room(None)
-            self._in_hand = True
-            self._say(logger, level, text)
-            self._in_hand = False
+            written = False
+            while not written:
+                self._room(None)
+                with self._pen:
+                    written = self._room(0)
+                    if written:
+                        self._say(logger, level, text)
             with self._guard:
                 if self._lines.empty():
                     self._tell_dropped()
 
     def _write_here(self) -> None:
-        """Write what waits as long as there is room, and not beside a thread that waits for it."""
-        with contextlib.suppress(queue.Empty):
-            while not self._in_hand and self._room(0):
-                self._say(*self._lines.get_nowait())
+        """Write what waits as long as there is room, unless somebody else is at it."""
+        if not self._pen.acquire(blocking=False):
+            return
+        try:
+            with contextlib.suppress(queue.Empty):
+                while self._room(0):
+                    self._say(*self._lines.get_nowait())
+        finally:
+            self._pen.release()
 
     def _say(self, logger: Any, level: str, text: str) -> None:
         try:
@@ -177,12 +188,7 @@ class Log:
 
     def _room(self, patience: int | None) -> bool:
         """Wait until a pipe takes a line: rclpy writes with the interpreter's lock held."""
-        poll = select.poll()
-        poll.register(STDERR, select.POLLOUT)
-        try:
-            return bool(poll.poll(patience))
-        except OSError:
-            return True
+        return _wait_for_room(patience)
 
 
 def _uses_stdout() -> bool:
@@ -198,7 +204,19 @@ def _write_by_hand(level: str, name: str, text: str) -> None:
         line = f"\x1b[{COLOURS[level]}m{line}\x1b[0m"
     left = f"{line}\n".encode(errors="replace")
     while left:
-        left = left[os.write(STDERR, left) :]
+        try:
+            left = left[os.write(STDERR, left) :]
+        except BlockingIOError:  # whoever shares the terminal has made it so
+            _wait_for_room()
+
+
+def _wait_for_room(patience: int | None = None) -> bool:
+    poll = select.poll()
+    poll.register(STDERR, select.POLLOUT)
+    try:
+        return bool(poll.poll(patience))
+    except OSError:
+        return True
 
 
 def _cut(text: str) -> str:

@@ -106,7 +106,6 @@ class TestExitCode0:
             assert (action["attempts"], action["outcome"]) == (1, "SUCCEEDED")
             assert 0.0 < action["duration"] < 30.0
 
-
     def test_standard_output_is_for_results_wherever_rclpys_loggers_are_to_write(
         self, start: Start, monkeypatch: pytest.MonkeyPatch
     ) -> None:

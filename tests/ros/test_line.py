@@ -99,6 +99,7 @@ def look(line: Any, seen: ServerWatch, now: float) -> None:
 
     line.watch, line._observe = seen, observe
     line.traffic, line._come_home = SimpleNamespace(node=None), lambda: None
+    line.client = SimpleNamespace(closed=False)
     Line.look(line, now)
 
 
@@ -126,6 +127,19 @@ def test_a_look_that_comes_late_decides_nothing_about_who_is_alone(
     line: Any = SimpleNamespace(_look_at=due, pump=lambda: None)
     look(line, seen, 3.0)
     assert seen.alone is alone
+
+
+def test_a_line_without_goals_is_not_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a server that is alone would settle anew for each goal after a pause."""
+    monkeypatch.setattr(module, "is_valid", lambda _: True)
+    monkeypatch.setattr(alarm, "forget", lambda _: None)
+    traffic: Any = SimpleNamespace(drop_if_unused=lambda _: None)
+    line: Any = SimpleNamespace(goals={}, _look_at=1.0, traffic=traffic, pump=lambda: None)
+    Line.close_book(line, SimpleNamespace(goal=SimpleNamespace(id=b"1")))  # type: ignore[arg-type]
+    seen = watch(OURS, NEW)
+    seen.probe_answered(0.5, 1)
+    look(line, seen, 4.0)
+    assert seen.alone
 
 
 def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -26,6 +27,11 @@ class Written:
 
     def __getattr__(self, level: str) -> Any:
         return lambda text: self.lines.append(f"{level}: {text}")
+
+
+def after(event: threading.Event) -> Callable[[int | None], bool]:
+    """In place of standard error, which has room from then on."""
+    return lambda patience: event.wait(60.0 if patience is None else 0.0)
 
 
 def test_a_line_fits_into_a_pipe_that_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,7 +62,7 @@ def test_where_nobody_reads_a_tree_leaves_room_for_goals_and_what_was_dropped_is
 ) -> None:
     log, written, reads = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
+    monkeypatch.setattr(log, "_room", after(reads))
     for number in range(2 * MOST):
         log.by(written, "info", str(number))
     log.error("of a goal")
@@ -73,7 +79,7 @@ def test_a_reader_that_falters_is_waited_for_at_the_end(monkeypatch: pytest.Monk
     """A tree that logs has given up by then; what is said of goals at the end has not."""
     log, written, reads = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
+    monkeypatch.setattr(log, "_room", after(reads))
     for number in range(MOST):
         log.by(written, "info", str(number))
     assert log._slow_at == 0
@@ -108,7 +114,7 @@ def test_the_time_that_a_process_was_stopped_for_is_not_the_logs(
     """A machine that stood still for longer than `flush` waits: nothing has been in vain."""
     log, written, passes = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and passes.wait(60.0))
+    monkeypatch.setattr(log, "_room", after(passes))
     log.error("a goal is not accounted for")
     monkeypatch.setattr(time, "monotonic", itertools.count(0.0, 100.0).__next__)
     nap = time.sleep
@@ -125,7 +131,7 @@ def test_the_time_that_a_process_was_stopped_for_is_not_the_logs(
 def test_what_was_dropped_last_is_told_too(monkeypatch: pytest.MonkeyPatch) -> None:
     log, written, reads = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
+    monkeypatch.setattr(log, "_room", after(reads))
     for number in range(2 * MOST):
         log.info(str(number))
     reads.set()
@@ -171,10 +177,8 @@ from bt_actions.ros.log import log
 logged = threading.Thread(target=lambda: [log.error("x" * 500 + f"-{n}") for n in range(500)])
 logged.start()
 logged.join()
-beats = 0
 for _ in range(200):
     time.sleep(0.005)
-    beats += 1
 print("went on", flush=True)
 input()
 log.flush(60.0)
@@ -197,7 +201,7 @@ def test_a_terminal_that_nobody_reads_holds_up_nothing() -> None:
         assert process.stdout.readline() == "went on\n"
         process.stdin.write("\n")
         process.stdin.flush()
-        while b"-499" not in said:
+        while b"-499\x1b[0m\r\n" not in said:
             said += os.read(ours, 65536)
         assert process.wait(20.0) == 0
     finally:
@@ -229,7 +233,7 @@ def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(
 ) -> None:
     log, written, reads = Log("test"), Written(), threading.Event()
     monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda patience: patience != 0 and reads.wait(60.0))
+    monkeypatch.setattr(log, "_room", after(reads))
     log.info("in its hands")
     log.error("of the parent's goal")
     held, forked = threading.Event(), threading.Event()
