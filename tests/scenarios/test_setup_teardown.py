@@ -11,6 +11,7 @@ import time
 import pytest
 
 from tests.scenarios.conftest import Launch
+from tests.support.cycles import PATIENCE
 from tests.support.reliability import Record
 
 MEMORY = 0.05
@@ -27,7 +28,7 @@ def test_cycles_in_one_process_leave_nothing(
     """Create, run, shut down, so many times in one process; "user": in a user's own context"""
     began = time.monotonic()
     program = launch(how, str(cycles), program=("-m", "tests.support.cycles"))
-    assert program.wait(30.0 + 2.0 * cycles) == 0, program
+    assert program.wait(PATIENCE + 10.0) == 0, program
     told = json.loads(program.lines[-1])
     warm, after = told["warm"], told["after"]
     assert program.errors == [], "no warning"

@@ -6,6 +6,7 @@ Whatever else it prints is a complaint.
 
 from __future__ import annotations
 
+import faulthandler
 import gc
 import json
 import sys
@@ -27,6 +28,8 @@ from bt_actions.simulation import Script, ScriptedServer
 NAME = "/cycles/move"
 OF_THE_PROCESS = ("bt_actions-lookout", "bt_actions-alarm")
 """Threads that are begun once, when they are needed."""
+PATIENCE = 100.0
+"""Seconds after which a process that hangs says where, and ends."""
 
 
 def held() -> dict[str, float]:
@@ -111,6 +114,7 @@ class User:
 
 def main() -> None:
     """Run the cycles."""
+    faulthandler.dump_traceback_later(PATIENCE, exit=True)
     how, cycles = sys.argv[1], int(sys.argv[2])
     user = User() if how == "user" else None
     alone = interrupted if how == "interrupted" else on_a_node_of_its_own
