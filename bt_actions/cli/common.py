@@ -100,9 +100,16 @@ def seconds(text: str) -> float:
     return positive(text, "number of seconds")
 
 
+FASTEST = 1e5
+"""The largest factor for the simulation's time, and one by the smallest."""
+
+
 def speed(text: str) -> float:
-    """Read a positive factor from the command line."""
-    return positive(text, "factor")
+    """Read a factor from the command line, with which timers can still be made."""
+    value = positive(text, "factor")
+    if not 1.0 / FASTEST <= value <= FASTEST:
+        raise argparse.ArgumentTypeError(f"{text!r} is not from {1.0 / FASTEST:g} to {FASTEST:g}")
+    return value
 
 
 def positive(text: str, what: str) -> float:

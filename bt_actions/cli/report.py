@@ -177,6 +177,7 @@ class Report:
         from bt_actions.events import GoalChanged, NodeChanged, TreeFinished, TreeStarted
 
         self.now = event.time
+        self.started = self.started or event.time  # a tree that cannot be set up never starts
         if isinstance(event, TreeStarted):
             self.started = event.time
             self._begun = self._clock()

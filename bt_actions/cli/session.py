@@ -125,6 +125,7 @@ class Session:
                 code = drive.finish(self._close(ended, part_at))
                 if ended.abandoned:
                     leave(code)
+                signals.settle(code)
         finally:
             with contextlib.suppress(OSError):  # the terminal may be gone
                 view.close()

@@ -6,6 +6,7 @@ Nothing here decides what a signal means.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import select
@@ -15,6 +16,16 @@ from types import FrameType
 from typing import Any, Self
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+_to_ignore: set[signal.Signals] = set()
+
+
+@atexit.register
+def _ignore() -> None:
+    """What is settled holds while Python takes itself down, too, where it has no handlers."""
+    for number in _to_ignore:
+        signal.signal(number, signal.SIG_IGN)
 
 
 class Signals:
@@ -31,6 +42,7 @@ class Signals:
         self._wakeup_before = -1
         self._closing = threading.Lock()
         self._closed = False
+        self._settled = False
 
     def __enter__(self) -> Self:
         self._wakeup_before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
@@ -41,13 +53,20 @@ class Signals:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
+        for number, handler in self._before.items() if not self._settled else ():
             signal.signal(number, handler)
         signal.set_wakeup_fd(self._wakeup_before)
         with self._closing:
             self._closed = True
             os.close(self._read)
             os.close(self._write)
+
+    def settle(self, code: int) -> None:
+        """It is told how this program ends: from here on a signal ends it at once, and as told."""
+        self._settled = True
+        for number in self._before:
+            signal.signal(number, lambda _number, _frame: os._exit(code))
+        _to_ignore.update(self._before)
 
     def poke(self) -> None:
         """Wake the thread that waits; callable from any thread."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import signal
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from bt_actions.cli import signals
 from tests.support.processes import Host, Journal, Process
 
 _numbers = itertools.count(1)
@@ -20,9 +22,13 @@ Start = Callable[..., Process]
 
 @pytest.fixture(autouse=True)
 def environment() -> Iterator[None]:
-    """Take back what a command called in this process has put into the environment."""
+    """Take back what a command called in this process has put in place: variables, handlers."""
     before = dict(os.environ)
+    handlers = {number: signal.getsignal(number) for number in signals._ENDING}
     yield
+    signals._to_ignore.clear()
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
     for name in set(os.environ) - set(before):
         del os.environ[name]
     os.environ.update(before)

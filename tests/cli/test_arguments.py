@@ -47,6 +47,8 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "pick_and_place", "--set", "pick=1"], "has no input 'pick'"),
         (["run", "no_such_tree"], "there is no tree 'no_such_tree'"),
         (["run", "t", "--speed", "2"], "--speed is about the simulation; it needs --sim"),
+        (["run", "t", "--sim", "--speed", "1e308"], "'1e308' is not from 1e-05 to 100000"),
+        (["sim", "--speed", "1e-300"], "'1e-300' is not from 1e-05 to 100000"),
         (["run", "t", "--fault", "a:1:abort"], "--fault is about the simulation"),
         (["run", "t", "--check-part", "5"], "--check-part is about the simulation"),
         (["run", "t", "--sim", "--fault", "nonsense"], "--fault"),

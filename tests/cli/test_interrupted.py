@@ -48,6 +48,21 @@ def moving(
     return begin
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("how", ["", "--json"])
+def test_what_was_told_holds_though_a_signal_comes_late(
+    number: signal.Signals, how: str, moving: Callable[..., tuple[Process, Journal]]
+) -> None:
+    """The goal runs on, and the process takes itself down."""
+    run, _ = moving(*([how] if how else []), fault="1:reject_cancel", cancel=0.3)
+    run.send(signal.SIGINT)
+    run.line('"finished"' if how else "STOPPED")
+    while run.popen.poll() is None:
+        run.send(number)
+        threading.Event().wait(0.01)
+    assert run.wait() == 3, run
+
+
 @pytest.mark.parametrize(
     ("number", "code", "how"),
     [

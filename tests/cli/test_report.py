@@ -13,8 +13,9 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Inverter
 
+from bt_actions.cli.common import Exit
 from bt_actions.cli.report import Report, Row, summary, table
-from bt_actions.cli.words import goal_text
+from bt_actions.cli.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import PLACE
 from bt_actions.events import Event, NodeChanged, TreeFinished
@@ -42,6 +43,13 @@ def told(root: Behaviour, *events: Event) -> Report:
 
 def row_of(leaf: FakeAction, *events: Event) -> Row:
     return told(leaf, *events).row(leaf)
+
+
+def test_a_tree_that_never_started_took_no_time(leaf: FakeAction) -> None:
+    """Its setup raised; the clock counts from when the machine was started."""
+    report = told(leaf, TreeFinished(5000.0, Status.INVALID))
+    words = last_words(report, Closing(Exit.FAILURE))
+    assert any(" after 0.00 s" in line for line in words), words
 
 
 def test_attempts_are_counted_over_the_retries_of_a_visit(leaf: FakeAction, story: Story) -> None:
