@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -29,9 +28,12 @@ class Written:
         return lambda text: self.lines.append(f"{level}: {text}")
 
 
-def after(event: threading.Event) -> Callable[[int | None], bool]:
-    """In place of standard error, which has room from then on."""
-    return lambda patience: event.wait(60.0 if patience is None else 0.0)
+def stuck_log(monkeypatch: pytest.MonkeyPatch) -> tuple[Log, Written, threading.Event]:
+    """A log, what it has written, and the event from which on its reader reads."""
+    log, written, reads = Log("test"), Written(), threading.Event()
+    monkeypatch.setattr(log, "_logger", written)
+    monkeypatch.setattr(log, "_room", lambda patience: reads.wait(60.0 if patience is None else 0))
+    return log, written, reads
 
 
 def test_a_line_fits_into_a_pipe_that_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,9 +62,7 @@ def test_a_tree_that_logs_in_a_loop_loses_nothing_while_somebody_reads(
 def test_where_nobody_reads_a_tree_leaves_room_for_goals_and_what_was_dropped_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log, written, reads = Log("test"), Written(), threading.Event()
-    monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", after(reads))
+    log, written, reads = stuck_log(monkeypatch)
     for number in range(2 * MOST):
         log.by(written, "info", str(number))
     log.error("of a goal")
@@ -77,9 +77,7 @@ def test_where_nobody_reads_a_tree_leaves_room_for_goals_and_what_was_dropped_is
 
 def test_a_reader_that_falters_is_waited_for_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tree that logs has given up by then; what is said of goals at the end has not."""
-    log, written, reads = Log("test"), Written(), threading.Event()
-    monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", after(reads))
+    log, written, reads = stuck_log(monkeypatch)
     for number in range(MOST):
         log.by(written, "info", str(number))
     assert log._slow_at == 0
@@ -112,9 +110,7 @@ def test_the_time_that_a_process_was_stopped_for_is_not_the_logs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A machine that stood still for longer than `flush` waits: nothing has been in vain."""
-    log, written, passes = Log("test"), Written(), threading.Event()
-    monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", after(passes))
+    log, written, passes = stuck_log(monkeypatch)
     log.error("a goal is not accounted for")
     monkeypatch.setattr(time, "monotonic", itertools.count(0.0, 100.0).__next__)
     nap = time.sleep
@@ -129,9 +125,7 @@ def test_the_time_that_a_process_was_stopped_for_is_not_the_logs(
 
 
 def test_what_was_dropped_last_is_told_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    log, written, reads = Log("test"), Written(), threading.Event()
-    monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", after(reads))
+    log, written, reads = stuck_log(monkeypatch)
     for number in range(2 * MOST):
         log.info(str(number))
     reads.set()
@@ -231,9 +225,7 @@ def test_a_line_by_hand_looks_as_one_of_rclpys(
 def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log, written, reads = Log("test"), Written(), threading.Event()
-    monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", after(reads))
+    log, written, reads = stuck_log(monkeypatch)
     log.info("in its hands")
     log.error("of the parent's goal")
     held, forked = threading.Event(), threading.Event()
