@@ -41,6 +41,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "t", "--timeout", "inf"], "'inf' is no positive number of seconds"),
         (["run", "t", "--executor", "both"], "invalid choice: 'both'"),
         (["run", "t", "--namespace", "r-1"], "'r-1' is no ROS namespace"),
+        (["run", "t", "--namespace", "a" * 151], "a namespace has at most 150 characters"),
         (["run", "t", "--set", "x"], "--set 'x': expected name=value"),
         (["run", "pick_and_place", "--set", "pick_at=[1"], "--set pick_at=[1"),
         (["run", "pick_and_place", "--set", "pick_at=far"], "--set pick_at=far"),
