@@ -410,9 +410,9 @@ class TreeRunner:
             with contextlib.suppress(queue.Empty):
                 self._wakes.get(timeout=wait) if wait > 0.0 else self._wakes.get_nowait()
             self._awake = False
+            self._spinner.check()
             if self._spin_error is not None:
                 raise TreeError(f"the spin thread died: {self._spin_error!r}") from self._spin_error
-            self._spinner.check()
             if self._stop_wanted or _past(deadline):
                 return Status.INVALID
             self._flush()

@@ -532,6 +532,25 @@ class TestWhoSpins:
             assert journal.ends() == ["canceled"]
             free.set()
 
+    @pytest.mark.parametrize("how", ["shut down", "node removed"])
+    def test_an_executor_that_is_taken_away_fails_the_tree(
+        self, journal: Journal, name: str, executor: str, how: str
+    ) -> None:
+        leaf = MoveRobot("m", 9.0, action_name=name)
+        with TreeRunner(leaf, executor=executor) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            if how == "shut down":
+                runner.executor.shutdown()
+            else:
+                runner.executor.remove_node(runner.node)
+            with pytest.raises(TreeError, match="was taken out of its executor, or that was shut"):
+                runner.wait(5.0)
+            assert journal.ends() == ["canceled"]
+            assert runner.unaccounted == []
+            with pytest.raises(TreeError, match="was taken out of its executor, or that was shut"):
+                runner.run(timeout=5.0)
+
     def test_a_dead_spin_thread_fails_the_tree(
         self, journal: Journal, name: str, executor: str
     ) -> None:

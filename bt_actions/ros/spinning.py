@@ -21,7 +21,6 @@ from rclpy.executors import (
     Executor,
     ExternalShutdownException,
     MultiThreadedExecutor,
-    ShutdownException,
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
@@ -117,15 +116,17 @@ class Spinner:
     def check(self) -> None:
         """Make sure now and then that whoever spins our node still does; never waits.
 
-        Raises RuntimeError when nobody has for 5 s, or the node was taken out of its executor.
+        Raises RuntimeError when nobody has for 5 s, or the node was taken out of its executor. Out
+        of one that is spun here: calls `died`.
         """
         if not self.spins:
             self._check(PATIENCE_RUNNING)
+        elif self._left():
+            self._died(self._gone())
 
     def _check(self, patience: float) -> None:
         since = time.monotonic() - self._asked_at
-        left = self.node not in self.executor.get_nodes()
-        if left or (not self._alive.is_set() and since >= patience):
+        if self._left() or (not self._alive.is_set() and since >= patience):
             raise RuntimeError(
                 f"node {self.node.get_fully_qualified_name()} is in an executor that nobody spins; "
                 "spin it on another thread while the tree runs, or leave the executor out"
@@ -140,22 +141,32 @@ class Spinner:
             self.executor.create_task(self._alive.set)
             self.executor.wake()
 
+    def _left(self) -> bool:
+        """Whether the node was taken out of its executor; shut down, that holds none."""
+        return self.node not in self.executor.get_nodes()
+
+    def _gone(self) -> RuntimeError:
+        return RuntimeError(
+            f"node {self.node.get_fully_qualified_name()} was taken out of its executor, or that "
+            "was shut down, while a tree runs; shut the runner down first"
+        )
+
     def _spinning(self) -> bool:
         return self._thread is not None and self._thread.is_alive()
 
     def _spin(self) -> None:
         """Spin until told to stop; an executor that was given must stay usable, so no shutdown."""
         try:
-            while not self._stopping:
-                self.executor.spin_once()
+            while not self._stopping and not self._left():
+                self.executor.spin_once()  # says nothing of an executor that was shut down
                 if not self.node.context.ok():
                     raise ExternalShutdownException
-        except ShutdownException:
-            if not self._stopping:
-                self._died(RuntimeError("the executor was shut down while a tree runs in it"))
         except BaseException as error:  # noqa: BLE001 - a dead spin thread must not go unnoticed
             if not self._stopping:
-                self._died(error)
+                self._died(self._gone() if self._left() else error)
+        else:
+            if not self._stopping:
+                self._died(self._gone())
 
     def _await(self, threads: Iterable[threading.Thread]) -> None:
         """Wait for threads that run callbacks, and tell it where one takes long to return."""
