@@ -256,8 +256,9 @@ class TreeRunner:
         thread = self._thread
         if thread is None:
             raise RuntimeError("nothing to wait for: the tree has not been started")
+        _check_seconds(timeout)
         with self._mind_signals():
-            thread.join(timeout)
+            thread.join(None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         if thread.is_alive():
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s")
         self._thread = None
@@ -372,8 +373,7 @@ class TreeRunner:
     def _run(self, timeout: float | None) -> Status:
         if self._closed:
             raise RuntimeError("this runner has been shut down")
-        if timeout is not None and timeout != timeout:
-            raise ValueError(f"timeout must be a number of seconds, not {timeout!r}")
+        _check_seconds(timeout)
         deadline = None if timeout is None else time.monotonic() + timeout
         self._leaving = None
         self._visitor.forget()
@@ -587,6 +587,11 @@ class TreeRunner:
         if not isinstance(error, Exception):
             self._leaving, self._stop_wanted = error, True
             self._wake()
+
+
+def _check_seconds(timeout: float | None) -> None:
+    if timeout is not None and timeout != timeout:
+        raise ValueError(f"timeout must be a number of seconds, not {timeout!r}")
 
 
 def _past(deadline: float | None) -> bool:

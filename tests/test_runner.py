@@ -138,6 +138,13 @@ class TestRun:
         with TreeRunner(Gate(), node=node) as runner, pytest.raises(ValueError, match="seconds"):
             runner.run(timeout=float("nan"))
 
+    def test_a_wait_may_be_longer_than_a_thread_can_wait(self, node: Any) -> None:
+        with TreeRunner(py_trees.behaviours.Success("s"), node=node) as runner:
+            runner.start()
+            with pytest.raises(ValueError, match="number of seconds"):
+                runner.wait(float("nan"))
+            assert runner.wait(1e300) is Status.SUCCESS
+
     def test_a_heartbeat_may_be_endless(self, journal: Journal, name: str, node: Any) -> None:
         leaf = MoveRobot("m", 0.1, action_name=name)
         with TreeRunner(leaf, node=node, heartbeat=float("inf")) as runner:

@@ -134,10 +134,6 @@ def metres(text: str) -> float:
     return value
 
 
-LONGEST_NAMESPACE = 150
-"""Characters; a name in ROS has 245 with all that an action adds to it."""
-
-
 def namespace(text: str) -> str:
     """Read a ROS namespace; return it with a leading slash, or "" for the root."""
     name = text.strip("/")
@@ -145,6 +141,8 @@ def namespace(text: str) -> str:
         raise argparse.ArgumentTypeError(
             f"{text!r} is no ROS namespace: letters, digits and _ between slashes, as in /r1"
         )
+    from bt_actions.document.ros_names import LONGEST_NAMESPACE
+
     if len(name) > LONGEST_NAMESPACE:
         raise argparse.ArgumentTypeError(f"a namespace has at most {LONGEST_NAMESPACE} characters")
     return f"/{name}" if name else ""

@@ -15,7 +15,11 @@ from bt_actions.document.shape import Schema, wrong_form
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD
 
-__all__ = ["RosName", "why_not"]
+__all__ = ["LONGEST", "LONGEST_NAMESPACE", "RosName", "why_not"]
+
+LONGEST = 120
+LONGEST_NAMESPACE = 100
+"""Characters. In ROS both have 247, with the 20 that an action adds to its name."""
 
 _PART = r"(?:[A-Za-z0-9_]|\{(?:node|ns|namespace)\})"
 _TOKEN = rf"(?![0-9]){_PART}+"
@@ -35,31 +39,37 @@ class RosName:
     def read(self, node: Node, source: Source) -> object:
         if not isinstance(node, Scalar) or not isinstance(node.value, str):
             return wrong_form(self, node, source)
-        if re.fullmatch(self._pattern, node.text):
+        if re.fullmatch(self._pattern, node.text) and len(node.text) <= self._longest:
             warn_cut(node, source, "text")
             return node.text
         hint = "letters, digits and underscores between slashes, such as arm/gripper"
-        said = f"{node.text!r} cannot be {self.words}: {_why(node.text)}"
+        said = f"{node.text!r} cannot be {self.words}: {_why(node.text, self._longest)}"
         source.report("BT121", span_of(node), said, hint=hint)
         return BAD
 
     def schema(self) -> Schema:
-        return {"type": "string", "pattern": f"^{self._pattern}$"}
+        return {"type": "string", "pattern": f"^{self._pattern}$", "maxLength": self._longest}
 
     @property
     def _pattern(self) -> str:
         return _NAMESPACE if self.namespace else _NAME
 
+    @property
+    def _longest(self) -> int:
+        return LONGEST_NAMESPACE if self.namespace else LONGEST
+
 
 def why_not(name: str) -> str:
     """What keeps a text from being the name of a topic or server; empty where nothing does."""
-    return "" if re.fullmatch(_NAME, name) else _why(name)
+    return "" if re.fullmatch(_NAME, name) and len(name) <= LONGEST else _why(name, LONGEST)
 
 
-def _why(text: str) -> str:
+def _why(text: str, longest: int) -> str:
     """What ROS would refuse in a name."""
     if not text:
         return "it is empty"
+    if len(text) > longest:
+        return f"it has more than {longest} characters"
     if "$" in text:
         return "no variable can stand in it"
     strange = _STRANGE.search(text)

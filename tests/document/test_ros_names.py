@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from rclpy.action import ActionClient
 from rclpy.exceptions import NameValidationException
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.validate_full_topic_name import validate_full_topic_name
+from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.document.build_names import join_names
 from bt_actions.document.nodes import compose
-from bt_actions.document.ros_names import RosName
+from bt_actions.document.ros_names import LONGEST, LONGEST_NAMESPACE, RosName
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD
 
@@ -45,6 +48,13 @@ def test_a_name_is_taken_exactly_when_ros_takes_it(name: str) -> None:
     # rcl makes '/space/nodea' of '~a', which its own rules forbid; {ns} holds slashes of its own.
     if "{ns}" not in name and not re.match("~[^/]", name):
         assert taken(name) == taken_by_rcl(name), name
+
+
+def test_the_longest_name_in_the_longest_namespace_can_be_an_action(node: Any) -> None:
+    name = f"/{'n' * (LONGEST_NAMESPACE - 1)}/{'a' * LONGEST}"
+    assert taken(name[-LONGEST:])
+    assert not taken("a" * (LONGEST + 1))
+    ActionClient(node, MoveRobot, name).destroy()
 
 
 @pytest.mark.parametrize(
