@@ -1,6 +1,7 @@
 """The middleware's settings for processes of our own; to be called before ROS is first touched.
 
-What the user has set is never overridden. Does not import rclpy.
+What the user has set is never overridden, but how far a simulation is seen that was asked to be
+private. Does not import rclpy.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ class Reach(Enum):
     MACHINE = "LOCALHOST"
     """For simulated servers: they carry the names of real ones, and would be mistaken for them."""
     PROCESS = "OFF"
-    """For a tree with its own simulated servers: another one beside it is none of its business."""
+    """For a tree with its own simulated servers, which must not be taken for those of a real robot
+    nearby, nor these for them: it is private, whatever the user has set for robots."""
 
 
 def prepare(reach: Reach = Reach.NETWORK) -> None:
@@ -42,5 +44,8 @@ def prepare(reach: Reach = Reach.NETWORK) -> None:
         os.environ.setdefault(_TRANSPORTS, "UDPv4")
     if not any(os.environ.get(name) for name in _LOGS):
         os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")  # rcl insists on one
+    if reach is Reach.PROCESS:
+        for name in _RANGES:
+            os.environ.pop(name, None)
     if reach is not Reach.NETWORK and not any(os.environ.get(name) for name in _RANGES):
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = reach.value

@@ -118,5 +118,26 @@ def test_a_simulation_stays_on_this_machine_and_nothing_else_does() -> None:
 
 def test_a_range_that_the_user_chose_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
-    prepare(Reach.PROCESS)
+    prepare(Reach.MACHINE)
     assert _get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "SUBNET"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"),
+        ("ROS_LOCALHOST_ONLY", "1"),
+        ("ROS_STATIC_PEERS", "127.0.0.1"),
+    ],
+)
+def test_a_private_simulation_is_private_whatever_was_chosen(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str
+) -> None:
+    monkeypatch.setenv(name, value)
+    prepare(Reach.PROCESS)
+    assert {each: _get(each) for each in ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")} == {
+        "ROS_LOCALHOST_ONLY": "",
+        "ROS_STATIC_PEERS": "",
+    }
+    assert _get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF"
+
