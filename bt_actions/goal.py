@@ -557,7 +557,7 @@ class Goal:
         if self._seen_status is not None:
             return self._finished_by_status()
         self.lost = True
-        if self.end is not End.NEVER_STARTED:
+        if not self._never_came:  # else it was denied for good; for less, it may have come
             self.end = End.SERVER_GONE
         self._deadlines.clear()
         self._release()

@@ -148,6 +148,7 @@ class TreeRunner:
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event of a run, on the ticking thread.
 
+        What becomes known of its goals in `shutdown` is told there.
         One that raises is removed, and the run goes on; SystemExit and the like end it, and are
         raised again when its goals have been drained.
         """
@@ -354,8 +355,9 @@ class TreeRunner:
                     with contextlib.suppress(Exception):
                         behaviour.shutdown()
         finally:
-            self._traffic.unobserve(self._note)
             self._spinner.stop(self._close_guests)
+            self._traffic.unobserve(self._note)
+            self._flush()  # what has only now become known of goals
 
     def __enter__(self) -> TreeRunner:
         return self

@@ -29,6 +29,7 @@ TOOLS = {
     "expression",
     "expression_text",
     "expression_values",
+    "plain_text",
     "streams",
     "suggest",
     "ticking",

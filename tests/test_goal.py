@@ -678,15 +678,17 @@ def test_a_goal_lost_before_its_acceptance_is_judged_when_the_server_is_back() -
     assert not life.goal.live, "nothing is owed: others may be sent"
 
 
-def test_a_suspect_judged_never_started_is_kept_in_mind_when_its_server_is_lost() -> None:
+def test_a_suspect_that_was_denied_once_may_run_on_a_server_that_is_lost() -> None:
     """Its acceptance may have been under way when the link was cut."""
     life = suspect()
     life.pass_time(2.0)
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     life.pass_time(1.0)
-    life.on(Event.SERVER_LOST, "cut")
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    life.on(Event.SERVER_LOST, "cut")
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.SERVER_GONE)
     assert life.on(Event.SERVER_RETURNED) == [CANCEL]
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
 
 

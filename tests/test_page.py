@@ -366,3 +366,15 @@ def test_a_page_has_all_levels_and_starts_folded_to_those_that_are_wanted(tree: 
 @pytest.mark.parametrize(("direction", "down"), [(None, True), ("down", True), ("right", False)])
 def test_direction_is_respected(direction: str | None, down: bool, tree: Path) -> None:
     assert _Reader(page(load_tree(tree), direction=direction)).data["down"] is down
+
+
+def test_a_node_that_another_is_merged_into_shows_its_own_lines(tmp_path: Path) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text(
+        "tree: t\nroot:\n  sequence: S\n  children:\n"
+        "    - &first\n      log: one\n      level: warn\n"
+        "    - <<: *first\n      level: error\n"
+    )
+    text = page(load_tree(path))
+    assert "level: warn" in text
+    assert "level: error" in text

@@ -19,7 +19,7 @@ class Gate(Decorator):
     """
 
     refused = False
-    """Whether it failed without its child, whose status is that of an earlier time then."""
+    """Whether it failed by itself: its child did not, or was not ticked this time."""
 
     def gate(self) -> Status | None:
         """What to do this time; called after `initialise`."""
@@ -28,11 +28,12 @@ class Gate(Decorator):
     def tick(self) -> Iterator[Behaviour]:
         if self.status is not Status.RUNNING:
             self.initialise()
-        decided = self.gate()
-        self.refused = decided is Status.FAILURE
+        decided, child_failed = self.gate(), False
         if decided is None:
             yield from self.decorated.tick()
+            child_failed = self.decorated.status is Status.FAILURE
             decided = self.update()
+        self.refused = decided is Status.FAILURE and not child_failed
         if decided is not Status.RUNNING:
             self.stop(decided)
         self.status = decided

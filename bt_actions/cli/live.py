@@ -20,7 +20,7 @@ from bt_actions.cli.choosing import branches, choose, fork_of, is_below
 from bt_actions.cli.report import Report, Row
 from bt_actions.cli.stderr import CaughtStderr
 from bt_actions.cli.words import Closing, feedback_text, goal_text, last_words
-from bt_actions.render.look import clean
+from bt_actions.plain_text import clean
 
 if TYPE_CHECKING:
     from bt_actions.events import Event

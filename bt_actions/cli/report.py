@@ -19,8 +19,8 @@ from py_trees.composites import Composite, Selector
 
 from bt_actions.behaviours.gate import Gate
 from bt_actions.cli.common import path_of, place_of
+from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
-from bt_actions.render.look import clean
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -28,22 +28,26 @@ def value(text: str, where: str) -> object:
 
     Raises BadInput.
     """
-    from bt_actions.document.nodes import Scalar, compose, data_of
+    from bt_actions.document.nodes import Node, Scalar, compose, data_of
     from bt_actions.document.source import Source
 
     stripped = text.strip()
     if not stripped:
         return text
+    node: Node | None
     if stripped[0] in "[{\"'":
         source = Source(where, text)
         node = compose(source)
         if source.findings or node is None:
             why = source.findings[0].message if source.findings else "not a value"
             raise BadInput(f"{where}: {why}")
+    else:
+        node = Scalar()
+        node.text, node.plain = stripped, True
+    try:
         return data_of(node)
-    scalar = Scalar()
-    scalar.text, scalar.plain = stripped, True
-    return scalar.value
+    except ValueError as error:
+        raise BadInput(f"{where}: {error}") from error
 
 
 def nested(values: dict[str, object]) -> dict[str, object]:

@@ -12,8 +12,8 @@ from py_trees.common import Status
 
 from bt_actions.cli.common import Exit
 from bt_actions.cli.report import Report, Row, summary, table
+from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
-from bt_actions.render.look import clean
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,

@@ -21,27 +21,28 @@ MAX_LEVELS = 100
 _END = object()
 
 
-def refuse_large(
-    value: object, *, items: int = MAX_ITEMS, characters: int = MAX_CHARACTERS
-) -> None:
-    """Raise ValueError for a value that is larger, or nested deeper than `MAX_LEVELS`.
+def refuse_large(value: object, *, items: int = MAX_ITEMS, characters: int = MAX_CHARACTERS) -> int:
+    """Return how many items a value has.
 
-    Takes no more time than a value of the largest size.
+    Raises ValueError for one that is larger, or nested deeper than `MAX_LEVELS`. Takes no more time
+    than a value of the largest size.
     """
+    left = items
     stack: list[Iterator[object]] = [iter((value,))]
     while stack:
         item = next(stack[-1], _END)
         if item is _END:
             stack.pop()
             continue
-        items -= 1
+        left -= 1
         if isinstance(item, str):
             characters -= len(item)
         elif isinstance(item, list | tuple):
             stack.append(iter(item))
         elif isinstance(item, Mapping):
             stack.append(chain.from_iterable(item.items()))
-        if items < 0 or characters < 0:
+        if left < 0 or characters < 0:
             raise ValueError("the value is too large")
         if len(stack) > MAX_LEVELS + 1:
             raise ValueError(f"the value is nested deeper than {MAX_LEVELS} levels")
+    return items - left

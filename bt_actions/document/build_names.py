@@ -39,14 +39,26 @@ def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
     return merged(shared, node.values)
 
 
-def resources_below(root: TreeNode, document: Document, namespace: str = "") -> dict[str, TreeNode]:
-    """What the actions of a subtree hold while they run, with the first node that does."""
+_Known = dict[tuple[int, str], dict[str, TreeNode]]
+
+
+def resources_below(
+    root: TreeNode, document: Document, namespace: str = "", known: _Known | None = None
+) -> dict[str, TreeNode]:
+    """What the actions of a subtree hold while they run, with the first node that does.
+
+    `known` keeps what trees that are included hold, for later calls.
+    """
+    known = {} if known is None else known
     found: dict[str, TreeNode] = {}
     inner = join_names(namespace, document.namespace)
     for node in root.walk():
         if node.included is not None and node.included.root is not None:
             below = join_names(inner, text_of(node.values, "namespace"))
-            for name in resources_below(node.included.root, node.included, below):
+            there = (id(node.included.root), below)
+            if there not in known:
+                known[there] = resources_below(node.included.root, node.included, below, known)
+            for name in known[there]:
                 found.setdefault(name, node)
         elif node.alias is not None or (node.kind is not None and node.kind.name == "action"):
             settings = settings_of(node, document)

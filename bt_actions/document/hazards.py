@@ -15,7 +15,7 @@ from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.order import find_early_reads
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
-from bt_actions.document.verdicts import Verdicts, budget
+from bt_actions.document.verdicts import Verdicts
 
 __all__ = ["find_hazards"]
 
@@ -39,6 +39,9 @@ class _Hazards:
         self._document: Document = checker.document
         self._source = checker.source
         self._verdicts = Verdicts()
+        self._held: dict[tuple[int, str], dict[str, TreeNode]] = {}
+        self._slow: dict[int, bool] = {}
+        self._anew: dict[int, TreeNode | None] = {}
         self._unbounded: dict[str, TreeNode] = {}
         self._used: set[str] = set()
 
@@ -114,7 +117,7 @@ class _Hazards:
     def _parallel(self, node: TreeNode) -> None:
         taken: dict[str, TreeNode] = {}
         for child in node.children:
-            below = resources_below(child, self._document)
+            below = resources_below(child, self._document, known=self._held)
             for resource, user in below.items():
                 first = taken.get(resource.lstrip("/"))
                 if first is None or self._doubts.below(node):
@@ -146,11 +149,11 @@ class _Hazards:
                 return
 
     def _reactive(self, node: TreeNode, kind: str) -> None:
-        slow = (any(_takes_time(inner) for inner in child.walk()) for child in node.children)
+        slow = (self._takes_time(child) for child in node.children)
         last = max((at for at, takes in enumerate(slow) if takes), default=0)
         begun_anew = []
         for child in node.children[:last]:
-            action, can = _restarted(child), self._verdicts.of(child)
+            action, can = self._restarted(child), self._verdicts.of(child)
             if action is not None and (can.succeed if kind == "sequence" else can.fail):
                 begun_anew.append(action)
         if not begun_anew or self._doubts.below(node):
@@ -162,11 +165,39 @@ class _Hazards:
                 related=Related(node.place, "because of 'memory: false' here"),
             )  # fmt: skip
 
+    def _restarted(self, root: TreeNode) -> TreeNode | None:
+        """The first action or service below that `root` begins anew with, or the tree it is in."""
+        if id(root) in self._anew:
+            return self._anew[id(root)]
+        found: TreeNode | None = None
+        stack = [root]
+        while stack and found is None:
+            node = stack.pop()
+            inner = node.included.root if node.included is not None else None
+            service = node.kind is not None and node.kind.name == "service"
+            if service or _is_action(node) or (inner is not None and self._restarted(inner)):
+                found = node
+            elif node.kind is None or node.kind.name != "run_once":
+                stack.extend(reversed(node.children))
+        self._anew[id(root)] = found
+        return found
+
+    def _takes_time(self, node: TreeNode) -> bool:
+        """Whether a node, or one below it, may take more than one tick."""
+        found = self._slow.get(id(node))
+        if found is None:
+            below = node.included.root if node.included is not None else None
+            within = [*node.children, below] if below is not None else node.children
+            busy = node.kind is not None and node.kind.name in _BUSY
+            found = _is_action(node) or busy or any(self._takes_time(each) for each in within)
+            self._slow[id(node)] = found
+        return found
+
     def _short(self, node: TreeNode) -> None:
         after = node.values.get("after")
         if not isinstance(after, float) or not node.children or self._doubts.below(node):
             return
-        needed = budget(node.children[0], self._document)
+        needed = self._verdicts.budget(node.children[0], self._document)
         if after < needed:
             self._report(
                 "BT307", span_of(node.written["after"]),
@@ -249,23 +280,3 @@ def _keys_of(node: TreeNode) -> dict[tuple[str, int], Node]:
 
 def _is_action(node: TreeNode) -> bool:
     return node.alias is not None or (node.kind is not None and node.kind.name == "action")
-
-
-def _restarted(root: TreeNode) -> TreeNode | None:
-    """The first action or service below that `root` begins anew with, or the tree it is in."""
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        inner = node.included.root if node.included is not None else None
-        service = node.kind is not None and node.kind.name == "service"
-        if service or _is_action(node) or (inner is not None and _restarted(inner) is not None):
-            return node
-        if node.kind is None or node.kind.name != "run_once":
-            stack.extend(reversed(node.children))
-    return None
-
-
-def _takes_time(node: TreeNode) -> bool:
-    if node.included is not None and node.included.root is not None:
-        return any(_takes_time(inner) for inner in node.included.root.walk())
-    return _is_action(node) or (node.kind is not None and node.kind.name in _BUSY)

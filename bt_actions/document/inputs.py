@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from bt_actions.document.bounds import refuse_large
 from bt_actions.document.nodes import Node, compose
-from bt_actions.document.source import Source
+from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.tree import Declared, Document
 from bt_actions.document.types import parse_type
 from bt_actions.document.values import names_file, read_data, resolve
@@ -103,6 +105,7 @@ def parse_input(text: str, type_name: str) -> object:
     value = _plain(node) if node is not None else None
     if value is None and isinstance(kind, Message):
         value = {}
+    refuse_large(value)
     refuse_infinite(value)
     return convert(value, type_name)
 
@@ -126,7 +129,9 @@ def _plain(node: Node) -> object:
     from bt_actions.document.values import read_value
 
     source = Source("value", "")
-    value = read_value(node, source)
+    value: object = None
+    with contextlib.suppress(TooManyErrors):  # which are filed
+        value = read_value(node, source)
     for finding in source.findings:
         raise ValueError(f"{finding.message} ({finding.hint})" if finding.hint else finding.message)
     return resolve(value, lambda name: f"${name}")

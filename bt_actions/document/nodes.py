@@ -8,6 +8,7 @@ it is ten times as slow, and says other things about the same mistakes.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from typing import Any
@@ -26,6 +27,7 @@ __all__ = [
     "Mapping",
     "Node",
     "Scalar",
+    "beyond_floats",
     "compose",
     "compose_written",
     "data_of",
@@ -114,14 +116,33 @@ def span_of(node: Node) -> Span:
     return Span(node.line, node.column, node.end_line, node.end_column)
 
 
+def beyond_floats(node: Scalar) -> bool:
+    """Whether a scalar is a number that no float64 can be, and not infinity itself."""
+    value = node.value
+    return isinstance(value, float) and math.isinf(value) and "inf" not in node.text.lower()
+
+
 def data_of(node: Node) -> object:
-    """What a node says, as plain data: a dollar sign means nothing in it."""
+    """What a node says, as plain data: a dollar sign means nothing in it.
+
+    What stands there twice by an alias is one object. Raises ValueError for a number that no
+    float64 can be.
+    """
+    return _data_of(node, {})
+
+
+def _data_of(node: Node, known: dict[int, object]) -> object:
     if isinstance(node, Scalar):
+        if beyond_floats(node):
+            raise ValueError(f"{node.text} does not fit a float64")
         return node.value
-    if isinstance(node, Listing):
-        return [data_of(item) for item in node.items]
-    assert isinstance(node, Mapping)
-    return {key.text: data_of(value) for key, value in node.pairs}
+    if id(node) not in known:
+        if isinstance(node, Listing):
+            known[id(node)] = [_data_of(item, known) for item in node.items]
+        else:
+            assert isinstance(node, Mapping)
+            known[id(node)] = {key.text: _data_of(value, known) for key, value in node.pairs}
+    return known[id(node)]
 
 
 def _number(text: str) -> object:

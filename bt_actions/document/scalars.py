@@ -6,6 +6,7 @@ Each reports what is wrong to the source and then gives BAD; it knows nothing of
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import dataclass
 
 from bt_actions.document.cut import warn_cut
@@ -29,6 +30,7 @@ __all__ = [
 ]  # fmt: skip
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+GREATEST = sys.float_info.max
 _NAME_LIMIT = 200
 
 
@@ -160,7 +162,7 @@ class Quantity:
         value = node.value if isinstance(node, Scalar) else None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return wrong_form(self, node, source)
-        if not self.least <= value <= self.most or value == float("inf"):
+        if not self.least <= value <= min(self.most, GREATEST):
             most = "" if self.most == float("inf") else f" and at most {self.most:g}"
             text = f"a number of at least {self.least:g}{most} is needed, not {words_for(node)}"
             source.report("BT110", span_of(node), text)

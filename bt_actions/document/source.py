@@ -34,6 +34,10 @@ PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
 Char = tuple[str, int, int]
 """A character of a text, and the line and column where it is written, from 1."""
+_PAIR = re.compile(
+    r"(?<!\\)((?:\\\\)*)\\u(d[89ab][0-9a-f]{2})\\u(d[c-f][0-9a-f]{2})", re.IGNORECASE
+)
+"""A character as JSON may write it, and YAML may not: as two halves of UTF-16."""
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -76,6 +80,10 @@ class Source:
     """Scalars about which enough was said."""
     decoded: tuple[Node, list[Char]] | None = None
     """The scalar that inner.py was last asked about, and where its characters are written."""
+    files: dict[Path, object] = field(default_factory=dict)
+    """What was read for it from other files as data, or the ValueError that came of it."""
+    items: int = 0
+    """Of such data, each counted as often as the document names it."""
     errors: int = 0
     """How many of the findings keep the tree from running."""
     _lines: list[str] | None = None
@@ -220,6 +228,8 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
         raise _unreadable(
             name, f"byte 0x{data[error.start]:02x} is no UTF-8", "BT101", line, column
         ) from None
+    if path is not None and path.suffix == ".json":
+        text = _PAIR.sub(_joined, text)
     source = Source(name, text, path)
     bad = _FORBIDDEN.search(text)
     if bad is not None:
@@ -230,6 +240,10 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
             line, column,
         )  # fmt: skip
     return source
+
+
+def _joined(pair: re.Match[str]) -> str:
+    return pair[1] + bytes.fromhex(pair[2] + pair[3]).decode("utf-16-be")
 
 
 def _unreadable(

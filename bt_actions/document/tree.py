@@ -51,8 +51,11 @@ class TreeNode:
 
     @property
     def place(self) -> Place:
-        """Where the node's kind is written."""
-        return Place(self.source.name, self.key.line, self.key.column)
+        """Where the node's kind is written, or the node begins whose kind is merged into it."""
+        node, key = self.node, self.key
+        begin, end = (node.line, node.column), (node.end_line, node.end_column)
+        at = key if begin <= (key.line, key.column) < end else node
+        return Place(self.source.name, at.line, at.column)
 
     def walk(self) -> Iterator[TreeNode]:
         """This node and all below it, in the order of the text."""

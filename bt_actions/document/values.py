@@ -6,7 +6,6 @@ A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` sta
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterator
 from collections.abc import Mapping as MappingType
@@ -15,12 +14,21 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from bt_actions.document.bounds import refuse_large
+from bt_actions.document.bounds import MAX_ITEMS, refuse_large
 from bt_actions.document.braces import report_braces
 from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.findings import DocumentError
 from bt_actions.document.inner import inner_span
-from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, data_of, span_of
+from bt_actions.document.nodes import (
+    Listing,
+    Mapping,
+    Node,
+    Scalar,
+    beyond_floats,
+    compose,
+    data_of,
+    span_of,
+)
 from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.expression_values import MAX_ITEMS as MAX_TEXT
@@ -118,11 +126,10 @@ def read_value(node: Node, source: Source) -> object:
 def _read_scalar(node: Scalar, source: Source) -> object:
     text = node.text
     if "$" not in text and not text.startswith(("=", "@")):
-        value = node.value
-        if isinstance(value, float) and math.isinf(value) and "inf" not in text.lower():
+        if beyond_floats(node):
             source.report("BT204", span_of(node), f"{text} does not fit a float64")
             return BAD
-        return value
+        return node.value
     if names_file(text):
         return _read_file(node, source)
     if text.startswith("= "):
@@ -160,26 +167,40 @@ def names_file(text: str) -> bool:
 def read_data(path: Path, *, pipes: bool = False) -> object:
     """The data in a YAML or JSON file; a dollar sign means nothing in it.
 
-    Raises DocumentError, with the place in that file. `pipes` as for `read_source`.
+    Raises DocumentError, with the place in that file, and ValueError for what is larger than any
+    value of a tree. `pipes` as for `read_source`.
     """
     source = read_source(path, pipes=pipes)
     node = compose(source)
     if source.findings:
         raise DocumentError(source.findings)
-    return None if node is None else data_of(node)
+    data = None if node is None else data_of(node)
+    refuse_large(data)
+    return data
 
 
 def _read_file(node: Scalar, source: Source) -> object:
     path = Path(node.text[1:])
     if source.path is not None:
         path = source.path.parent / path
-    try:
-        return read_data(path)
-    except DocumentError as error:
-        first = error.findings[0]
+    if path not in source.files:
+        try:
+            source.files[path] = read_data(path)
+        except ValueError as error:
+            source.files[path] = error
+    data = source.files[path]
+    if not isinstance(data, ValueError):
+        if source.items <= MAX_ITEMS:
+            source.items += refuse_large(data)
+        if source.items <= MAX_ITEMS:
+            return data
+        data = ValueError(f"of data in files, a tree takes {MAX_ITEMS:,} items")
+    text = f"{path.name}: {data}"
+    if isinstance(data, DocumentError):
+        first = data.findings[0]
         text = f"{path.name}:{first.line}:{first.column}: {first.message}"
-        source.report("BT209", span_of(node), text)
-        return BAD
+    source.report("BT209", span_of(node), text)
+    return BAD
 
 
 def _computed(node: Scalar, source: Source, text: str, start: int) -> object:

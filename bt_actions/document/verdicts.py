@@ -9,7 +9,7 @@ from bt_actions.document.build_names import settings_of
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.values import computed_in
 
-__all__ = ["Can", "Verdicts", "budget"]
+__all__ = ["Can", "Verdicts"]
 
 
 class Can(NamedTuple):
@@ -28,6 +28,7 @@ class Verdicts:
 
     def __init__(self) -> None:
         self._known: dict[int, Can] = {}
+        self._budgets: dict[int, float] = {}
 
     def of(self, node: TreeNode) -> Can:
         """How a node can end."""
@@ -82,31 +83,39 @@ class Verdicts:
             "run_once": inner,
         }.get(kind, _EITHER)
 
+    def budget(self, node: TreeNode, document: Document) -> float:
+        """The seconds that a node's deadlines and pauses add up to; what has none counts nothing.
 
-def budget(node: TreeNode, document: Document) -> float:
-    """The seconds that a node's deadlines and pauses add up to; what has none counts nothing."""
-    kind = node.kind.name if node.kind is not None else ""
-    if node.alias is not None or kind == "action":
-        settings = settings_of(node, document)
-        return _tries(_deadline(settings, "result"), settings.get("retry"))
-    if kind == "service":
-        return _tries(_deadline(node.values, "response"), node.values.get("retry"))
-    if kind in ("wait", "wait_until", "wait_for_message"):
-        limit = node.values.get("wait" if kind == "wait" else "timeout")
-        return limit if isinstance(limit, float) else 0.0
-    if node.included is not None and node.included.root is not None:
-        return budget(node.included.root, node.included)
-    inner = [budget(child, document) for child in node.children]
-    if not inner:
-        return 0.0
-    if kind in ("sequence", "fallback"):
-        return sum(inner)
-    after = node.values.get("after")
-    if kind == "timeout" and isinstance(after, float):
-        return min(after, inner[0])
-    if kind == "retry":
-        return _tries(inner[0], node.values)
-    return inner[0] * _rounds(kind, node) if len(inner) == 1 else max(inner)
+        `document` is the one that the node stands in.
+        """
+        found = self._budgets.get(id(node))
+        if found is None:
+            found = self._budgets[id(node)] = self._add_up(node, document)
+        return found
+
+    def _add_up(self, node: TreeNode, document: Document) -> float:
+        kind = node.kind.name if node.kind is not None else ""
+        if node.alias is not None or kind == "action":
+            settings = settings_of(node, document)
+            return _tries(_deadline(settings, "result"), settings.get("retry"))
+        if kind == "service":
+            return _tries(_deadline(node.values, "response"), node.values.get("retry"))
+        if kind in ("wait", "wait_until", "wait_for_message"):
+            limit = node.values.get("wait" if kind == "wait" else "timeout")
+            return limit if isinstance(limit, float) else 0.0
+        if node.included is not None and node.included.root is not None:
+            return self.budget(node.included.root, node.included)
+        inner = [self.budget(child, document) for child in node.children]
+        if not inner:
+            return 0.0
+        if kind in ("sequence", "fallback"):
+            return sum(inner)
+        after = node.values.get("after")
+        if kind == "timeout" and isinstance(after, float):
+            return min(after, inner[0])
+        if kind == "retry":
+            return _tries(inner[0], node.values)
+        return inner[0] * _rounds(kind, node) if len(inner) == 1 else max(inner)
 
 
 def _deadline(settings: Mapping[str, object], name: str) -> float:

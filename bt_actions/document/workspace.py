@@ -35,7 +35,7 @@ class Workspace:
         self._sources: list[Source] = []
         self._sizes: dict[int, int] = {}
         self._heights: dict[int, int] = {}
-        self._unreadable: list[Finding] = []
+        self._failed: dict[Path, DocumentError] = {}
 
     def open(self, path: Path, name: str | None = None) -> Document | None:
         """The tree in a file, with its imports and subtrees; None when there is none to speak of.
@@ -57,7 +57,8 @@ class Workspace:
     @property
     def findings(self) -> list[Finding]:
         """Everything found in any of them, by file and place."""
-        found = list(self._unreadable)
+        failed = [error.findings for error in self._failed.values()]
+        found = [one for findings in failed for one in findings if one.code == "BT101"]
         for source in self._sources:
             found += sorted(source.findings, key=lambda one: (one.line, one.column, one.code))
         return list(dict.fromkeys(found))  # what an alias repeats is wrong once
@@ -143,15 +144,16 @@ class Workspace:
         return path
 
     def _read(self, path: Path, written: Node, source: Source) -> Source | None:
-        try:
-            return read_source(path, _shown(path, source), pipes=False)
-        except DocumentError as error:
-            first = error.findings[0]
-            if first.code == "BT101":  # told where it stands in that file, as all that is wrong
-                self._unreadable += error.findings
-            else:
-                source.report("BT209", span_of(written), f"{path.name or path}: {first.message}")
-            return None
+        key = _key(path)
+        if key not in self._failed:
+            try:
+                return read_source(path, _shown(path, source), pipes=False)
+            except DocumentError as error:
+                self._failed[key] = error
+        first = self._failed[key].findings[0]
+        if first.code != "BT101":  # which is told where it stands in that file
+            source.report("BT209", span_of(written), f"{path.name or path}: {first.message}")
+        return None
 
     def _import(self, document: Document, chain: tuple[Path, ...]) -> None:
         """Take over the actions, topics and defaults of the files a document imports."""

@@ -14,12 +14,12 @@ from pathlib import Path
 from py_trees.behaviour import Behaviour
 
 from bt_actions.document.findings import PLACE
+from bt_actions.plain_text import clean
 from bt_actions.render.graphviz import RenderError, draw
 from bt_actions.render.look import (
     DOWN_UP_TO,
     Row,
     action_of,
-    clean,
     direction_of,
     kind,
     label,

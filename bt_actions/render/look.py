@@ -17,12 +17,12 @@ from py_trees.composites import Composite, Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
 from bt_actions.behaviours.parallel import Parallel as OwnParallel
+from bt_actions.plain_text import clean
 
 __all__ = [
     "DOWN_UP_TO",
     "Row",
     "action_of",
-    "clean",
     "direction_of",
     "kind",
     "label",
@@ -159,8 +159,3 @@ def _shape(node: Behaviour) -> tuple[str, str, str | None]:
     if action_of(node) is not None:
         return "ellipse", "#bfd7ff", None
     return "ellipse", "#d4d8dd", None
-
-
-def clean(name: str) -> str:
-    """Return `name` on one line, without the characters that XML and terminals do not take."""
-    return re.sub("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]+", " ", name)

@@ -12,6 +12,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
+from bt_actions.expression_values import scalar
 from bt_actions.ros.interfaces import short_name
 
 __all__ = [
@@ -120,11 +121,11 @@ def describe(cls: type) -> Mapping[str, FieldType]:
 
 @lru_cache(maxsize=4096)
 def constants(cls: type) -> Mapping[str, object]:
-    """The constants that a message class declares."""
+    """The constants that a message class declares; one that is a byte as a number."""
     # rosidl keeps them on the metaclass, as properties and in a private dictionary.
     return MappingProxyType(
         {
-            name: getattr(cls, name)
+            name: scalar(getattr(cls, name))
             for name in vars(type(cls))
             if name.isupper() and not name.startswith("_") and not name.endswith("__DEFAULT")
         }

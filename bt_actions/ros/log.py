@@ -23,6 +23,8 @@ from typing import Any
 import rclpy.logging
 from rclpy.logging import LoggingSeverity
 
+from bt_actions.plain_text import clean_lines
+
 MOST = 1000
 """Lines that wait to be written; of a reader that has stopped, newer ones are only counted.
 Half of them is for what is said of goals."""
@@ -123,7 +125,7 @@ class Log:
                 self._dropped += 1
                 return
             self._tell_dropped()
-            self._take(logger, level, _cut(text))
+            self._take(logger, level, _fit(text))
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._write, name=THREAD, daemon=True)
                 try:
@@ -219,8 +221,9 @@ def _wait_for_room(patience: int | None = None) -> bool:
         return True
 
 
-def _cut(text: str) -> str:
-    whole = text.encode(errors="replace")
+def _fit(text: str) -> str:
+    """What a line takes of a text."""
+    whole = clean_lines(text[: LONGEST + 1]).encode()
     if len(whole) <= LONGEST:
         return whole.decode()
     return whole[: LONGEST - 3].decode(errors="ignore") + "..."

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from bt_actions.expression_values import plain
 from bt_actions.ros.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
 from bt_actions.ros.fields import (
     FLOATS,
@@ -89,12 +90,12 @@ def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.t
 
 
 def fill_value(kind: FieldType, data: object, *, now: Callable[[], int] = time.time_ns) -> object:
-    """A value for a field of type `kind`, as `fill` makes it. Raises MessageError."""
+    """A value of type `kind` as a tree has it: a byte is a number. Raises MessageError."""
     filler = _Filler(now, None)
     value = filler.convert(kind, data, ())
     if filler.problems:
         raise MessageError(filler.problems)
-    return value
+    return plain(value)
 
 
 def examine(kind: FieldType, data: object, hole: Hole | None = None) -> list[Problem]:

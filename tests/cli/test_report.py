@@ -231,19 +231,34 @@ ANOTHER_REASON_EACH_TIME = (
         ("{repeat: R, times: $n, child: {success: S}}", {"R": "times"}),
         ("{invert: I, child: {success: S}}", {"S": ""}),
         ("{invert: I, child: {fallback: F, children: [{failure: A}, {success: B}]}}", {"F": ""}),
+        ("{for_each: F, in: $l, as: m, child: {success: A}}", {"F": "item 1: m: 300 does"}),
+        ("{subtree: sub.yaml, save: {m: z}}", {"sub": "m: 500 does not fit an int8"}),
         (ANOTHER_REASON_EACH_TIME, {"W": "the condition does not hold"}),
         (ANOTHER_EACH_TIME, {"A": ""}),
     ],
-    ids=["timeout", "while", "repeat", "invert", "invert a fallback", "reasons", "retry"],
+    ids=[
+        "timeout",
+        "while",
+        "repeat",
+        "invert",
+        "invert a fallback",
+        "for_each",
+        "subtree",
+        "reasons",
+        "retry",
+    ],
 )
 def test_who_failed_is_named_and_nobody_who_did_not_run(
     tmp_path: Path, written: str, culprits: dict[str, str]
 ) -> None:
     tree = tmp_path / "t.yaml"
     tree.write_text(
-        "tree: t\ninputs: {n: {type: int32, default: -1}, m: {type: int32, default: 0}}\n"
-        f"root: {written}\n"
+        "tree: t\n"
+        "inputs: {n: {type: int32, default: -1}, l: {type: 'int32[]', default: [1, 300]}}\n"
+        "outputs: {m: int8}\n"
+        f"root: {{sequence: t, children: [{{set: {{m: 0}}}}, {written}]}}\n"
     )
+    (tmp_path / "sub.yaml").write_text("tree: sub\noutputs: {z: int32}\nroot: {set: {z: 500}}\n")
     root = load_tree(tree)
     events: list[Event] = []
     visitor = ChangeVisitor()

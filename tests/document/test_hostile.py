@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import time
@@ -9,6 +10,7 @@ import tracemalloc
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -20,12 +22,19 @@ from bt_actions import render
 from bt_actions.document import (
     DocumentError,
     Finding,
+    build_names,
     check_file,
     check_source,
+    hazards,
     load_tree,
+    source,
     source_of,
+    verdicts,
+    workspace,
 )
-from bt_actions.document.source import MAX_BYTES, MAX_ERRORS
+from bt_actions.document.inputs import parse_input
+from bt_actions.document.source import MAX_BYTES, MAX_ERRORS, Source
+from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.workspace import MAX_LEVELS
 from tests.document.test_wrong_documents import CASES
 
@@ -540,3 +549,101 @@ def test_a_thousand_errors_in_one_long_text_are_told_in_bounded_time() -> None:
     started = time.process_time()
     assert len(check_bytes(text.encode())) == MAX_ERRORS
     assert time.process_time() - started < 5
+
+
+ALIASES = "a0: &a0 [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]\n" + "".join(
+    f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 5)
+)
+"""Some 110,000 items, once its aliases are unfolded."""
+
+
+def test_data_in_files_is_bounded_however_often_it_is_named(tmp_path: Path) -> None:
+    (tmp_path / "data.yaml").write_text(ALIASES)
+    path = tmp_path / "tree.yaml"
+    path.write_text(f"tree: t\nroot: {{set: {{x: [{', '.join(['@data.yaml'] * 100)}]}}}}\n")
+    path.write_text(path.read_text().replace("@data.yaml", "'@data.yaml'"))
+    tracemalloc.start()
+    findings = check_file(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    refused = [found for found in findings if found.code == "BT209"]
+    assert 90 <= len(refused) < 100
+    assert "of data in files, a tree takes 1,000,000 items" in refused[0].message
+    assert peak < 50e6
+
+
+def test_a_value_in_a_file_is_no_larger_than_any_other(tmp_path: Path) -> None:
+    (tmp_path / "data.yaml").write_text(ALIASES + f"more: [{', '.join(['*a4'] * 10)}]\n")
+    path = tmp_path / "tree.yaml"
+    path.write_text("tree: t\nroot: {set: {x: '@data.yaml'}}\n")
+    with pytest.raises(DocumentError, match=r"data\.yaml: the value is too large"):
+        load_tree(path)
+    with pytest.raises(ValueError, match="the value is too large"):
+        parse_input(f"@{tmp_path}/data.yaml", "int32[]")
+
+
+def test_a_number_in_a_file_that_no_float_can_be_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "data.yaml").write_text("[.inf, 1e999]")
+    path = tmp_path / "tree.yaml"
+    path.write_text("tree: t\nroot: {set: {x: '@data.yaml'}}\n")
+    with pytest.raises(DocumentError, match=r"data\.yaml: 1e999 does not fit a float64"):
+        load_tree(path)
+
+
+def test_a_file_that_cannot_be_read_is_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bad.yaml").write_bytes(b"\xff")
+    tree = "tree: t\nroot:\n  sequence: S\n  children:\n" + "    - subtree: bad.yaml\n" * 10
+    (tmp_path / "tree.yaml").write_text(tree)
+    read: list[str] = []
+
+    def read_source(path: Path, *args: Any, **more: Any) -> Source:
+        read.append(path.name)
+        return source.read_source(path, *args, **more)
+
+    monkeypatch.setattr(workspace, "read_source", read_source)
+    (finding,) = check_file(tmp_path / "tree.yaml")
+    assert finding.code == "BT101"
+    assert read.count("bad.yaml") == 1
+
+
+def test_what_trees_inside_each_other_hold_is_looked_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unfolded, it is half a million nodes, below each of thirty others."""
+    looked: list[object] = []
+
+    def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
+        looked.append(node)
+        return build_names.settings_of(node, document)
+
+    monkeypatch.setattr(verdicts, "settings_of", settings_of)
+    monkeypatch.setattr(hazards, "settings_of", settings_of)
+    below = "move: M, goal: {distance: 1.0}"
+    names = ["c.yaml", "b.yaml", "a.yaml"]
+    declared = "actions: {move: {type: robot_control_interfaces/action/MoveRobot, server: m}}"
+    for name, inner in zip(names, [below, "subtree: c.yaml", "subtree: b.yaml"], strict=True):
+        children = f"    - {{{inner}}}\n" * 80
+        (tmp_path / name).write_text(
+            f"tree: t\n{declared}\nroot:\n  sequence: S\n  children:\n{children}"
+        )
+    root = "{subtree: a.yaml}"
+    for _ in range(10):
+        root = f"{{timeout: T, after: 5 s, child: {root}}}"
+        root = f"{{parallel: P, children: [{root}, {{success: A}}]}}"
+        root = f"{{sequence: R, memory: false, children: [{root}, {{success: B}}]}}"
+    (tmp_path / "tree.yaml").write_text(f"tree: t\nroot: {root}\n")
+    check_file(tmp_path / "tree.yaml")
+    assert len(looked) < 2000
+
+
+def test_json_may_write_a_character_as_two_halves(tmp_path: Path) -> None:
+    path = tmp_path / "tree.json"
+    path.write_text(json.dumps({"tree": "t", "root": {"log": "\N{GRINNING FACE} \\ud83d\\ude00"}}))
+    assert "\\ud83d\\ude00" in path.read_text()
+    root = load_tree(path)
+    tree = BehaviourTree(root)
+    tree.setup()
+    tree.tick()
+    assert root.feedback_message == "\N{GRINNING FACE} \\ud83d\\ude00"

@@ -150,3 +150,27 @@ def test_a_constant_that_is_not_there_has_no_value() -> None:
     assert expression.constants == ["A.B"]
     with pytest.raises(ExpressionError, match=r"no A\.B"):
         expression.evaluate({}, lambda name: name)
+
+
+@pytest.mark.parametrize(
+    "condition",
+    ["$s.level == 2", "$s.level >= DiagnosticStatus.ERROR", "$b + 1 == 3", "1 in $l", "$l.0 == 1"],
+)
+def test_a_byte_is_a_number(load: Load, condition: str) -> None:
+    root = load(
+        f"""
+        tree: t
+        inputs:
+          s: {{type: diagnostic_msgs/msg/DiagnosticStatus, default: {{level: ERROR}}}}
+          b: {{type: byte, default: 2}}
+          l: {{type: "byte[]", default: [1, 2]}}
+        outputs: {{n: int64, m: diagnostic_msgs/msg/DiagnosticStatus}}
+        root:
+          sequence: S
+          children:
+            - check: {condition}
+            - set: {{n: $s.level, m: {{level: $b}}}}
+            - check: $n == 2 and $m.level == 2
+        """
+    )
+    assert tick(root) is Status.SUCCESS

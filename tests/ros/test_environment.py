@@ -140,4 +140,3 @@ def test_a_private_simulation_is_private_whatever_was_chosen(
         "ROS_STATIC_PEERS": "",
     }
     assert _get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF"
-

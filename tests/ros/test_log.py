@@ -253,3 +253,11 @@ def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(
     holder.join()
     reads.set()
     until(lambda: written.lines == ["info: in its hands", "error: of the parent's goal"])
+
+
+def test_no_line_holds_what_a_terminal_obeys(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, written = Log("test"), Written()
+    monkeypatch.setattr(log, "_logger", written)
+    log.info("a\x1b]0;title\x07b\r\x9bc\u202ed\ud800\n\te")
+    log.flush(10.0)
+    assert written.lines == ["info: a ]0;title b  c d \n\te"]

@@ -28,6 +28,7 @@ from bt_actions import (
     Var,
 )
 from bt_actions.behaviours.variables import read, write
+from bt_actions.events import GoalChanged
 from bt_actions.goal_terms import Event
 from bt_actions.ros.shared import lock
 from tests.support.processes import Host, HostFactory
@@ -595,6 +596,22 @@ class TestDeadlines:
         serve("1:drop_result")
         leaf = run(MoveRobot("m", 0.1, action_name=name))
         assert stood(leaf) == (Outcome.SERVER_LOST, End.SUCCEEDED)
+
+    def test_an_end_that_becomes_known_in_shutdown_is_told(self, serve: Any, name: str) -> None:
+        serve("1:drop_result=1000")
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.5, cancel=0.3))
+        told: list[End] = []
+
+        def tell(event: object) -> None:
+            if isinstance(event, GoalChanged):
+                told.append(event.end)
+
+        with TreeRunner(leaf) as runner:
+            runner.observe(tell)
+            runner.run(timeout=20.0)
+            assert leaf.end is told[-1] is End.UNKNOWN
+        assert leaf.end is told[-1] is End.CANCELED
+        assert runner.unaccounted == []
 
 
 class TestServersOfAnotherKind:

@@ -14,6 +14,7 @@ from typing import Any
 import py_trees
 import pytest
 from py_trees.common import Status
+from py_trees.composites import Selector
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
@@ -25,7 +26,7 @@ from bt_actions.server import Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import Host, HostFactory, Journal
 from tests.support.reliability import Record
-from tests.support.trees import in_sequence, in_turn, state
+from tests.support.trees import Gate, in_sequence, in_turn, state
 from tests.support.waiting import holds_for, until
 
 SHORT = 5.0
@@ -244,6 +245,28 @@ class TestStopped:
         assert journal.ends() == ["canceled", "succeeded"]
         assert journal.max_live == 1
         record.outcome = "SERVER_LOST; back: canceled first, then the next goal SUCCEEDED"
+
+    def test_stopped_while_it_decides_on_a_goal_that_it_denied(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """It withholds its acceptance for 3 s (deadline 0.5 s); then SIGSTOP beyond the lease"""
+        host = new_host()
+        journal = host.open(name, "1:delay_accept=3")
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=0.5, cancel=3.0))
+        gate = Gate()
+        root = Selector("root", memory=True, children=[leaf, gate])
+        with TreeRunner(root, node=node) as runner:
+            runner.start()
+            until(lambda: stood(leaf) == (Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED))
+            stopped = host.send(signal.SIGSTOP)
+            until(lambda: leaf.end is End.SERVER_GONE, 9.0, what="no longer said to be denied")
+            record.took(time.monotonic() - stopped, SHORT)
+            host.send(signal.SIGCONT)
+            journal.wait_for("canceled")
+            until(lambda: leaf.end is End.CANCELED, what="accounted for at last")
+            gate.passed = True
+            assert runner.wait(9.0) is Status.SUCCESS
+        record.outcome = "ACCEPT_TIMEOUT, NEVER_STARTED; then SERVER_GONE; canceled when it woke"
 
     @pytest.mark.chaos
     def test_stopped_and_back_for_the_next_runner(

@@ -1,0 +1,25 @@
+"""Texts of strangers, fit to be shown: nothing in them that a terminal obeys or XML refuses.
+
+Names of a tree, messages of a server, variables: whatever is shown or logged comes through here.
+"""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["clean", "clean_lines"]
+
+_NONE = "\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
+"""Controls, those that turn the direction of what follows, and characters that are none."""
+_STRANGE = re.compile(f"[\x00-\x08\x0b-\x1f{_NONE}]")
+_BROKEN = re.compile(f"[\x00-\x1f{_NONE}]+")
+
+
+def clean(text: str) -> str:
+    """Return `text` on one line, with a space in place of each run of what cannot be shown."""
+    return _BROKEN.sub(" ", text)
+
+
+def clean_lines(text: str) -> str:
+    """Return `text` with its lines and tabs, and a space for each character that is not shown."""
+    return _STRANGE.sub(" ", text)
