@@ -55,7 +55,7 @@ class End(StrEnum):
     ABORTED = "ABORTED"
     CANCELED = "CANCELED"
     NEVER_STARTED = "NEVER_STARTED"
-    """Not sent, refused, or denied by its server for good."""
+    """Not sent, refused, or denied by its server; within 30 s of that, it may still turn up."""
     SERVER_GONE = "SERVER_GONE"
     """The server went away with it; should it come back, the goal is canceled first."""
     UNKNOWN = "UNKNOWN"
@@ -64,6 +64,10 @@ class End(StrEnum):
 
 class Busy(StrEnum):
     """What to do when a resource that a goal needs is taken."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> Busy:
+        raise ValueError(f"busy must be one of {', '.join(cls)}, not {value!r}")
 
     WAIT = "wait"
     """Queue for it, first come first served."""

@@ -1,6 +1,6 @@
 """A py_trees tree of your own, ticked by py_trees, with leaves of bt_actions beside your own.
 
-In one terminal:    bt-actions sim
+In one terminal:    bt-actions sim       (a new one: the part must lie where the robot looks for it)
 In another:         python examples/embed.py
 """
 

@@ -13,6 +13,7 @@ from bt_actions.cli.common import (
     OutputLost,
     discard_stdout,
     note,
+    refuse_domain,
     seconds,
     write,
 )
@@ -75,6 +76,8 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
         from bt_actions.ros.cleanup import CannotStart, cleanup
     except ImportError as error:
         raise BadInput(NO_ROS.format(error)) from error
+
+    refuse_domain()
 
     def found(left: LeftBehind) -> None:
         note(f"canceling a goal of dead process {left.pid} on {left.action}: {left.goal_id.hex()}")

@@ -11,7 +11,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from enum import IntEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TextIO
@@ -146,6 +146,27 @@ def namespace(text: str) -> str:
     if len(name) > LONGEST_NAMESPACE:
         raise argparse.ArgumentTypeError(f"a namespace has at most {LONGEST_NAMESPACE} characters")
     return f"/{name}" if name else ""
+
+
+HIGHEST_DOMAIN = 232
+
+
+def refuse_domain() -> None:
+    """Raise BadInput for a ROS domain whose ports Fast DDS has not: it would end the process."""
+    domain = os.environ.get("ROS_DOMAIN_ID", "")
+    if domain.isdecimal() and int(domain) > HIGHEST_DOMAIN:
+        text = f"ROS_DOMAIN_ID is {domain}; a domain is a number from 0 to {HIGHEST_DOMAIN}"
+        raise BadInput(f"ROS 2 cannot start: {text}")
+
+
+@contextlib.contextmanager
+def starting_ros() -> Iterator[None]:
+    """Turn what ROS raises when it is first touched into BadInput."""
+    refuse_domain()
+    try:
+        yield
+    except RuntimeError as error:  # rclpy's RCLError
+        raise BadInput(f"ROS 2 cannot start: {str(error).splitlines()[0]}") from error
 
 
 def add_no_python(parser: argparse.ArgumentParser) -> None:

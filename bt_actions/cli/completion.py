@@ -239,7 +239,7 @@ def _zsh(commands: list[Command]) -> str:
         specs = []
         for option in command.options:
             value = f":value:({' '.join(option.choices)})" if option.choices else ":value:_files"
-            text = option.help.replace("[", "(").replace("]", ")").replace(":", ",")
+            text = option.help.replace("[", "(").replace("]", ")").replace(":", "\\:")
             specs += [
                 _quote(
                     f"*{name}{_joined(name, option)}[{text}]{value if option.takes_value else ''}"

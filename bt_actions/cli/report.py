@@ -15,7 +15,7 @@ from uuid import UUID
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector
+from py_trees.composites import Selector
 
 from bt_actions.behaviours.gate import Gate
 from bt_actions.cli.common import path_of, place_of
@@ -34,9 +34,6 @@ STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
 REMEMBERED = 64
 """Goals of a leaf that are known again when their last news come late."""
-
-
-_ENDED = (Status.SUCCESS, Status.FAILURE)
 
 
 @dataclass(slots=True)
@@ -272,22 +269,16 @@ class Report:
         return self.status_of(child)
 
     def _failed_leaves(self) -> Iterator[Behaviour]:
-        """Go down from the root along what failed; through a decorator to what has ended below.
+        """Go down from the root along what failed.
 
-        What failed though nothing below it did, or did not come to an end, speaks for itself, as a
-        leaf does.
+        What failed though nothing below it did speaks for itself, as a leaf does.
         """
         waiting = [self.root]
         while waiting:
             node = waiting.pop()
-            if isinstance(node, Composite) and self._stands(node) is not Status.FAILURE:
-                below = []  # of an inverter, say
-            elif isinstance(node, Composite):
-                below = [c for c in node.children if self._stands(c) is Status.FAILURE]
-            elif isinstance(node, Gate) and node.refused:
-                below = []
-            else:
-                below = [c for c in node.children if self._stands(c) in _ENDED]
+            below = [child for child in node.children if self._stands(child) is Status.FAILURE]
+            if isinstance(node, Gate) and node.refused:
+                below = []  # whose statuses may be those of an earlier time
             if below:
                 waiting.extend(reversed(below))
             else:
@@ -338,7 +329,7 @@ def summary(report: Report) -> list[str]:
         if row is None or row.outcome is None:
             lines.append(f"  failed{_because(culprit.message)}")
         else:
-            tries = "1 attempt" if row.attempts == 1 else f"{row.attempts} attempts"
+            tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
             lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
         if culprit.place:
             lines.append(f"  {culprit.place}")

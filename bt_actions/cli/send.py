@@ -44,7 +44,11 @@ def add_parser(subparsers: Subparsers) -> None:
         "type", metavar="TYPE", help="its action type: MoveRobot, pkg/MoveRobot or the full name"
     )
     parser.add_argument(
-        "fields", metavar="FIELD=VALUE", nargs="*", help="fields of the goal; others keep defaults"
+        "fields",
+        metavar="FIELD=VALUE",
+        nargs="*",
+        default=[],
+        help="fields of the goal; others keep defaults",
     )
     parser.add_argument(
         "--timeout", metavar="S", type=seconds, help="cancel after so many seconds, exit code 124"

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Self
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.cli.common import NO_ROS, BadInput, Exit, note
+from bt_actions.cli.common import NO_ROS, BadInput, Exit, note, starting_ros
 from bt_actions.cli.drive import Drive, Ended, leave
 from bt_actions.cli.patient_file import gap_text
 from bt_actions.cli.patient_output import PatientOutput
@@ -65,10 +65,8 @@ class Session:
         from bt_actions.runner import TreeRunner as Runner
 
         self.report = Report(root)
-        try:
+        with starting_ros():
             self._runner = Runner(root, executor=executor, namespace=namespace)
-        except RuntimeError as error:  # rclpy's RCLError: a domain id that is none, say
-            raise BadInput(f"ROS 2 cannot start: {str(error).splitlines()[0]}") from error
         self._output = PatientOutput()
         self._simulator = None
         if simulation is not None:

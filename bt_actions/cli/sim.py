@@ -10,7 +10,7 @@ import argparse
 import contextlib
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import BadInput, Exit, namespace, note, seconds, speed
+from bt_actions.cli.common import BadInput, Exit, namespace, note, seconds, speed, starting_ros
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -106,7 +106,8 @@ def run(args: argparse.Namespace) -> int:
             errors.append(error)
             signals.poke()
 
-        spinner = Spinner(None, args.executor, name="simulation", died=died)
+        with starting_ros():
+            spinner = Spinner(None, args.executor, name="simulation", died=died)
         simulation = None
         try:
             simulation = _simulation(spinner.node, args)

@@ -265,7 +265,7 @@ class JsonView:
                 "failures": [
                     {
                         "path": list(culprit.path),
-                        "attempts": culprit.row.attempts if culprit.row else 0,
+                        "attempts": culprit.row.attempt if culprit.row else 0,
                         "outcome": culprit.row.outcome if culprit.row else None,
                         "reason": (culprit.row.reason if culprit.row else "") or culprit.message,
                         "place": culprit.place or None,

@@ -126,7 +126,7 @@ class _Hazards:
                 where = user if user.source is self._source else child
                 self._report(
                     "BT303", span_of(where.key),
-                    f"this needs {resource!r}, and so does a branch beside it: one waits",
+                    f"this needs {resource!r}, and so does a branch beside it: only one can run",
                     related=Related(place, "the other is here"),
                     hint="busy: share, where both may run at once",
                 )  # fmt: skip

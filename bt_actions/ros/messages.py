@@ -264,7 +264,7 @@ def _number_in(value: object) -> str:
         return ""
     if not found["unit"]:
         return ": without its quotes it is one"
-    return f": fields of a message have no units, write {found['number']}"
+    return ": write the number alone, in the unit that is expected"
 
 
 def _wrong_float(name: str, value: object) -> str | None:

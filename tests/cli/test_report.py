@@ -69,6 +69,17 @@ def test_attempts_are_counted_over_the_retries_of_a_visit(leaf: FakeAction, stor
     assert row.duration == pytest.approx(3.0)
 
 
+def test_a_failure_tells_the_attempts_of_its_last_visit(leaf: FakeAction, story: Story) -> None:
+    report = told(
+        leaf,
+        *story.succeed(leaf),
+        *story.succeed(leaf),
+        *fail(story, leaf),
+        story.finish(Status.FAILURE),
+    )
+    assert "  ABORTED after 1 attempt" in "\n".join(summary(report))
+
+
 def test_a_leaf_that_is_visited_again_adds_to_its_row(leaf: FakeAction, story: Story) -> None:
     report = Report(leaf)
     for visit in (1, 2, 3):
@@ -209,7 +220,7 @@ def test_of_a_fallback_each_child_that_failed_is_named_and_of_a_sequence_only_th
         story.node(root, Status.FAILURE),
         story.finish(Status.FAILURE),
     )
-    assert [culprit.path[-1] for culprit in report.culprits()] == ["b", "d", "not delivered"]
+    assert [culprit.path[-1] for culprit in report.culprits()] == ["b", "not", "not delivered"]
 
 
 ANOTHER_EACH_TIME = (
@@ -229,8 +240,12 @@ ANOTHER_REASON_EACH_TIME = (
         ("{timeout: T, after: 10 ms, child: {running: R}}", {"T": "not done within 0.01 s"}),
         ("{while: false, name: W, child: {wait: 1 s}}", {"W": "the condition does not hold"}),
         ("{repeat: R, times: $n, child: {success: S}}", {"R": "times"}),
-        ("{invert: I, child: {success: S}}", {"S": ""}),
-        ("{invert: I, child: {fallback: F, children: [{failure: A}, {success: B}]}}", {"F": ""}),
+        ("{invert: I, child: {success: S}}", {"I": "success"}),
+        ("{force_failure: G, child: {success: S}}", {"G": "success is failure"}),
+        (
+            "{invert: I, child: {fallback: F, children: [{failure: A}, {success: B}]}}",
+            {"I": "success"},
+        ),
         ("{for_each: F, in: $l, as: m, child: {success: A}}", {"F": "item 1: m: 300 does"}),
         ("{subtree: sub.yaml, save: {m: z}}", {"sub": "m: 500 does not fit an int8"}),
         (ANOTHER_REASON_EACH_TIME, {"W": "the condition does not hold"}),
@@ -241,6 +256,7 @@ ANOTHER_REASON_EACH_TIME = (
         "while",
         "repeat",
         "invert",
+        "force",
         "invert a fallback",
         "for_each",
         "subtree",

@@ -231,11 +231,12 @@ class TestExitCode2:
         fault = ("--sim", "--fault", "move_robt:1:abort")
         assert "--fault" in self.refused(capsys, "pick_and_place", *fault)
 
-    @pytest.mark.parametrize("command", ["run", "run --cleanup-first", "cleanup"])
+    @pytest.mark.parametrize("command", ["run", "run --cleanup-first", "cleanup", "sim"])
+    @pytest.mark.parametrize("domain", ["many", "233"])
     def test_a_ros_domain_that_is_none(
-        self, start: Start, monkeypatch: pytest.MonkeyPatch, tree: Tree, command: str
+        self, start: Start, monkeypatch: pytest.MonkeyPatch, tree: Tree, command: str, domain: str
     ) -> None:
-        monkeypatch.setenv("ROS_DOMAIN_ID", "many")
+        monkeypatch.setenv("ROS_DOMAIN_ID", domain)
         run = start(*command.split(), *([str(tree())] if "run" in command else []))
         assert run.wait() == 2, run
         assert clean(run), run
