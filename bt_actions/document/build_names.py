@@ -48,7 +48,7 @@ def resources_below(root: TreeNode, document: Document, namespace: str = "") -> 
             below = join_names(inner, text_of(node.values, "namespace"))
             for name in resources_below(node.included.root, node.included, below):
                 found.setdefault(name, node)
-        elif node.alias is not None or (node.kind is not None and node.kind.name == "action"):
+        elif node.is_action:
             settings = settings_of(node, document)
             if settings.get("busy") == "share":
                 continue

@@ -59,7 +59,7 @@ class _Hazards:
             kind = node.kind.name if node.kind is not None else ""
             if node.alias is not None:
                 self._used.add(node.alias)
-            if node.alias is not None or kind == "action":
+            if node.is_action:
                 if not inside:
                     self._look_at_action(node)
             elif kind == "parallel":
@@ -247,10 +247,6 @@ def _keys_of(node: TreeNode) -> dict[tuple[str, int], Node]:
     }
 
 
-def _is_action(node: TreeNode) -> bool:
-    return node.alias is not None or (node.kind is not None and node.kind.name == "action")
-
-
 def _restarted(root: TreeNode) -> TreeNode | None:
     """The first action or service below that `root` begins anew with, or the tree it is in."""
     stack = [root]
@@ -258,7 +254,7 @@ def _restarted(root: TreeNode) -> TreeNode | None:
         node = stack.pop()
         inner = node.included.root if node.included is not None else None
         service = node.kind is not None and node.kind.name == "service"
-        if service or _is_action(node) or (inner is not None and _restarted(inner) is not None):
+        if service or node.is_action or (inner is not None and _restarted(inner) is not None):
             return node
         if node.kind is None or node.kind.name != "run_once":
             stack.extend(reversed(node.children))
@@ -268,4 +264,4 @@ def _restarted(root: TreeNode) -> TreeNode | None:
 def _takes_time(node: TreeNode) -> bool:
     if node.included is not None and node.included.root is not None:
         return any(_takes_time(inner) for inner in node.included.root.walk())
-    return _is_action(node) or (node.kind is not None and node.kind.name in _BUSY)
+    return node.is_action or (node.kind is not None and node.kind.name in _BUSY)

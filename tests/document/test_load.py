@@ -514,8 +514,6 @@ def test_imports_bring_actions_topics_and_defaults_and_the_own_ones_win(load: Lo
          ("robot.yaml", 1, 21, "BT205")),
         ("topics: {a: {topic: a, type: foo/msg/Bar}}", ("robot.yaml", 1, 30, "BT205")),
         ("topics: {here: {topic: a, type: std_msgs/msg/Bool}}", ("main.yaml", 3, 10, "BT216")),
-        (("actions: {m: {type: test_msgs/action/Fibonacci, server: m, timeout: 1 s,"
-         " goal: {order: $n}}}"), ("main.yaml", 2, 9, "BT202")),
         ("inputs: {a: int32}\nactions: {}", ("robot.yaml", 1, 1, "BT107")),
     ],
 )  # fmt: skip
