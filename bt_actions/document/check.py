@@ -130,10 +130,7 @@ class Checker:
         kind = self.variables.get(declared.name)
         if kind is not None:
             self.value(kind, default, node)
-        try:
-            refuse_infinite(default)
-        except ValueError as error:
-            self.source.report("BT110", span_of(node), str(error))
+        self.finite(default, node)
 
     def interface(
         self, name: str, kind: str, node: Node, source: Source | None = None
@@ -360,6 +357,13 @@ class Checker:
             if isinstance(at, Scalar) and names_file(at.text):
                 text = f"{at.text}: {problem}"
             self.source.report(code, span_of(at), text, hint=_trap(at))
+
+    def finite(self, value: object, node: Node) -> None:
+        """Check that no number of an input's value is infinite."""
+        try:
+            refuse_infinite(value)
+        except ValueError as error:
+            self.source.report("BT110", span_of(node), str(error))
 
     def condition(self, value: object, roots: Types) -> None:
         """Check an expression that must be true or false."""

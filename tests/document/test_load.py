@@ -373,15 +373,16 @@ def test_an_output_of_a_subtree_that_does_not_fit_fails_it(load: Load, child: st
 
 
 @pytest.mark.parametrize(("items", "told"), [
-    ("[300, 1]", "item 0: n: "),
-    ("[1, 300]", "item 1: n: "),
+    ([300, 1], "item 0: n: "),
+    ([1, 300], "item 1: n: "),
 ])  # fmt: skip
 def test_an_item_that_does_not_fit_its_variable_fails_the_loop(
-    load: Load, items: str, told: str
+    load: Load, items: list[int], told: str
 ) -> None:
     root = load(
-        "tree: t\noutputs: {n: int8}\n"
-        f"root: {{for_each: F, in: {items}, as: n, on_failure: continue, child: {{success: }}}}\n"
+        "tree: t\ninputs: {items: 'int64[]'}\noutputs: {n: int8}\n"
+        "root: {for_each: F, in: $items, as: n, on_failure: continue, child: {success: }}\n",
+        {"items": items},
     )
     assert tick(root) is Status.FAILURE
     assert root.feedback_message.startswith(told)
