@@ -31,6 +31,7 @@ from bt_actions.document.values import (
     locate,
     names_file,
 )
+from bt_actions.document.workspace import merged
 from bt_actions.document.writes import Write, infer_variables, items_inside, root_type, writes_of
 from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import Either, FieldType, Message, Record
@@ -184,8 +185,9 @@ class Checker:
     def _actions(self) -> None:
         """The actions that are declared here, and of those imported what the nodes take over."""
         users: dict[str | None, list[dict[str, object]]] = {}
-        for node in self.document.nodes():
-            users.setdefault(node.alias, []).append(node.values)
+        if self.document.imported:
+            for node in self.document.nodes():
+                users.setdefault(node.alias, []).append(node.values)
         for declared in self.document.actions.values():
             if not isinstance(declared.node, Mapping):
                 continue
@@ -241,6 +243,7 @@ class Checker:
             declared = self.document.actions.get(node.alias)
             if declared is not None:
                 self._action(node.values, node.node, declared)
+                self._together(node, declared)
             return
         if node.kind is None:
             return
@@ -249,6 +252,28 @@ class Checker:
         check = CHECKS.get(node.kind.name)
         if check is not None:
             check(self, node)
+
+    def _together(self, node: TreeNode, declared: Declared) -> None:
+        """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
+        own, shared = node.values.get("goal"), declared.values.get("goal")
+        if not isinstance(own, dict) or not isinstance(shared, dict):
+            return
+        cls = self.action_class(declared)
+        if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):
+            return
+
+        from bt_actions.ros.messages import Problem, examine
+
+        def problems(goal: object) -> list[Problem]:
+            return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]
+
+        told = {*problems(own), *problems(shared)}
+        for problem in problems(merged(shared, own)):
+            if problem not in told:
+                self.source.report(
+                    "BT204", span_of(locate(node.written["goal"], problem.path)), problem.text,
+                    related=Related(declared.place, "merged with the goal here"),
+                )  # fmt: skip
 
     def action_class(self, declared: Declared) -> type | None:
         """The class of the action that a name stands for."""
@@ -419,6 +444,10 @@ class Checker:
             nothing = None if maybe else "this tree has no inputs and saves nothing"
             hint = f"this tree has {known}" if known else nothing
         self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
+
+
+def _is_computed(value: object, _kind: FieldType, _path: tuple[str | int, ...]) -> bool:
+    return value is BAD or isinstance(value, Computed | Interpolated)
 
 
 def _left(settings: dict[str, object], nearer: list[dict[str, object]]) -> dict[str, object]:
