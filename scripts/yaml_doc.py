@@ -123,7 +123,8 @@ The key is a name under `actions`, its value the node's name.
 """
 ALIAS_EXAMPLE = "move: To the part\ngoal: {distance: 2.0}\nretry: 3"
 IMPORT = """\
-`actions`, `topics` and `defaults` from other files. They are found as subtrees are: below."""
+`actions`, `topics` and `defaults` from other files. They are found as subtrees are: below.
+A `$name` in them is a variable of the tree that uses them, and is checked there."""
 WHERE = """\
 ## Where trees are found
 

@@ -60,7 +60,7 @@ def resources_below(
                 known[there] = resources_below(node.included.root, node.included, below, known)
             for name in known[there]:
                 found.setdefault(name, node)
-        elif node.alias is not None or (node.kind is not None and node.kind.name == "action"):
+        elif node.is_action:
             settings = settings_of(node, document)
             if settings.get("busy") == "share":
                 continue

@@ -6,10 +6,13 @@ imported, and what would need it is taken for granted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from collections.abc import Mapping as MappingType
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import NamedTuple
 
+from bt_actions.document.build_names import settings_of
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import BOOL, TEXT, infer, named
 from bt_actions.document.inner import inner_span
@@ -28,7 +31,8 @@ from bt_actions.document.values import (
     locate,
     names_file,
 )
-from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
+from bt_actions.document.workspace import merged
+from bt_actions.document.writes import Write, infer_variables, items_inside, root_type, writes_of
 from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import Either, FieldType, Message, Record
 from bt_actions.suggest import closest, listing
@@ -72,12 +76,8 @@ class Checker:
         """Report everything that is wrong with names and types."""
         self._declarations()
         self._collect()
-        for declared in self.document.actions.values():
-            self._reader = declared
-            if declared.source is self.source:
-                self._alias(declared)
-            else:
-                self._imported(declared)
+        self._actions()
+        self._defaults()
         for node in self.document.nodes():
             self._reader = node
             self._node(node)
@@ -131,10 +131,7 @@ class Checker:
         kind = self.variables.get(declared.name)
         if kind is not None:
             self.value(kind, default, node)
-        try:
-            refuse_infinite(default)
-        except ValueError as error:
-            self.source.report("BT110", span_of(node), str(error))
+        self.finite(default, node)
 
     def interface(
         self, name: str, kind: str, node: Node, source: Source | None = None
@@ -185,29 +182,68 @@ class Checker:
 
     # Nodes
 
-    def _alias(self, declared: Declared) -> None:
-        if not isinstance(declared.node, Mapping):
-            return
-        self._action(declared.values, declared.node, declared)
+    def _actions(self) -> None:
+        """The actions that are declared here, and of those imported what the nodes take over."""
+        users: dict[str | None, list[dict[str, object]]] = {}
+        if self.document.imported:
+            for node in self.document.nodes():
+                users.setdefault(node.alias, []).append(node.values)
+        for declared in self.document.actions.values():
+            if not isinstance(declared.node, Mapping):
+                continue
+            self._reader = declared
+            if declared.source is self.source:
+                self._action(declared.values, declared.node, declared)
+                continue
+            values = _left(declared.values, users.get(declared.name, []))
+            with self._within(declared.source, f"the imported action {declared.name!r}"):
+                self._action(values, declared.node, declared)
 
-    def _imported(self, declared: Declared) -> None:
-        """What an imported action reads must be there in this document, too."""
-        node = self.document.node.get("import")
-        for computed in computed_in(declared.values.get("goal")):
-            for name, (start, end) in computed.expression.variable_spans:
-                read = Read(name, computed, start, end)
-                self.reads.setdefault(id(declared), []).append(read)
-                unknown = name not in self.variables and not self.doubts.declares(name)
-                if unknown and node is not None:
-                    text = f"the imported action {declared.name!r} reads ${name}, which is not here"
-                    related = Related(declared.place, "declared here")
-                    self.source.report("BT202", span_of(node), text, related=related)
+    def _defaults(self) -> None:
+        """The condition in `defaults` is that of each action which has none nearer."""
+        when = _when(self.document.defaults)
+        if when is None:
+            return
+        users = {
+            node.alias or node.values.get("type"): node
+            for node in self.document.nodes()
+            if node.is_action and _when(settings_of(node, self.document)) is when
+        }
+        documents = self.document.with_imports()
+        source = next(one.source for one in documents if _when(one.values.get("defaults")) is when)
+        with self._within(source, "the imported defaults"):
+            for node in users.values():
+                self._reader = self.document.actions.get(node.alias or "", self.document)
+                self.condition(when, {"result": root_type(node, "result", self)})
+
+    @contextmanager
+    def _within(self, source: Source, what: str) -> Iterator[None]:
+        """Look at what stands in a source.
+
+        Of one that is imported, what is wrong in this document only is told at the import.
+        """
+        own, written = self.source, self.document.node.get("import")
+        if source is own or written is None:
+            yield
+            return
+        self.source = replace(source, findings=[], errors=0, unread=own.unread)
+        try:
+            yield
+        finally:
+            found, self.source = self.source.findings, own
+            for one in found:
+                if one not in source.findings:
+                    own.report(
+                        one.code, span_of(written), f"{what}: {one.message}",
+                        hint=one.hint, related=Related(one.place, "written here"),
+                    )  # fmt: skip
 
     def _node(self, node: TreeNode) -> None:
         if node.alias is not None:
             declared = self.document.actions.get(node.alias)
             if declared is not None:
                 self._action(node.values, node.node, declared)
+                self._together(node, declared)
             return
         if node.kind is None:
             return
@@ -216,6 +252,28 @@ class Checker:
         check = CHECKS.get(node.kind.name)
         if check is not None:
             check(self, node)
+
+    def _together(self, node: TreeNode, declared: Declared) -> None:
+        """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
+        own, shared = node.values.get("goal"), declared.values.get("goal")
+        if not isinstance(own, dict) or not isinstance(shared, dict):
+            return
+        cls = self.action_class(declared)
+        if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):
+            return
+
+        from bt_actions.ros.messages import Problem, examine
+
+        def problems(goal: object) -> list[Problem]:
+            return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]
+
+        told = {*problems(own), *problems(shared)}
+        for problem in problems(merged(shared, own)):
+            if problem not in told:
+                self.source.report(
+                    "BT204", span_of(locate(node.written["goal"], problem.path)), problem.text,
+                    related=Related(declared.place, "merged with the goal here"),
+                )  # fmt: skip
 
     def action_class(self, declared: Declared) -> type | None:
         """The class of the action that a name stands for."""
@@ -247,9 +305,7 @@ class Checker:
         if request_key in values and written is not None:
             self.value(request, values[request_key], written)
         roots = {"result": result}
-        retry = values.get("retry")
-        conditions = [values.get("expect"), retry.get("when") if isinstance(retry, dict) else None]
-        for condition in conditions:
+        for condition in (values.get("expect"), _when(values)):
             self.condition(condition, roots)
         self.save(values.get("save"), roots)
 
@@ -327,6 +383,13 @@ class Checker:
                 text = f"{at.text}: {problem}"
             self.source.report(code, span_of(at), text, hint=_trap(at))
 
+    def finite(self, value: object, node: Node) -> None:
+        """Check that no number of an input's value is infinite."""
+        try:
+            refuse_infinite(value)
+        except ValueError as error:
+            self.source.report("BT110", span_of(node), str(error))
+
     def condition(self, value: object, roots: Types) -> None:
         """Check an expression that must be true or false."""
         if not isinstance(value, Computed):
@@ -381,6 +444,29 @@ class Checker:
             nothing = None if maybe else "this tree has no inputs and saves nothing"
             hint = f"this tree has {known}" if known else nothing
         self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
+
+
+def _is_computed(value: object, _kind: FieldType, _path: tuple[str | int, ...]) -> bool:
+    return value is BAD or isinstance(value, Computed | Interpolated)
+
+
+def _left(settings: dict[str, object], nearer: list[dict[str, object]]) -> dict[str, object]:
+    """The settings that not everything nearer has others for."""
+    left: dict[str, object] = {}
+    for name, value in settings.items():
+        over = [one[name] for one in nearer if name in one]
+        inner = [one for one in over if isinstance(one, dict)]
+        if len(over) < len(nearer):
+            left[name] = value
+        elif inner and isinstance(value, dict):
+            left[name] = _left(value, inner)
+    return left
+
+
+def _when(settings: object) -> object:
+    """The condition for another attempt."""
+    retry = settings.get("retry") if isinstance(settings, dict) else None
+    return retry.get("when") if isinstance(retry, dict) else None
 
 
 def _trap(node: Node) -> str | None:

@@ -46,6 +46,7 @@ def _subtree(checker: Checker, node: TreeNode) -> None:
         for key, inner in written.pairs:
             wanted = _input_type(checker, included, key.text, key)
             checker.value(wanted, given.get(key.text), inner)
+            checker.finite(given.get(key.text), inner)
     if included is None:
         return
     if names is not None:
@@ -148,8 +149,13 @@ def _for_each(checker: Checker, node: TreeNode) -> None:
     if item == index and "index" in node.written:
         text = f"the item and its index are both called {item!r}"
         checker.source.report("BT216", span_of(node.written["index"]), text)
+    if isinstance(index, str) and index not in checker.document.topics:  # which BT312 tells of
+        checker.assigns(index, INTEGER, node.written["index"])
     items = node.values.get("in")
-    if isinstance(items, Computed):
+    wanted = checker.variables.get(str(item)) if item in checker.declared_at else None
+    if wanted is not None and item not in checker.document.topics and "in" in node.written:
+        checker.value(Listing(wanted), items, node.written["in"])
+    elif isinstance(items, Computed):
         kind = checker.expression(items, {})
         if kind is not None and not isinstance(kind, Listing):
             text = f"a list is needed, and this is {named(kind)}"

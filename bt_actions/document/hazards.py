@@ -175,7 +175,7 @@ class _Hazards:
             node = stack.pop()
             inner = node.included.root if node.included is not None else None
             service = node.kind is not None and node.kind.name == "service"
-            if service or _is_action(node) or (inner is not None and self._restarted(inner)):
+            if service or node.is_action or (inner is not None and self._restarted(inner)):
                 found = node
             elif node.kind is None or node.kind.name != "run_once":
                 stack.extend(reversed(node.children))
@@ -189,7 +189,7 @@ class _Hazards:
             below = node.included.root if node.included is not None else None
             within = [*node.children, below] if below is not None else node.children
             busy = node.kind is not None and node.kind.name in _BUSY
-            found = _is_action(node) or busy or any(self._takes_time(each) for each in within)
+            found = node.is_action or busy or any(self._takes_time(each) for each in within)
             self._slow[id(node)] = found
         return found
 
@@ -276,7 +276,3 @@ def _keys_of(node: TreeNode) -> dict[tuple[str, int], Node]:
         if isinstance(table, YamlMapping)
         for key, value in table.pairs
     }
-
-
-def _is_action(node: TreeNode) -> bool:
-    return node.alias is not None or (node.kind is not None and node.kind.name == "action")

@@ -234,22 +234,23 @@ class _Inference:
         kind = self.type_of(index)
         if owner is None:
             return None
-        by_name = isinstance(owner, Message | Record)
-        if by_name and isinstance(index, ast.Constant) and _is_text(kind):
-            return self._field(node, owner, str(index.value))
+        literal = index.value if isinstance(index, ast.Constant) else None
+        if isinstance(owner, Record) and isinstance(literal, str):
+            return self._key(node, owner, literal)
         if isinstance(owner, Record) and (kind is None or _is_text(kind)):
             return None
         if isinstance(owner, Scalar) and _is_text(owner):
             return TEXT
         if not isinstance(owner, Listing):
-            self._wrong(node, f"{named(owner)} has no items")
+            field = isinstance(owner, Message) and isinstance(literal, str)
+            remedy = f": write .{literal!s}" if field else ""
+            self._wrong(node, f"{named(owner)} has no items{remedy}")
             return None
         if kind is not None and not (isinstance(kind, Scalar) and kind.name in INTEGERS):
             self._wrong(index, f"an index is a whole number, not {named(kind)}")
         size = owner.size
-        at = index.value if isinstance(index, ast.Constant) else None
-        if size is not None and isinstance(at, int) and not -size <= at < size:
-            self._wrong(node, f"index {at} is outside of {size} items")
+        if size is not None and isinstance(literal, int) and not -size <= literal < size:
+            self._wrong(node, f"index {literal} is outside of {size} items")
         return owner.item
 
     def _truth(self, node: ast.expr) -> None:
@@ -279,10 +280,10 @@ class _Inference:
             first, second = self._number(left), self._number(right)
         if first is None or second is None:
             return None
-        if isinstance(op, (ast.Div, ast.Pow)):
-            return FLOAT
         both = {kind.name for kind in (first, second) if isinstance(kind, Scalar)}
-        return FLOAT if both & set(FLOATS) else INTEGER
+        if isinstance(op, ast.Div) or both & set(FLOATS):
+            return FLOAT
+        return _power(right, second) if isinstance(op, ast.Pow) else INTEGER
 
     def _computable(self, node: ast.BinOp) -> None:
         """Say what goes wrong whatever the variables are: `1 / 0 > $n`, `$n % 0`."""
@@ -332,10 +333,23 @@ class _Inference:
             if only is not None and not isinstance(only, Listing):
                 self._wrong(args[0], f"{name} of one value needs a list, not {named(only)}")
             return only.item if isinstance(only, Listing) else None
+        known = [(arg, kind) for arg, kind in zip(args, kinds, strict=True) if kind is not None]
+        for arg, kind in known[1:]:
+            first = known[0][1]
+            if not _comparable(first, kind):
+                self._wrong(arg, f"{named(first)} is never compared with {named(kind)}")
         if all(_is_number(kind) for kind in kinds):
             floats = any(isinstance(kind, Scalar) and kind.name in FLOATS for kind in kinds)
             return FLOAT if floats else INTEGER
         return kinds[0] if all(kind == kinds[0] for kind in kinds) else None
+
+
+def _power(exponent: ast.expr, kind: FieldType) -> FieldType | None:
+    """The type of a whole number to the power of another; None where that may be below zero."""
+    value = _number_of(exponent)
+    if value is not None:
+        return FLOAT if value < 0 else INTEGER
+    return INTEGER if isinstance(kind, Scalar) and INTEGERS[kind.name][0] == 0 else None
 
 
 def _number_of(node: ast.expr) -> int | float | None:

@@ -138,7 +138,8 @@ def check_source(source: Source, *, types: bool = True, python: bool = True) -> 
 
 
 def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[Finding]:
-    for document in workspace.documents:
+    # Libraries first: what is wrong with them by themselves is not told of the trees they are in.
+    for document in sorted(workspace.documents, key=lambda one: one.root is not None):
         with contextlib.suppress(TooManyErrors):  # which are errors of this document: it is refused
             checker = Checker(document, types=types, python=python)
             checker.check()

@@ -57,6 +57,11 @@ class TreeNode:
         at = key if begin <= (key.line, key.column) < end else node
         return Place(self.source.name, at.line, at.column)
 
+    @property
+    def is_action(self) -> bool:
+        """Whether it sends a goal: under an action's name, or with type and server in place."""
+        return self.alias is not None or (self.kind is not None and self.kind.name == "action")
+
     def walk(self) -> Iterator[TreeNode]:
         """This node and all below it, in the order of the text."""
         stack = [self]
@@ -109,6 +114,16 @@ class Document:
     def namespace(self) -> str:
         value = self.values.get("namespace", "")
         return value if isinstance(value, str) else ""
+
+    def with_imports(self) -> Iterator[Document]:
+        """This document and all that it imports, each once."""
+        waiting, seen = [self], set()
+        while waiting:
+            one = waiting.pop()
+            if id(one) not in seen:
+                seen.add(id(one))
+                yield one
+                waiting.extend(one.imported)
 
     def nodes(self) -> tuple[TreeNode, ...]:
         """All nodes of the tree, which was read to its end, in the order of the text."""

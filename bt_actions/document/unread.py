@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar
@@ -37,7 +36,7 @@ class Doubts:
 
     def __init__(self, document: Document) -> None:
         self._document = document
-        self._sources = [one.source for one in _with_imports(document)]
+        self._sources = [one.source for one in document.with_imports()]
         self._parts = [source.unread for source in self._sources]
         self._words: _Words | None = None
         self._places: dict[int, list[tuple[int, int]]] = {}
@@ -108,7 +107,7 @@ class Doubts:
         """Whether settings that hold for all actions may be in what could not be read."""
         if any(part.names for part in self._parts):
             return True
-        for document in _with_imports(self._document):
+        for document in self._document.with_imports():
             if document.source.unread.nodes:
                 known = [document.node.get(name) for name in _KNOWN]
                 inside = sum(self._count(one, document.source) for one in known if one is not None)
@@ -134,16 +133,6 @@ class Doubts:
             for part in self._parts:
                 _collect(part.nodes, self._words)
         return self._words
-
-
-def _with_imports(document: Document) -> Iterator[Document]:
-    waiting, seen = [document], set()
-    while waiting:
-        one = waiting.pop()
-        if id(one) not in seen:
-            seen.add(id(one))
-            yield one
-            waiting.extend(one.imported)
 
 
 def _collect(nodes: list[Node], words: _Words) -> None:

@@ -16,7 +16,7 @@ from bt_actions.ros.fields import FieldType, Listing, Message, Scalar
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker
 
-__all__ = ["Write", "infer_variables", "items_inside", "writes_of"]
+__all__ = ["Write", "infer_variables", "items_inside", "root_type", "writes_of"]
 
 _ROUNDS = 8
 """How far a type is followed from variable to variable, before none is taken for known."""
@@ -47,7 +47,7 @@ class Write:
             return Scalar("string")
         if not isinstance(self.value, Computed):
             return type_of_literal(self.value)
-        roots = {} if self.root is None else {self.root: _root_type(self.node, self.root, checker)}
+        roots = {} if self.root is None else {self.root: root_type(self.node, self.root, checker)}
         return infer(self.value.expression, roots, checker.types_at(self.node), lambda *_: None,
                      types=checker.types)  # fmt: skip
 
@@ -176,7 +176,7 @@ def infer_variables(written: Iterable[Write], checker: Checker) -> None:
         checker.variables[name] = None
 
 
-def _root_type(node: TreeNode, root: str, checker: Checker) -> FieldType | None:
+def root_type(node: TreeNode, root: str, checker: Checker) -> FieldType | None:
     """The type of the bare root that a node's expressions may use."""
     if not checker.types:
         return None

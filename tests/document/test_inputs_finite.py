@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions.cli import main
-from bt_actions.document import InputError, check_source, load_tree, source_of
+from bt_actions.document import InputError, check_file, check_source, load_tree, source_of
 
 DEFAULT = "tree: t\ninputs: {{a: {{type: {type}, default: {value}}}}}\nroot: {{check: $a == $a}}\n"
 
@@ -36,6 +36,22 @@ def test_a_caller_s_value_is_refused_too(tmp_path: Path) -> None:
 def test_a_default_that_is_not_finite_is_found_by_check(kind: str, value: str) -> None:
     text = DEFAULT.format(type=kind, value=value)
     [finding] = check_source(source_of(text.encode(), "t.yaml"))
+    assert (finding.code, finding.line) == ("BT110", 2)
+    assert "a finite number is needed" in finding.message
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"), [("float64", ".inf"), ("float64", "-.inf"), ('"float64[]"', "[1.0, .nan]")]
+)
+def test_a_subtree_s_input_that_is_not_finite_is_found_by_check(
+    kind: str, value: str, tmp_path: Path
+) -> None:
+    (tmp_path / "in.yaml").write_text(
+        f"tree: in\ninputs: {{a: {kind}}}\nroot: {{check: $a == $a}}\n"
+    )
+    path = tmp_path / "t.yaml"
+    path.write_text(f"tree: t\nroot: {{subtree: in.yaml, with: {{a: {value}}}}}\n")
+    [finding] = check_file(path)
     assert (finding.code, finding.line) == ("BT110", 2)
     assert "a finite number is needed" in finding.message
 

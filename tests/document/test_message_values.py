@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 from py_trees.behaviour import Behaviour
@@ -174,3 +175,32 @@ def test_a_byte_is_a_number(load: Load, condition: str) -> None:
         """
     )
     assert tick(root) is Status.SUCCESS
+
+
+@pytest.mark.parametrize(
+    ("shared", "own", "told"),
+    [
+        ("{yaw: 90 deg}", "{w: 1.0}", "roll, pitch and yaw stand alone: 'w' cannot be beside them"),
+        ("{w: $w}", "{yaw: $w}", "roll, pitch and yaw stand alone: 'w' cannot be beside them"),
+        ("{yaw: 90 deg}", "{pitch: $w}", None),
+        ("{x: 1.0}", "{w: 1.0}", None),
+    ],
+)
+def test_goals_that_are_merged_must_fit_together(
+    shared: str, own: str, told: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from geometry_msgs.msg import PoseStamped
+    from std_msgs.msg import Empty
+
+    action = SimpleNamespace(Goal=PoseStamped, Result=Empty)  # no action here wants a pose
+    monkeypatch.setattr("bt_actions.document.check.interface_of", lambda _name, _kind: action)
+    text = (
+        "tree: t\ninputs: {w: float64}\nactions:\n  go: {type: a/action/B, server: s, timeout: 1 s,"
+        f" goal: {{pose: {{orientation: {shared}}}}}}}\n"
+        f"root:\n  sequence: S\n  children:\n    - check: $w > 0\n"
+        f"    - {{go: A, goal: {{pose: {{orientation: {own}}}}}}}\n"
+    )
+    found = check_source(source_of(text.encode(), "t"))
+    assert [(one.line, one.column, one.message) for one in found] == (
+        [(9, 42, told)] if told is not None else []
+    )
