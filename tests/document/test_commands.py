@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import io
 import json
 import re
@@ -194,11 +195,12 @@ def test_format_rewrites_files_and_check_changes_nothing(
     assert "would change" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("fails", ["chmod", "replace"])
+@pytest.mark.parametrize(("where", "fails"), [(os, "fchmod"), (Path, "replace")])
 def test_format_leaves_nothing_behind_where_it_cannot_write(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
+    where: object,
     fails: str,
 ) -> None:
     def fail(*_args: object) -> None:
@@ -206,7 +208,7 @@ def test_format_leaves_nothing_behind_where_it_cannot_write(
 
     path = tmp_path / "t.yaml"
     path.write_text("root: {success: A}\ntree: t\n")
-    monkeypatch.setattr(Path, fails, fail)
+    monkeypatch.setattr(where, fails, fail)
     assert main(["format", str(path)]) == 2
     assert "t.yaml: cannot be written: Disk quota exceeded" in capsys.readouterr().err
     assert [each.name for each in tmp_path.iterdir()] == ["t.yaml"]
