@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import errno
-import os
 import io
 import json
+import os
 import re
 from pathlib import Path
 from typing import Any
