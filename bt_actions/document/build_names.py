@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.workspace import merged
 
-__all__ = ["join_names", "resources_below", "settings_of", "text_of"]
+__all__ = ["join_names", "resources_below", "settings_of", "text_of", "when_of"]
 
 
 def text_of(values: Mapping[str, object], key: str) -> str:
@@ -37,6 +37,12 @@ def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
         own = declared.values if declared is not None else {}
         shared = document.settings[alias] = merged(document.defaults, own)
     return merged(shared, node.values)
+
+
+def when_of(settings: object) -> object:
+    """The condition of settings for another attempt."""
+    retry = settings.get("retry") if isinstance(settings, dict) else None
+    return retry.get("when") if isinstance(retry, dict) else None
 
 
 _Known = dict[tuple[int, str], dict[str, TreeNode]]

@@ -6,13 +6,11 @@ imported, and what would need it is taken for granted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from collections.abc import Mapping as MappingType
-from contextlib import contextmanager
-from dataclasses import replace
 from typing import NamedTuple
 
-from bt_actions.document.build_names import settings_of
+from bt_actions.document.build_names import when_of
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import BOOL, TEXT, infer, named
 from bt_actions.document.inner import inner_span
@@ -31,8 +29,7 @@ from bt_actions.document.values import (
     locate,
     names_file,
 )
-from bt_actions.document.workspace import merged
-from bt_actions.document.writes import Write, infer_variables, items_inside, root_type, writes_of
+from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
 from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import Either, FieldType, Message, Record
 from bt_actions.suggest import closest, listing
@@ -67,19 +64,21 @@ class Checker:
         self.declared_at: dict[str, Declared] = {}
         self.reads: dict[int, list[Read]] = {}
         """What each node reads, by the node's id; an alias's own reads under the alias's."""
-        self._reader: object = document
+        self.reader: object = document
         self._writes: dict[int, tuple[Write, ...]] = {}
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
 
     def check(self) -> None:
         """Report everything that is wrong with names and types."""
+        from bt_actions.document.check_actions import check_actions, check_defaults
+
         self._declarations()
         self._collect()
-        self._actions()
-        self._defaults()
+        check_actions(self)
+        check_defaults(self)
         for node in self.document.nodes():
-            self._reader = node
+            self.reader = node
             self._node(node)
 
     # What is declared
@@ -182,98 +181,20 @@ class Checker:
 
     # Nodes
 
-    def _actions(self) -> None:
-        """The actions that are declared here, and of those imported what the nodes take over."""
-        users: dict[str | None, list[dict[str, object]]] = {}
-        if self.document.imported:
-            for node in self.document.nodes():
-                users.setdefault(node.alias, []).append(node.values)
-        for declared in self.document.actions.values():
-            if not isinstance(declared.node, Mapping):
-                continue
-            self._reader = declared
-            if declared.source is self.source:
-                self._action(declared.values, declared.node, declared)
-                continue
-            values = _left(declared.values, users.get(declared.name, []))
-            with self._within(declared.source, f"the imported action {declared.name!r}"):
-                self._action(values, declared.node, declared)
-
-    def _defaults(self) -> None:
-        """The condition in `defaults` is that of each action which has none nearer."""
-        when = _when(self.document.defaults)
-        if when is None:
-            return
-        users = {
-            node.alias or node.values.get("type"): node
-            for node in self.document.nodes()
-            if node.is_action and _when(settings_of(node, self.document)) is when
-        }
-        documents = self.document.with_imports()
-        source = next(one.source for one in documents if _when(one.values.get("defaults")) is when)
-        with self._within(source, "the imported defaults"):
-            for node in users.values():
-                self._reader = self.document.actions.get(node.alias or "", self.document)
-                self.condition(when, {"result": root_type(node, "result", self)})
-
-    @contextmanager
-    def _within(self, source: Source, what: str) -> Iterator[None]:
-        """Look at what stands in a source.
-
-        Of one that is imported, what is wrong in this document only is told at the import.
-        """
-        own, written = self.source, self.document.node.get("import")
-        if source is own or written is None:
-            yield
-            return
-        self.source = replace(source, findings=[], errors=0, unread=own.unread)
-        try:
-            yield
-        finally:
-            found, self.source = self.source.findings, own
-            for one in found:
-                if one not in source.findings:
-                    own.report(
-                        one.code, span_of(written), f"{what}: {one.message}",
-                        hint=one.hint, related=Related(one.place, "written here"),
-                    )  # fmt: skip
-
     def _node(self, node: TreeNode) -> None:
+        from bt_actions.document.check_actions import check_use
+        from bt_actions.document.check_kinds import CHECKS
+
         if node.alias is not None:
             declared = self.document.actions.get(node.alias)
             if declared is not None:
-                self._action(node.values, node.node, declared)
-                self._together(node, declared)
+                check_use(self, node, declared)
             return
         if node.kind is None:
             return
-        from bt_actions.document.check_kinds import CHECKS
-
         check = CHECKS.get(node.kind.name)
         if check is not None:
             check(self, node)
-
-    def _together(self, node: TreeNode, declared: Declared) -> None:
-        """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
-        own, shared = node.values.get("goal"), declared.values.get("goal")
-        if not isinstance(own, dict) or not isinstance(shared, dict):
-            return
-        cls = self.action_class(declared)
-        if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):
-            return
-
-        from bt_actions.ros.messages import Problem, examine
-
-        def problems(goal: object) -> list[Problem]:
-            return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]
-
-        told = {*problems(own), *problems(shared)}
-        for problem in problems(merged(shared, own)):
-            if problem not in told:
-                self.source.report(
-                    "BT204", span_of(locate(node.written["goal"], problem.path)), problem.text,
-                    related=Related(declared.place, "merged with the goal here"),
-                )  # fmt: skip
 
     def action_class(self, declared: Declared) -> type | None:
         """The class of the action that a name stands for."""
@@ -281,15 +202,6 @@ class Checker:
         if not isinstance(text, str):
             return None
         return self.interface(text, "action", declared.written("type"), declared.source)
-
-    def _action(self, values: dict[str, object], node: Mapping, declared: Declared) -> None:
-        cls = self.action_class(declared)
-        self.call(
-            values, node,
-            request=None if cls is None else Message(cls.Goal),  # type: ignore[attr-defined]
-            result=None if cls is None else Message(cls.Result),  # type: ignore[attr-defined]
-            request_key="goal",
-        )  # fmt: skip
 
     def call(
         self,
@@ -305,7 +217,7 @@ class Checker:
         if request_key in values and written is not None:
             self.value(request, values[request_key], written)
         roots = {"result": result}
-        for condition in (values.get("expect"), _when(values)):
+        for condition in (values.get("expect"), when_of(values)):
             self.condition(condition, roots)
         self.save(values.get("save"), roots)
 
@@ -403,7 +315,7 @@ class Checker:
         """Check what an expression reads and does; return its type, or None."""
         expression = computed.expression
         for name, (start, end) in expression.variable_spans:
-            self.reads.setdefault(id(self._reader), []).append(Read(name, computed, start, end))
+            self.reads.setdefault(id(self.reader), []).append(Read(name, computed, start, end))
             if name not in self.variables:
                 self._unknown(name, computed, start, end)
 
@@ -421,7 +333,7 @@ class Checker:
                 return None
         if not self.types and not roots and not expression.names:
             return None
-        variable = self.types_at(self._reader)
+        variable = self.types_at(self.reader)
         return infer(expression, roots, variable, report, types=self.types)
 
     def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
@@ -444,29 +356,6 @@ class Checker:
             nothing = None if maybe else "this tree has no inputs and saves nothing"
             hint = f"this tree has {known}" if known else nothing
         self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
-
-
-def _is_computed(value: object, _kind: FieldType, _path: tuple[str | int, ...]) -> bool:
-    return value is BAD or isinstance(value, Computed | Interpolated)
-
-
-def _left(settings: dict[str, object], nearer: list[dict[str, object]]) -> dict[str, object]:
-    """The settings that not everything nearer has others for."""
-    left: dict[str, object] = {}
-    for name, value in settings.items():
-        over = [one[name] for one in nearer if name in one]
-        inner = [one for one in over if isinstance(one, dict)]
-        if len(over) < len(nearer):
-            left[name] = value
-        elif inner and isinstance(value, dict):
-            left[name] = _left(value, inner)
-    return left
-
-
-def _when(settings: object) -> object:
-    """The condition for another attempt."""
-    retry = settings.get("retry") if isinstance(settings, dict) else None
-    return retry.get("when") if isinstance(retry, dict) else None
 
 
 def _trap(node: Node) -> str | None:
