@@ -18,6 +18,7 @@ import py_trees
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from rclpy.executors import SingleThreadedExecutor
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
@@ -495,8 +496,6 @@ class TestPause:
 
 class TestWhoSpins:
     def test_a_node_in_an_executor_that_nobody_spins_is_an_error(self, node: Any) -> None:
-        from rclpy.executors import SingleThreadedExecutor
-
         executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)
         started = time.monotonic()
@@ -588,11 +587,23 @@ class TestWhoSpins:
                 assert "context" in str(error) or "spin" in str(error)  # noqa: PT017
         assert journal.ends() == ["canceled"]
 
+    def test_a_node_that_is_in_an_executor_is_spun_by_its_owner(
+        self, journal: Journal, name: str, node: Any, executor: str
+    ) -> None:
+        leaf = MoveRobot("m", 0.1, action_name=name)
+        with spun(node) as theirs:
+            with TreeRunner(leaf, node=node, executor=executor) as runner:
+                assert runner.executor is theirs
+                assert runner.run(timeout=9.0) is Status.SUCCESS
+            another = SingleThreadedExecutor(context=node.context)
+            with pytest.raises(ValueError, match="is in another executor than the one given"):
+                TreeRunner(leaf, node=node, executor=another)
+            another.shutdown()
+            assert node.executor is theirs
+
     def test_an_executor_without_nodes_is_spun_here(
         self, journal: Journal, name: str, node: Any
     ) -> None:
-        from rclpy.executors import SingleThreadedExecutor
-
         executor = SingleThreadedExecutor(context=node.context)
         leaf = MoveRobot("m", 0.1, action_name=name)
         with TreeRunner(leaf, node=node, executor=executor) as runner:
@@ -602,8 +613,6 @@ class TestWhoSpins:
     def test_an_executor_that_was_given_stays_usable(
         self, journal: Journal, name: str, node: Any
     ) -> None:
-        from rclpy.executors import SingleThreadedExecutor
-
         executor = SingleThreadedExecutor(context=node.context)
         for _ in range(2):
             leaf = MoveRobot("m", 0.1, action_name=name)

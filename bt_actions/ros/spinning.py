@@ -70,7 +70,10 @@ class Spinner:
         given = executor if isinstance(executor, Executor) else None
         if node is not None and node.executor is not None and node not in node.executor.get_nodes():
             node.executor = None  # left behind by an executor that was shut down
-        if node is not None and given is None and executor is None:
+        if node is not None and node.executor is not None:  # whose owner spins it
+            if given not in (None, node.executor):
+                name = node.get_fully_qualified_name()
+                raise ValueError(f"node {name} is in another executor than the one given")
             given = node.executor
         self.spins = given is None or not given.get_nodes()
         context = node.context if node is not None else given.context if given else None
