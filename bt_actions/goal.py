@@ -102,6 +102,7 @@ class Goal:
         self._denied_at: float | None = None  # the last of these answers
         self._judged = False  # the tree went on because of them
         self._never_came = False  # denied for good
+        self._judged_before = False  # and its server was lost since
         self._doubts = 0
         self._seen_status: int | None = None  # terminal, from the status topic
         self._asked_since = 0  # questions for the result since then
@@ -508,6 +509,8 @@ class Goal:
                 self._denied_since = now.steady
             if self.suspect and self._judged:
                 self._ask_once_more(now)
+            elif self.suspect and self._judged_before:
+                self._verdict(now)  # once more; the time to be late in is over
         if detail != CANCEL_UNKNOWN_GOAL and not self._accepted:
             return self._turned_up(now, detail)  # known to the server: it had been accepted
         return State.CANCELING
@@ -575,6 +578,7 @@ class Goal:
         self.end = End.UNKNOWN
         self.waited_for = False  # there is somebody again who can tell
         if not self._accepted:
+            self._judged_before |= self._judged
             self._suspect, self._judged = True, False
             self._deadlines.arm(Event.ACCEPT_DUE, self._patience, now)
         self._ask(now)

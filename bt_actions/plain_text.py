@@ -9,7 +9,7 @@ import re
 
 __all__ = ["clean", "clean_lines"]
 
-_NONE = "\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
+_NONE = "\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
 """Controls, those that turn the direction of what follows, and characters that are none."""
 _STRANGE = re.compile(f"[\x00-\x08\x0b-\x1f{_NONE}]")
 _BROKEN = re.compile(f"[\x00-\x1f{_NONE}]+")
@@ -21,5 +21,6 @@ def clean(text: str) -> str:
 
 
 def clean_lines(text: str) -> str:
-    """Return `text` with its lines and tabs, and a space for each character that is not shown."""
-    return _STRANGE.sub(" ", text)
+    """Return `text` with its tabs and lines, from the second on set in, so that none passes for one
+    of its own; and a space for each character that is not shown."""
+    return _STRANGE.sub(" ", text).replace("\n", "\n  ")

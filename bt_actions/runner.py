@@ -315,6 +315,9 @@ class TreeRunner:
             raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
         with self._mind_signals():
             self._shut_down(patience=-1.0)
+        leaving, self._leaving = self._leaving, None
+        if leaving is not None:
+            raise leaving
 
     def _at_exit(self) -> None:
         with contextlib.suppress(KeyboardInterrupt), self._ended_by_signals():
@@ -355,9 +358,11 @@ class TreeRunner:
                     with contextlib.suppress(Exception):
                         behaviour.shutdown()
         finally:
-            self._spinner.stop(self._close_guests)
-            self._traffic.unobserve(self._note)
-            self._flush()  # what has only now become known of goals
+            try:
+                self._spinner.stop(self._close_guests)
+            finally:
+                self._traffic.unobserve(self._note)
+                self._flush()  # what has only now become known of goals
 
     def __enter__(self) -> TreeRunner:
         return self

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import secrets
+import stat
 from pathlib import Path
 
 __all__ = ["replace_file"]
@@ -12,14 +14,14 @@ __all__ = ["replace_file"]
 def replace_file(path: Path, data: bytes) -> None:
     """Write what a file shall hold from now on: all of it, or no change. Raises OSError.
 
-    A link still leads to it, and its permissions stay as they are. What exists and is no file, as a
-    pipe or a device, is written to.
+    A link still leads to it; its owner and permissions stay. What exists and is no file, as a pipe
+    or a device, is written to.
     """
-    target = Path(os.path.realpath(path))
-    before = target.stat() if target.exists() else None
-    if before is not None and not target.is_file():
-        target.write_bytes(data)
+    before = path.stat() if path.exists() else None
+    if before is not None and not stat.S_ISREG(before.st_mode):
+        path.write_bytes(data)
         return
+    target = Path(os.path.realpath(path))
     new = target.with_name(f".{secrets.token_hex(8)}")  # nobody can have put a link there
     mode = 0o666 if before is None else 0o600
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
@@ -28,7 +30,9 @@ def replace_file(path: Path, data: bytes) -> None:
             file.write(data)
             file.flush()
             if before is not None:
-                os.fchmod(file.fileno(), before.st_mode & 0o7777)
+                with contextlib.suppress(PermissionError):  # only root may give it away
+                    os.fchown(descriptor, before.st_uid, before.st_gid)
+                os.fchmod(descriptor, before.st_mode & 0o777)
             new.replace(target)
         except BaseException:
             new.unlink(missing_ok=True)

@@ -692,6 +692,21 @@ def test_a_suspect_that_was_denied_once_may_run_on_a_server_that_is_lost() -> No
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
 
 
+def test_a_suspect_bars_nothing_longer_than_its_server_that_is_back_takes_to_deny_it() -> None:
+    life = suspect()
+    life.pass_time(2.0)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.pass_time(1.0)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    life.on(Event.SERVER_LOST, "cut")
+    life.on(Event.SERVER_RETURNED)
+    assert life.goal.owed
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    assert not life.goal.owed
+    assert life.on(Event.ACCEPTED) == [CANCEL, ASK], "and if it turns up all the same"
+
+
 def test_a_new_server_is_asked_whether_it_knows_the_goal() -> None:
     assert executing().on(Event.SERVER_CHANGED) == [ASK]
     assert sending().on(Event.SERVER_CHANGED) == [], "it had not been accepted"

@@ -557,6 +557,19 @@ class TestWhoSpins:
             with pytest.raises(TreeError, match="was taken out of its executor, or that was shut"):
                 runner.run(timeout=5.0)
 
+    def test_a_node_that_the_user_moves_to_another_executor_stays_there(self, node: Any) -> None:
+        another = SingleThreadedExecutor(context=node.context)
+        with TreeRunner(Gate(), node=node) as runner:
+            runner.start()
+            until(lambda: runner.tree.root.status is Status.RUNNING)
+            another.add_node(node)
+            with pytest.raises(TreeError, match="was taken out of its executor"):
+                runner.wait(5.0)
+        assert node in another.get_nodes()
+        assert node.executor is another
+        another.shutdown()
+        node.executor = None
+
     def test_a_dead_spin_thread_fails_the_tree(
         self, journal: Journal, name: str, executor: str
     ) -> None:

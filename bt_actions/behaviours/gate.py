@@ -19,7 +19,8 @@ class Gate(Decorator):
     """
 
     refused = False
-    """Whether it failed by itself: its child did not, or was not ticked this time."""
+    """Whether it failed by itself: its child did not, or was not ticked this time, or `update` says
+    so."""
 
     def gate(self) -> Status | None:
         """What to do this time; called after `initialise`."""
@@ -28,12 +29,13 @@ class Gate(Decorator):
     def tick(self) -> Iterator[Behaviour]:
         if self.status is not Status.RUNNING:
             self.initialise()
+        self.refused = False
         decided, child_failed = self.gate(), False
         if decided is None:
             yield from self.decorated.tick()
             child_failed = self.decorated.status is Status.FAILURE
             decided = self.update()
-        self.refused = decided is Status.FAILURE and not child_failed
+        self.refused = decided is Status.FAILURE and (self.refused or not child_failed)
         if decided is not Status.RUNNING:
             self.stop(decided)
         self.status = decided

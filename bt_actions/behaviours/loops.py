@@ -201,6 +201,7 @@ class ForEach(Gate):
             self._begin(self._items[self.index], self.index)
         except ValueError as error:
             self.feedback_message = f"item {self.index}: {error}"
+            self.refused = True
             return False
         return True
 

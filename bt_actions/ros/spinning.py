@@ -206,7 +206,7 @@ class Spinner:
                 self._thread = None
             if self._own_executor and pool is not None:
                 pool.shutdown(wait=True)
-        if self._added:
+        if self._added and self.node.executor is self.executor:
             self.node.executor = None  # takes it out of the executor, and lets another have it
         before_nodes()
         if self._own_node:

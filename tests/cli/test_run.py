@@ -232,7 +232,7 @@ class TestExitCode2:
         assert "--fault" in self.refused(capsys, "pick_and_place", *fault)
 
     @pytest.mark.parametrize("command", ["run", "run --cleanup-first", "cleanup", "sim"])
-    @pytest.mark.parametrize("domain", ["many", "233"])
+    @pytest.mark.parametrize("domain", ["many", "233", "0x1F4"])
     def test_a_ros_domain_that_is_none(
         self, start: Start, monkeypatch: pytest.MonkeyPatch, tree: Tree, command: str, domain: str
     ) -> None:

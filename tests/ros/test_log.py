@@ -260,4 +260,4 @@ def test_no_line_holds_what_a_terminal_obeys(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(log, "_logger", written)
     log.info("a\x1b]0;title\x07b\r\x9bc\u202ed\ud800\n\te")
     log.flush(10.0)
-    assert written.lines == ["info: a ]0;title b  c d \n\te"]
+    assert written.lines == ["info: a ]0;title b  c d \n  \te"]

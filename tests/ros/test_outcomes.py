@@ -613,6 +613,21 @@ class TestDeadlines:
         assert leaf.end is told[-1] is End.CANCELED
         assert runner.unaccounted == []
 
+    def test_who_ends_the_program_at_news_in_shutdown_is_heard(self, serve: Any, name: str) -> None:
+        serve("1:drop_result=1000")
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.5, cancel=0.3))
+        runner = TreeRunner(leaf)
+
+        def leave(event: object) -> None:
+            if isinstance(event, GoalChanged) and event.end is End.CANCELED:
+                raise SystemExit(9)
+
+        runner.observe(leave)
+        runner.run(timeout=20.0)
+        with pytest.raises(SystemExit):
+            runner.shutdown()
+        runner.shutdown()
+
 
 class TestServersOfAnotherKind:
     @pytest.mark.parametrize("answer", [2, 0], ids=["executing", "unknown"])
