@@ -10,6 +10,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.gate import Gate
+from bt_actions.expression_values import plain
 
 __all__ = ["ForEach", "Repeat", "RetryChild"]
 
@@ -159,9 +160,7 @@ class ForEach(Gate):
         self._items = None
         self.feedback_message = ""
         try:
-            items = self._get_items()
-            to_list = getattr(items, "tolist", None)  # array.array and numpy alike
-            items = to_list() if to_list is not None else items
+            items = plain(self._get_items())
             if not isinstance(items, (list, tuple)):
                 raise ValueError(f"a list is needed, not {type(items).__name__}")
         except ValueError as error:

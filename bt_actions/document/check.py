@@ -31,7 +31,7 @@ from bt_actions.document.values import (
 )
 from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
 from bt_actions.expression import ExpressionError
-from bt_actions.ros.fields import Either, FieldType, Message, Record
+from bt_actions.ros.fields import Either, FieldType, Message
 from bt_actions.suggest import closest, listing
 
 __all__ = ["Checker", "Read"]
@@ -76,10 +76,10 @@ class Checker:
         self._declarations()
         self._collect()
         check_actions(self)
-        check_defaults(self)
         for node in self.document.nodes():
             self.reader = node
             self._node(node)
+        check_defaults(self)
 
     # What is declared
 
@@ -247,6 +247,11 @@ class Checker:
                 "BT204", span_of(node), f"{name!r} is {named(wanted)}, and this is {named(kind)}",
                 related=Related(declared.place, "declared here"),
             )  # fmt: skip
+        for text in misfits(kind, wanted):
+            self.source.report(
+                "BT204", span_of(node), f"{name!r} is {named(wanted)}; {text}",
+                related=Related(declared.place, "declared here"),
+            )  # fmt: skip
 
     # Values
 
@@ -271,8 +276,8 @@ class Checker:
                         said = f"in one item {said}"
                     text = f"{named(wanted)} is needed, and {said} is {named(given)}"
                     self.source.report("BT204", span_of(item.node), text)
-                elif isinstance(given, Record) and isinstance(wanted, Message):
-                    for text in misfits(given, wanted):
+                elif texts := misfits(given, wanted):
+                    for text in texts:
                         self.source.report("BT204", span_of(item.node), f"{said}.{text}")
                 elif (constant := constant_of(item)) is not None:
                     for problem in examine(wanted, constant):
@@ -337,7 +342,7 @@ class Checker:
         return infer(expression, roots, variable, report, types=self.types)
 
     def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
-        if self.document.node.get("root") is None or self.doubts.declares(name):
+        if self.document.root is None or self.doubts.declares(name):
             return  # a library's words are read with the names of whoever imports it
         span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
         if name in computed.expression.roots:

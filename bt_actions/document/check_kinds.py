@@ -11,7 +11,7 @@ from bt_actions.document.infer import FLOAT, INTEGER, named
 from bt_actions.document.nodes import Mapping as YamlMapping
 from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.tree import Document, TreeNode
-from bt_actions.document.types import TypeNameError, fits, parse_type
+from bt_actions.document.types import TypeNameError, fits, misfits, parse_type
 from bt_actions.document.values import Computed, computed_in, constant_of, locate
 from bt_actions.ros.fields import FieldType, Listing, Message, Record
 from bt_actions.suggest import did_you_mean, listing
@@ -69,6 +69,8 @@ def _computed_inputs(checker: Checker, included: Document, given: Computed, kind
             said = given.expression.text.strip()
             text = f"{name!r} is {named(wanted)}, and in {said} it is {named(value)}"
             checker.source.report("BT204", span_of(given.node), text)
+        for text in misfits(value, wanted):
+            checker.source.report("BT204", span_of(given.node), f"{name}.{text}")
 
 
 def _input_type(checker: Checker, included: Document, name: str, at: Node) -> FieldType | None:

@@ -145,7 +145,8 @@ def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[
             checker.check()
             doubts = Doubts(document)  # anew: the checker found more
             find_hazards(checker, doubts)
-            apply_ignores(document.source, complete=not doubts.any)
+            all_tried = document.root is not None and not doubts.any
+            apply_ignores(document.source, complete=all_tried)
     return workspace.findings
 
 

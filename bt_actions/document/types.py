@@ -128,8 +128,15 @@ def _fills(given: FieldType, cls: type) -> bool:
     return isinstance(given, Record)
 
 
-def misfits(given: Record, wanted: Message) -> list[str]:
-    """What is wrong with a mapping of such types where a message is needed."""
+def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
+    """What is wrong with mappings of such types where messages are needed, also inside lists."""
+    if isinstance(given, Listing) and isinstance(wanted, Listing):
+        return [f"one item: {text}" for text in misfits(given.item, wanted.item)]
+    if isinstance(given, Either):
+        return next((texts for kind in given.kinds if (texts := misfits(kind, wanted))), [])
+    if not isinstance(given, Record) or not isinstance(wanted, Message):
+        return []
+
     from bt_actions.ros.messages import dotted, examine
 
     found: list[str] = []
@@ -138,10 +145,10 @@ def misfits(given: Record, wanted: Message) -> list[str]:
         if isinstance(item, dict):  # the mapping itself
             return False
         inner = item if isinstance(item, FieldType) else None
-        if isinstance(inner, Record) and isinstance(kind, Message):
-            found.extend(f"{dotted(path)}.{text}" for text in misfits(inner, kind))
-        elif inner != Scalar("string") and not fits(inner, kind):  # a text may name a constant
+        if inner != Scalar("string") and not fits(inner, kind):  # a text may name a constant
             found.append(f"{dotted(path)}: a value of {kind} is needed, not of {inner}")
+        else:
+            found.extend(f"{dotted(path)}.{text}" for text in misfits(inner, kind))
         return True
 
     problems = examine(wanted, dict(given.items), hole)

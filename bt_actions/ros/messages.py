@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bt_actions.expression_values import plain
+from bt_actions.expression_values import plain, scalar
 from bt_actions.ros.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
 from bt_actions.ros.fields import (
     FLOATS,
@@ -221,8 +221,7 @@ class _Filler:
         return [self.convert(kind.item, item, (*path, at)) for at, item in enumerate(items)]
 
     def _scalar(self, kind: Scalar, value: object, path: Path) -> Any:
-        if type(value).__module__ == "numpy" and hasattr(value, "item"):
-            value = value.item()
+        value = scalar(value)
         if isinstance(value, str) and kind.name not in ("string", "wstring"):
             try:
                 value = constant(value, self._owner)
@@ -280,8 +279,6 @@ def _wrong_float(name: str, value: object) -> str | None:
 
 
 def _wrong_integer(name: str, value: object) -> str | None:
-    if name == "byte" and isinstance(value, bytes) and len(value) == 1:
-        return None
     if isinstance(value, bool) or not isinstance(value, int):
         return f"a whole number ({name}) is needed, not {show(value)}{_number_in(value)}"
     least, greatest = INTEGERS[name]

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import nav_msgs.msg
 import pytest
+import std_msgs.msg
 
 from bt_actions.document import check_file
+from bt_actions.ros import messages
 
 MOVE = "{{type: robot_control_interfaces/action/MoveRobot, server: m, timeout: 3 s, {}}}"
 MAIN = """\
@@ -111,3 +116,44 @@ def test_imported_defaults_that_do_not_fit_the_tree_are_told_at_the_import(
     library = f"defaults: {{retry: {{when: {when}}}}}\nactions:\n  move: {MOVE.format('')}\n"
     (told,) = found(tmp_path, library, "string")
     assert told.startswith(f"main.yaml:2 {expected}")
+
+
+def test_a_whole_tree_may_be_imported_for_its_words(tmp_path: Path) -> None:
+    """What is written below its root is its own: names are read with those of the importer."""
+    (tmp_path / "a.yaml").write_text(
+        "tree: a\nactions:\n  move:\n    type: robot_control_interfaces/action/MoveRobot\n"
+        "    server: move_robot\n    timeout: 30 s\n    goal: {distance: $at}\n"
+        "root:\n  sequence: S\n  children:\n    - set: {at: 1.0}\n"
+        "    - retry: ever  # bt: ignore[BT304] it must not give up\n      child: {move: Go}\n"
+    )
+    (tmp_path / "t.yaml").write_text(
+        "tree: t\nimport: a.yaml\nroot:\n  sequence: S\n  children:\n"
+        "    - set: {at: 2.0}\n    - move: Go\n"
+    )
+    assert check_file(tmp_path / "a.yaml") == []
+    assert check_file(tmp_path / "t.yaml") == []
+
+
+def test_a_large_goal_that_nodes_add_to_is_looked_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "t.yaml").write_text(
+        "tree: t\nactions:\n  go: {type: a/action/B, server: s, timeout: 1 s, goal:"
+        f" {{header: {{frame_id: a}}, poses: [{'{}, ' * 200}]}}}}\nroot:\n  sequence: S\n"
+        "  children:\n" + "    - {go: G, goal: {header: {frame_id: b}}}\n" * 50
+    )
+    monkeypatch.setattr(
+        "bt_actions.document.check.interface_of",
+        lambda _name, _kind: SimpleNamespace(Goal=nav_msgs.msg.Path, Result=std_msgs.msg.Empty),
+    )
+    looked = 0
+    convert = messages._Filler.convert
+
+    def count(self: Any, *args: Any) -> Any:
+        nonlocal looked
+        looked += 1
+        return convert(self, *args)
+
+    monkeypatch.setattr(messages._Filler, "convert", count)
+    assert [each for each in check_file(tmp_path / "t.yaml") if each.code == "BT204"] == []
+    assert 200 < looked < 2000

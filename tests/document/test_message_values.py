@@ -204,3 +204,48 @@ def test_goals_that_are_merged_must_fit_together(
     assert [(one.line, one.column, one.message) for one in found] == (
         [(9, 42, told)] if told is not None else []
     )
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        "{set: {u: $m.data}}",
+        "{for_each: E, in: $m.data, as: i, child: {check: $i >= 1}}",
+        "{for_each: E, in: $m.data, child: {set: {i: $item}}}",
+        "{set: {b: $m.data}}",
+    ],
+)
+def test_the_bytes_of_a_message_are_numbers(load: Load, node: str) -> None:
+    root = load(
+        f"""
+        tree: t
+        inputs: {{m: {{type: std_msgs/msg/ByteMultiArray, default: {{data: [1, 2, 255]}}}}}}
+        outputs: {{u: "uint8[]", i: int32, b: "byte[]"}}
+        root: {node}
+        """
+    )
+    assert tick(root, 5) is Status.SUCCESS
+
+
+PUBLISHES = "{publish: a, type: geometry_msgs/msg/Polygon, message: $m}"
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        "{set: {pts: [{x: 1}, {q: 2.5}]}}, {for_each: E, in: $pts, as: p, child: {success: S}}",
+        "{set: {pts: [{x: 1}, {q: 2.5}]}}, {set: {l: $pts}}",
+        f"{{set: {{m: {{points: [{{x: 1}}, {{q: 2}}]}}}}}}, {PUBLISHES}",
+        "{for_each: E, in: [{p: [{x: 1}]}, {p: [{q: 2}]}], child: {set: {l: $item.p}}}",
+    ],
+)
+def test_a_mapping_in_a_list_must_fit_its_message(nodes: str) -> None:
+    findings = check_source(
+        source_of(
+            b"tree: t\noutputs: {p: geometry_msgs/msg/Point, l: 'geometry_msgs/msg/Point[]'}\n"
+            b"root: {sequence: S, children: [" + nodes.encode() + b"]}\n",
+            "t",
+        )
+    )
+    (found,) = [each for each in findings if each.code == "BT204"]
+    assert "has no field 'q'" in found.message
