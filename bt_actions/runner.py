@@ -315,8 +315,8 @@ class TreeRunner:
             raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
         with self._mind_signals():
             self._shut_down(patience=-1.0)
-        leaving, self._leaving = self._leaving, None
-        if leaving is not None:
+        if self._is_down and self._leaving is not None:
+            leaving, self._leaving = self._leaving, None
             raise leaving
 
     def _at_exit(self) -> None:

@@ -30,7 +30,7 @@ def replace_file(path: Path, data: bytes) -> None:
             file.write(data)
             file.flush()
             if before is not None:
-                with contextlib.suppress(PermissionError):  # only root may give it away
+                with contextlib.suppress(OSError):  # only root may give it away
                     os.fchown(descriptor, before.st_uid, before.st_gid)
                 os.fchmod(descriptor, before.st_mode & 0o777)
             new.replace(target)

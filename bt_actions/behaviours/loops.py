@@ -160,7 +160,9 @@ class ForEach(Gate):
         self._items = None
         self.feedback_message = ""
         try:
-            items = plain(self._get_items())
+            items = self._get_items()
+            to_list = getattr(items, "tolist", None)  # array.array and numpy alike
+            items = plain(to_list() if to_list is not None else items)
             if not isinstance(items, (list, tuple)):
                 raise ValueError(f"a list is needed, not {type(items).__name__}")
         except ValueError as error:

@@ -153,11 +153,13 @@ HIGHEST_DOMAIN = 232
 
 def refuse_domain() -> None:
     """Raise BadInput for what is no ROS domain; of one too high, Fast DDS would end the process."""
-    domain = os.environ.get("ROS_DOMAIN_ID", "0") or "0"
-    plain = re.fullmatch("0|[1-9][0-9]{0,2}", domain)  # rcl takes 0x1F4, too
-    if plain is None or int(domain) > HIGHEST_DOMAIN:
-        text = f"ROS_DOMAIN_ID is {domain!r}; a domain is a number from 0 to {HIGHEST_DOMAIN}"
-        raise BadInput(f"ROS 2 cannot start: {text}")
+    domain = os.environ.get("ROS_DOMAIN_ID", "")
+    digits = domain.strip().removeprefix("+").lower()
+    base = 16 if digits.startswith("0x") else 8 if digits.startswith("0") else 10  # as rcl reads it
+    with contextlib.suppress(ValueError):  # of which rcl says why
+        if int(digits, base) > HIGHEST_DOMAIN:
+            text = f"ROS_DOMAIN_ID is {domain!r}; a domain is a number from 0 to {HIGHEST_DOMAIN}"
+            raise BadInput(f"ROS 2 cannot start: {text}")
 
 
 @contextlib.contextmanager

@@ -242,16 +242,12 @@ class Checker:
             self.source.report("BT204", span_of(node), message, related=related)
             return
         wanted = self.variables.get(name)
+        texts = [f"{name}{text}" for text in misfits(kind, wanted)]
         if not fits(kind, wanted):
-            self.source.report(
-                "BT204", span_of(node), f"{name!r} is {named(wanted)}, and this is {named(kind)}",
-                related=Related(declared.place, "declared here"),
-            )  # fmt: skip
-        for text in misfits(kind, wanted):
-            self.source.report(
-                "BT204", span_of(node), f"{name!r} is {named(wanted)}; {text}",
-                related=Related(declared.place, "declared here"),
-            )  # fmt: skip
+            texts = [f"{name!r} is {named(wanted)}, and this is {named(kind)}"]
+        for text in texts:
+            related = Related(declared.place, "declared here")
+            self.source.report("BT204", span_of(node), text, related=related)
 
     # Values
 
@@ -278,7 +274,7 @@ class Checker:
                     self.source.report("BT204", span_of(item.node), text)
                 elif texts := misfits(given, wanted):
                     for text in texts:
-                        self.source.report("BT204", span_of(item.node), f"{said}.{text}")
+                        self.source.report("BT204", span_of(item.node), f"{said}{text}")
                 elif (constant := constant_of(item)) is not None:
                     for problem in examine(wanted, constant):
                         self.source.report("BT204", span_of(item.node), problem.text)

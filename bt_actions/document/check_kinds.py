@@ -69,8 +69,9 @@ def _computed_inputs(checker: Checker, included: Document, given: Computed, kind
             said = given.expression.text.strip()
             text = f"{name!r} is {named(wanted)}, and in {said} it is {named(value)}"
             checker.source.report("BT204", span_of(given.node), text)
+            continue
         for text in misfits(value, wanted):
-            checker.source.report("BT204", span_of(given.node), f"{name}.{text}")
+            checker.source.report("BT204", span_of(given.node), f"{name}{text}")
 
 
 def _input_type(checker: Checker, included: Document, name: str, at: Node) -> FieldType | None:

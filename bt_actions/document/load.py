@@ -145,7 +145,8 @@ def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[
             checker.check()
             doubts = Doubts(document)  # anew: the checker found more
             find_hazards(checker, doubts)
-            all_tried = document.root is not None and not doubts.any
+            has_unread = document.root is None and document.node.get("root") is not None
+            all_tried = not has_unread and not doubts.any
             apply_ignores(document.source, complete=all_tried)
     return workspace.findings
 

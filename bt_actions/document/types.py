@@ -32,6 +32,7 @@ _STAND_FOR = {
     "builtin_interfaces/msg/Duration": (*FLOATS, *INTEGERS, "string"),
 }
 """The plain types whose values may be given for a message: seconds, and `500 ms`."""
+_TEXT = Scalar("string")
 _SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{1,9}))?(\])?)?")
 
 
@@ -129,9 +130,12 @@ def _fills(given: FieldType, cls: type) -> bool:
 
 
 def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
-    """What is wrong with mappings of such types where messages are needed, also inside lists."""
+    """What is wrong with mappings of such types where messages are needed, also inside lists.
+
+    Each text goes on where the name of the value ends: ".x: ...", ", in one item: ...".
+    """
     if isinstance(given, Listing) and isinstance(wanted, Listing):
-        return [f"one item: {text}" for text in misfits(given.item, wanted.item)]
+        return [f", in one item{text}" for text in misfits(given.item, wanted.item)]
     if isinstance(given, Either):
         return next((texts for kind in given.kinds if (texts := misfits(kind, wanted))), [])
     if not isinstance(given, Record) or not isinstance(wanted, Message):
@@ -145,11 +149,24 @@ def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
         if isinstance(item, dict):  # the mapping itself
             return False
         inner = item if isinstance(item, FieldType) else None
-        if inner != Scalar("string") and not fits(inner, kind):  # a text may name a constant
-            found.append(f"{dotted(path)}: a value of {kind} is needed, not of {inner}")
+        kinds = inner.kinds if isinstance(inner, Either) else (inner,)
+        wrong = [one for one in kinds if one != _TEXT and not fits(one, kind)]
+        if wrong:  # a text may name a constant
+            found.append(f".{dotted(path)}: a value of {kind} is needed, not of {wrong[0]}")
         else:
-            found.extend(f"{dotted(path)}.{text}" for text in misfits(inner, kind))
+            found.extend(f".{dotted(path)}{text}" for text in misfits(inner, kind))
         return True
 
-    problems = examine(wanted, dict(given.items), hole)
-    return [str(problem) for problem in problems] + found
+    problems = [one for part in _alone(given) for one in examine(wanted, part, hole)]
+    return [f".{one}" if one.path else f": {one.text}" for one in problems] + found
+
+
+def _alone(given: Record) -> list[dict[str, FieldType | None]]:
+    """A mapping as what can stand beside each other: of several, one may have angles."""
+    from bt_actions.ros.conveniences import ANGLES
+
+    items = dict(given.items)
+    if not given.sometimes or not any(name in ANGLES for name in items):
+        return [items]
+    angles = {name: kind for name, kind in items.items() if name in ANGLES}
+    return [angles, {name: kind for name, kind in items.items() if name not in ANGLES}]

@@ -249,3 +249,31 @@ def test_a_mapping_in_a_list_must_fit_its_message(nodes: str) -> None:
     )
     (found,) = [each for each in findings if each.code == "BT204"]
     assert "has no field 'q'" in found.message
+
+
+@pytest.mark.parametrize(
+    ("type_name", "message"),
+    [
+        ("sensor_msgs/msg/PointCloud2", "{fields: [{datatype: FLOAT32}, {datatype: 7}]}"),
+        ("nav_msgs/msg/Path", "{poses: [{header: {stamp: now}}, {header: {stamp: 3.5}}]}"),
+        (
+            "geometry_msgs/msg/PoseArray",
+            "{poses: [{orientation: {yaw: 1.0}}, {orientation: {w: 1.0}}]}",
+        ),
+        (
+            "geometry_msgs/msg/PoseArray",
+            "{poses: [{orientation: {yaw: 90 deg}}, {orientation: {yaw: 1.5}}]}",
+        ),
+    ],
+)
+def test_the_mappings_of_a_list_may_say_the_same_in_several_ways(
+    type_name: str, message: str
+) -> None:
+    findings = check_source(
+        source_of(
+            f"tree: t\nroot: {{sequence: S, children: [{{set: {{m: {message}}}}},"
+            f" {{publish: a, type: {type_name}, message: $m}}]}}\n".encode(),
+            "t",
+        )
+    )
+    assert [each.message for each in findings] == []
