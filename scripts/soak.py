@@ -65,11 +65,12 @@ SAID = {
     "succeeded": {End.SUCCEEDED},
     "aborted": {End.ABORTED},
     "canceled": {End.CANCELED},
-    "rejected": {End.NEVER_STARTED},
+    "rejected": {End.NEVER_STARTED, End.SERVER_GONE},
     "died": {End.SERVER_GONE},
     "None": {End.NEVER_STARTED, End.SERVER_GONE},
 }
-"""What the orchestrator may say of a goal, by how it ended on the server; UNKNOWN of none."""
+"""What the orchestrator may say of a goal, by how it ended on the server; UNKNOWN of none. Of a
+request whose answer was lost, and its server after it, nobody can say that it never started."""
 
 
 class Soak:
