@@ -109,6 +109,20 @@ def suspect(timeouts: Timeouts = LIMITS) -> Life:
     return life
 
 
+def denied(life: Life) -> None:
+    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+
+
+def denied_suspect() -> Life:
+    """A suspect for which the tree did not wait any longer, because its server denied it."""
+    life = suspect()
+    life.pass_time((LIMITS.accept or 0.0) - 1.0)
+    denied(life)
+    life.pass_time(1.0)
+    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    return life
+
+
 # The table
 
 
@@ -326,11 +340,7 @@ def test_a_server_that_knows_a_goal_it_had_not_answered_has_accepted_it(code: in
 
 
 def test_accepted_however_late_it_is_canceled() -> None:
-    life = suspect()
-    life.pass_time(2.0)
-    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
-    life.pass_time(1.0)
-    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    life = denied_suspect()
     life.pass_time(3600.0)
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
     assert life.goal.end is End.UNKNOWN
@@ -680,11 +690,7 @@ def test_a_goal_lost_before_its_acceptance_is_judged_when_the_server_is_back() -
 
 def test_a_suspect_that_was_denied_once_may_run_on_a_server_that_is_lost() -> None:
     """Its acceptance may have been under way when the link was cut."""
-    life = suspect()
-    life.pass_time(2.0)
-    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
-    life.pass_time(1.0)
-    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    life = denied_suspect()
     life.on(Event.SERVER_LOST, "cut")
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.SERVER_GONE)
     assert life.on(Event.SERVER_RETURNED) == [CANCEL]
@@ -693,15 +699,11 @@ def test_a_suspect_that_was_denied_once_may_run_on_a_server_that_is_lost() -> No
 
 
 def test_a_suspect_bars_nothing_longer_than_its_server_that_is_back_takes_to_deny_it() -> None:
-    life = suspect()
-    life.pass_time(2.0)
-    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
-    life.pass_time(1.0)
-    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
+    life = denied_suspect()
     life.on(Event.SERVER_LOST, "cut")
     life.on(Event.SERVER_RETURNED)
     assert life.goal.owed
-    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+    denied(life)
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
     assert not life.goal.owed
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK], "and if it turns up all the same"
@@ -957,20 +959,6 @@ def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -
     assert life.goal.bars(base, same_server=False)
     assert not life.goal.bars(beside, same_server=False)
     assert life.goal.bars(beside, same_server=True)
-
-
-def denied(life: Life) -> None:
-    life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
-
-
-def denied_suspect() -> Life:
-    """A suspect for which the tree did not wait any longer, because its server denied it."""
-    life = suspect()
-    life.pass_time((LIMITS.accept or 0.0) - 1.0)
-    denied(life)
-    life.pass_time(1.0)
-    life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
-    return life
 
 
 def test_a_suspect_that_is_denied_for_good_need_not_be_waited_for() -> None:
