@@ -48,9 +48,7 @@ __all__ = [
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")
-_NUMBER = re.compile(
-    r" *(?P<number>[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?) *(?P<unit>[A-Za-z/%°]{0,9})"
-)
+_NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")
 
 
 @dataclass(frozen=True, slots=True)
