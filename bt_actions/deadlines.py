@@ -46,6 +46,11 @@ class Deadlines:
         for event in self._due:
             self._due[event] += seconds
 
+    def hold(self, seconds: float, now: Now) -> None:
+        """Let none fall due within so many seconds."""
+        for event in self._due:
+            self._due[event] += max(0.0, seconds - self._left(event, now))
+
     def follow(self, now: Now) -> None:
         """Where the ROS clock has jumped back, let the deadlines on it jump with it."""
         back = self._ros_seen - now.ros

@@ -232,6 +232,10 @@ class Goal:
         if self.state in (State.QUEUED, State.WAITING_FOR_SERVER):
             self._deadlines.postpone(seconds)
 
+    def hold(self, seconds: float, now: Now) -> None:
+        """Let no deadline take effect within so many seconds: what is awaited is on its way."""
+        self._deadlines.hold(seconds, now)
+
     # Steps of the table: each decides, acts on the goal, and returns the next state
 
     def _stay(self, now: Now, detail: Any) -> State:
@@ -636,6 +640,7 @@ class Goal:
         self._plan(outcome, reason)
         self._deadlines.disarm(Event.RESULT_DUE)
         self._deadlines.disarm(Event.FEEDBACK_DUE)
+        self._deadlines.disarm(Event.CANCEL_DUE)  # that of a replacement, which may be all there is
         self._deadlines.arm(Event.CANCEL_DUE, self.timeouts.cancel, now)
         self._ask(now)
         return State.CANCELING
@@ -654,14 +659,18 @@ class Goal:
         return State.CANCELING
 
     def _cancel_due(self, now: Now, detail: Any) -> State:
-        """The leaf has waited long enough; the questions go on."""
+        """The leaf has waited long enough; the questions go on, unless the status shows the end."""
+        if self._seen_status is not None:
+            return self._finished_by_status()
         self._settle_as_planned()
         self._ask(now)
         return State.CANCELING
 
     def _drained(self, now: Now, detail: Any) -> State:
-        """Nobody waits any longer; a request that was never answered is UNKNOWN."""
+        """Nobody waits any longer; what is not known by now is UNKNOWN, and may become known."""
         self.waited_for = True
+        if self._seen_status is not None:
+            return self._finished_by_status()
         self._settle_as_planned()
         if self.suspect:
             self.end = End.UNKNOWN  # canceled if it turns up all the same
@@ -786,9 +795,9 @@ def _table() -> dict[tuple[State, Event], Row]:
         (canceling, Event.RESULT_UNKNOWN): (Goal._denied_while_canceling, {canceling, done}),
         (canceling, Event.CANCEL_ANSWERED): (Goal._cancel_answered, {canceling}),
         (canceling, Event.ACCEPT_DUE): (Goal._suspicion, {canceling}),
-        (canceling, Event.CANCEL_DUE): (Goal._cancel_due, {canceling}),
+        (canceling, Event.CANCEL_DUE): (Goal._cancel_due, {canceling, done}),
         (canceling, Event.ASK_DUE): (Goal._ask_again, {canceling, done}),
-        (canceling, Event.DRAINED): (Goal._drained, {canceling}),
+        (canceling, Event.DRAINED): (Goal._drained, {canceling, done}),
         (canceling, Event.INTERRUPTED): (Goal._interrupted_while_canceling, {canceling}),
         (canceling, Event.SERVER_AMBIGUOUS): (Goal._taken_by_two_while_canceling, {canceling}),
         (canceling, Event.REPLACED): (Goal._replaced_while_canceling, {canceling}),

@@ -176,7 +176,7 @@ class TreeRunner:
         Raises TimeoutError after `timeout` seconds, TreeError when a behaviour raised or the
         spin thread died (goals are drained first in each case), and RuntimeError on an executor's
         thread, in a second run at a time, or where nobody spins the node. On the main thread and
-        with a node of its own, SIGINT, SIGTERM and SIGHUP take effect after the goals were drained.
+        with a node of its own, SIGINT, SIGTERM, SIGHUP and SIGQUIT take effect after the drain.
         """
         from bt_actions.ros.spinning import on_executor_thread
 
@@ -238,7 +238,7 @@ class TreeRunner:
     def _release(self) -> None:
         from bt_actions.ros.shared import lock
 
-        self._stop_wanted = self._abandoned = False
+        self._stop_wanted = self._abandoned = self._pause_wanted = False
         try:
             with lock:  # under which _note() is called
                 self._runs_on = None

@@ -631,6 +631,32 @@ def test_the_deadline_shown_is_the_earliest_that_means_something() -> None:
     assert life.goal.deadline(life.now) is None
 
 
+def test_what_is_held_falls_due_later_and_nothing_else_does() -> None:
+    life = executing()
+    life.now = Now(life.now.steady + 2.5, life.now.ros + 2.5)  # nobody polls: timeout.feedback is 2
+    life.goal.hold(1.0, life.now)
+    assert life.pass_time(0.9) == []
+    assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, pytest.approx(0.1))
+    life.on(Event.FEEDBACK, "at last")
+    assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, 2.0)
+
+
+@pytest.mark.parametrize("last", [Event.CANCEL_DUE, Event.DRAINED])
+def test_an_end_that_the_status_shows_is_known_when_nobody_waits_any_longer(last: Event) -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.STATUS, STATUS_CANCELED)
+    life.on(last)
+    life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+def test_a_replaced_goal_that_is_interrupted_has_the_deadline_of_its_own_cancel() -> None:
+    life = executing(Timeouts(cancel=None))
+    life.on(Event.REPLACED, "/move")
+    life.on(Event.INTERRUPTED)
+    assert life.goal.deadline(life.now) is None
+
+
 def test_a_paused_tree_stops_the_deadlines_of_what_was_not_sent() -> None:
     life = waiting()
     life.goal.postpone(60.0)

@@ -54,7 +54,7 @@ examples:
 
 exit codes:
   0 success   1 failure   2 bad input   3 the end of a goal is unknown (wins over all others)
-  124 --timeout expired   129 SIGHUP   130 Ctrl-C   141 stdout was closed   143 SIGTERM
+  124 --timeout expired   129 SIGHUP   130 Ctrl-C   131 Ctrl-\\   141 closed stdout   143 SIGTERM
 """
 
 

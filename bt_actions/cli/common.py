@@ -33,6 +33,7 @@ class Exit(IntEnum):
     TIMEOUT = 124
     SIGHUP = 129
     SIGINT = 130
+    SIGQUIT = 131
     SIGPIPE = 141
     """Nobody reads standard output any more."""
     SIGTERM = 143

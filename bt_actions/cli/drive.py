@@ -44,6 +44,7 @@ _LOOK = 0.02
 _EXITS = {
     Signal.SIGHUP: Exit.SIGHUP,
     Signal.SIGINT: Exit.SIGINT,
+    Signal.SIGQUIT: Exit.SIGQUIT,
     Signal.SIGTERM: Exit.SIGTERM,
 }
 
@@ -136,7 +137,9 @@ class Drive:
                 thread.join()
                 break
             now = self._clock()
-            if deadline is not None and now >= deadline and self._stop is None:
+            if self._stop is not None or self._report.finished:
+                deadline = None  # there is nothing left to end
+            if deadline is not None and now >= deadline:
                 self._end(Exit.TIMEOUT, f"--timeout {self._timeout:g} s expired", now)
             if now - drawn >= FRAME:
                 self._show(self._view.frame)

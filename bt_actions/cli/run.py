@@ -37,9 +37,9 @@ examples:
   bt-actions run patrol --namespace /r1 --timeout 600 --json
   bt-actions run patrol --ros-args --params-file patrol.yaml -p use_sim_time:=true
 
-Ctrl-C, SIGTERM, SIGHUP, --timeout and a closed standard output all end a run in the same way:
-every goal is canceled and seen to its end. A second Ctrl-C leaves at once and says which goals
-are not accounted for. Exit codes: see `bt-actions --help`.
+Ctrl-C, Ctrl-\\, SIGTERM, SIGHUP, --timeout and a closed standard output all end a run in the same
+way: every goal is canceled and seen to its end. A second Ctrl-C leaves at once and says which
+goals are not accounted for. Exit codes: see `bt-actions --help`.
 """
 
 

@@ -1,4 +1,4 @@
-"""SIGINT, SIGTERM and SIGHUP as bytes in a pipe that the main thread reads when it is ready.
+"""SIGINT, SIGTERM, SIGHUP and SIGQUIT as bytes in a pipe, which the main thread reads in its time.
 
 A handler that did more than write a byte could run in the middle of anything, with any lock held.
 Nothing here decides what a signal means.
@@ -15,7 +15,7 @@ import threading
 from types import FrameType
 from typing import Any, Self
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 _to_ignore: set[signal.Signals] = set()

@@ -1,7 +1,7 @@
 """The alarm: one plain thread that minds every open goal's deadlines and servers, ticks or not.
 
 It sleeps until the earliest deadline, ends when no goal has been open for a while, and starts again
-with the next.
+with the next. As it never sleeps for long, it notices when the whole process stood still.
 It knows lines only by their `attend`.
 """
 
@@ -13,6 +13,7 @@ from typing import Protocol
 
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
+from bt_actions.standstill import Standstill
 
 AT_LEAST_EVERY = 0.2
 """Seconds; a clock that is not the steady one may run faster than the alarm can know."""
@@ -27,6 +28,8 @@ class Attended(Protocol):
         """Do what is due and return the seconds until there is more."""
 
 
+standstill = Standstill()
+"""Of this process while a goal is open; under the lock."""
 _open: set[Attended] = set()
 _bell = threading.Condition(lock)
 _thread: threading.Thread | None = None
@@ -58,6 +61,7 @@ def disown() -> None:
     global _thread
     _open.clear()
     _thread = None
+    standstill.rests()
 
 
 def wake_by(moment: float) -> None:
@@ -77,10 +81,13 @@ def _attend() -> None:
             if _open:
                 busy_at = time.monotonic()
             for line in list(_open):
+                standstill.lives(time.monotonic())
                 try:
                     wait = min(wait, line.attend(time.monotonic()))
                 except Exception as error:  # noqa: BLE001 - the last guard of every deadline
                     log.error(f"{line!r}: {error!r}")
             _wakes_at = time.monotonic() + wait
+            standstill.lives(time.monotonic())
             _bell.wait(wait)
+        standstill.rests()
         _thread = None

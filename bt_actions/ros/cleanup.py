@@ -17,6 +17,7 @@ from typing import Any
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from rclpy.context import Context
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
@@ -94,7 +95,9 @@ def cleanup(
         if context is None:
             own.init()
         node = Node("bt_actions_cleanup", context=own, namespace=namespace)
-    except RuntimeError as error:  # rclpy's RCLError
+    except (RuntimeError, NameValidationException) as error:  # of the first, rclpy's RCLError
+        if context is None:
+            own.try_shutdown()
         raise CannotStart(str(error).splitlines()[0]) from error
     executor = SingleThreadedExecutor(context=own)
     executor.add_node(node)

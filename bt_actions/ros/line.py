@@ -21,6 +21,7 @@ from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
+from bt_actions.ros.alarm import standstill
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.graph import servers
 from bt_actions.ros.interfaces import interface_name
@@ -40,8 +41,6 @@ LOOK_WHILE_LOST = 1.0
 PUMP_EVERY = 0.01
 """Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
-STOOD_STILL = 0.5
-"""Seconds that a look is late by where this process, or the machine, seems to have stood still."""
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
 SILENT_FOR = 40.0
@@ -205,23 +204,24 @@ class Line:
         """Let the goal's deadlines take effect, unless its tree is paused before sending.
 
         What has arrived by now is taken in first: an answer that came in time is in time, though
-        the executor, or this whole process, was too busy to look. One moment decides whether to do
-        so, and what is due.
+        the executor was too busy to look. Where this whole process stood still, it may be about to
+        arrive. One moment decides whether to do so, and what is due.
         """
         with lock:
             goal, now = ticket.goal, self.traffic.clocks.now()
             if self.is_parents:
                 return
             if ticket.paused_at is None or goal.sent:
-                if goal.sent and goal.due_in(now) == 0.0:
+                if goal.due_in(now) == 0.0:
                     self.pump()
                     now = self.traffic.clocks.now()
+                    goal.hold(standstill.answers_take(now.steady), now)
                 self._apply(ticket, lambda _: goal.poll(now), None)
 
     def mind(self, ticket: Ticket) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""
         try:
-            if ticket.given_up:
+            if ticket.given_up and not standstill.answers_take(time.monotonic()):
                 self.tell(ticket, Event.INTERRUPTED)
             self.poll(ticket)
         except Exception as error:  # noqa: BLE001 - a mistake of ours: any
@@ -496,6 +496,7 @@ class Line:
             for ticket in self.goals.values()
             if ticket.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
             and ticket.goal.outcome is not None
+            and not ticket.goal.suspect
         ]
         for ticket in settled[:-LOST_KEPT]:
             self.tell(ticket, Event.CLOSED)
@@ -516,7 +517,7 @@ class Line:
             self._orphan()
             return Server.ABSENT
         if self.watch.is_crowded:  # what answers came in time count, though nobody spun the node
-            if self._look_at and now - self._look_at > STOOD_STILL:
+            if standstill.answers_take(time.monotonic()):
                 self.watch.stood_still(now)
             self.pump()
             if self.client.closed:  # by what came, and nobody used the line
@@ -533,7 +534,8 @@ class Line:
             self._probe()
         for ticket in list(self.goals.values()):
             gone = self.watch.gone(now, ticket.testimony.sent_to)
-            if gone and now < ticket.not_gone_before:
+            hidden = now < ticket.not_gone_before or standstill.hides_servers(time.monotonic())
+            if gone and hidden:
                 continue  # it has not been discovered yet, though its status may have come already
             if ticket.goal.sent:
                 if gone and not ticket.goal.lost:

@@ -30,6 +30,7 @@ from bt_actions.goal_terms import Event, State
 from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
 from bt_actions.ros import alarm, shared
+from bt_actions.ros.alarm import standstill
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.line import Line
@@ -313,7 +314,7 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
         waits = [t for t in wanted if not t.accounted_for and not t.goal.waited_for]
         patience = max((ticket.goal.drains_within for ticket in waits), default=0.0)
         deadline = time.monotonic() + patience + JUST_PAST
-    while waits and time.monotonic() < deadline and not hurry():
+    while waits and _may_wait(deadline) and not hurry():
         with lock:
             for line in {ticket.line for ticket in waits}:
                 line.pump()
@@ -325,6 +326,13 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     for ticket in waits:
         ticket.line.tell(ticket, Event.DRAINED)
     return [ticket for ticket in wanted if not ticket.accounted_for]
+
+
+def _may_wait(deadline: float) -> bool:
+    """Whether there is time left; where this process stood still, for what is about to arrive."""
+    now = time.monotonic()
+    with lock:
+        return now < deadline or standstill.answers_take(now) > 0.0
 
 
 def _who_begins() -> Beginner | None:

@@ -76,6 +76,7 @@ def test_the_status_of_the_tree_is_the_exit_code(status: Status, code: Exit, sto
         (signal.SIGINT, Exit.SIGINT),
         (signal.SIGTERM, Exit.SIGTERM),
         (signal.SIGHUP, Exit.SIGHUP),
+        (signal.SIGQUIT, Exit.SIGQUIT),
     ],
 )
 def test_a_signal_interrupts_and_the_drained_run_has_its_code(
@@ -107,10 +108,13 @@ def killed_when(event: threading.Event, number: signal.Signals) -> Iterator[None
         killer.join()
 
 
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+
+
 def test_the_handlers_of_before_are_back_after_a_run(story: Story) -> None:
-    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    before = [signal.getsignal(number) for number in ENDING]
     Run(FakeRunner([story.finish(Status.SUCCESS)])).go()
-    after = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    after = [signal.getsignal(number) for number in ENDING]
     assert after == before
 
 
@@ -133,6 +137,16 @@ def test_the_timeout_interrupts_with_124(story: Story) -> None:
     run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
     assert run.go().code is Exit.TIMEOUT
     assert "--timeout 0.05 s expired: canceling 1 goal" in run.out.getvalue()
+
+
+def test_a_timeout_that_expires_when_the_tree_has_finished_changes_nothing(story: Story) -> None:
+    run = Run(FakeRunner(waits=True), timeout=0.05)
+    run.runner.before = [story.start(), story.finish(Status.SUCCESS)]
+    later = threading.Timer(0.3, run.runner.interrupted.set)  # its shutdown takes so long
+    later.start()
+    ended = run.go()
+    later.join()
+    assert ended.code is Exit.SUCCESS
 
 
 def test_a_goal_whose_end_is_unknown_wins_over_every_other_code(story: Story) -> None:

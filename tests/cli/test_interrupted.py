@@ -71,6 +71,7 @@ def test_what_was_told_holds_though_a_signal_comes_late(
         (signal.SIGINT, 130, "--executor=single"),
         (signal.SIGTERM, 143, ""),
         (signal.SIGHUP, 129, ""),
+        (signal.SIGQUIT, 131, ""),
     ],
 )
 def test_a_signal_in_mid_motion_cancels_the_goal_within_the_deadline_and_leaves_no_process(

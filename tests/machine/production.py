@@ -15,19 +15,22 @@ from unittest import mock
 
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.goal import Goal
-from bt_actions.goal_terms import Event, State
+from bt_actions.goal_terms import Event, Now, State
 from bt_actions.policy import End, Outcome
 from bt_actions.ros import alarm, line, shared, traffic
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Ticket
 from bt_actions.ros.traffic import Traffic
+from bt_actions.standstill import Standstill
 from tests.machine.histories import ACTIONS, Play, plan
-from tests.machine.judge import Judge
+from tests.machine.judge import Judge, Violation
 from tests.machine.parts import LeafPlan, Ledger
 from tests.machine.world import NODES, Message, World
 
 DOMAIN = 1
+LEASE = 3.0
+"""Seconds without a look after which a process has dropped the servers that it saw."""
 _playing: list[Caller] = []
 """The caller of the play that goes on, last."""
 
@@ -206,11 +209,14 @@ class Caller:
         _playing[:] = [self]
         shared._domains.clear()
         alarm._open.clear()
+        line.standstill = Standstill()
         self._traffics = {number: self._traffic(number) for number in NODES}
         self._lines: dict[tuple[str, int], Line] = {}  # made when a leaf first wants them
         world.client = self  # type: ignore[assignment]
         judge.caller = self  # type: ignore[assignment]
-        kinds = "fails_to_send builds_nonsense unexpected restarts_meanwhile opens_meanwhile"
+        kinds = (
+            "fails_to_send builds_nonsense unexpected restarts_meanwhile opens_meanwhile freezes"
+        )
         world.kinds.update(
             {
                 "tick": (lambda: () if self.closed else self.leaves, self.tick),
@@ -397,12 +403,45 @@ class Caller:
                         each.statuses_came({message.goal_id: message.detail})
 
     def attend(self) -> None:
-        """What the alarm does."""
+        """What the alarm does, which is late where the process was frozen."""
+        line.standstill.rests()
+        self._attend()
+        if self.takes("freezes"):
+            self._freeze((0.9, 2.5, 6.0)[self._moments % 3])
+
+    def _attend(self) -> None:
         for each in list(alarm._open):
             assert isinstance(each, Line)
             each._look_at = 0.0
             each.attend(self.moment())
         self.judge.nobody_waits_in_vain()
+
+    def _freeze(self, seconds: float) -> None:
+        """This process is stopped, and runs again; what it was sent comes in a moment later.
+
+        So do servers that it sees, beyond their lease.
+        """
+        line.standstill.lives(self.moment())
+        world, hidden = self.world, set[tuple[bytes, int]]()
+        if seconds > LEASE:
+            hidden = {(server.gid, node) for server in world.servers for node in NODES}
+            hidden -= world.overlooked
+        world.overlooked |= hidden
+        world.now = Now(world.now.steady + seconds, world.now.ros + seconds * world.pace)
+        before = {
+            view: view.goal.state
+            for view in self.tickets
+            if view.goal.state in (State.SENDING, State.EXECUTING) and not view.ledger.crowded
+        }
+        self._attend()
+        for view, state in before.items():
+            if view.goal.state is not state:
+                raise Violation(f"who was frozen looks first for what came meanwhile: {view}")
+        world.overlooked -= hidden
+        for message in world._deliverable():
+            if message in world.air:
+                world.deliver(message)
+        self.attend()
 
     def due_in(self) -> float:
         """Return the seconds until something is due (half a second where nothing is)."""
@@ -527,6 +566,7 @@ def installed() -> Iterator[None]:
         (traffic, "log", mock.Mock()),
         (traffic, "new_goal_id", lambda: now().new_goal_id()),
         (traffic, "drain", _drain),
+        (line, "standstill", Standstill()),
         (alarm, "_open", set()),
         (alarm, "mind", lambda each: alarm._open.add(each)),
         (shared, "_domains", {}),

@@ -14,6 +14,7 @@ import pytest
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Domain
 from bt_actions.ros.traffic import Traffic
+from bt_actions.standstill import Standstill
 from tests.machine.conftest import THOROUGH
 from tests.machine.histories import first_broken, random_history, shrink, tell
 from tests.machine.production import ProductionPlay, installed
@@ -44,6 +45,12 @@ MISTAKES: dict[str, tuple[type, str, Callable[..., Any]]] = {
     "knows of nothing in the way": (Traffic, "_in_the_way_of", lambda self, ticket: False),
     "takes preemption for a failure": (Line, "_rival_sent", lambda self, ticket: False),
     "remembers nothing that is lost": (Domain, "keep_lost", lambda self, *lost: None),
+    "takes who is not in sight yet for lost": (
+        Standstill,
+        "hides_servers",
+        lambda self, now: False,
+    ),
+    "takes what has not come in yet for late": (Standstill, "answers_take", lambda self, now: 0.0),
 }
 """What callers.py cannot show, as these are the parts that it copies."""
 

@@ -597,8 +597,18 @@ class TestDeadlines:
         leaf = run(MoveRobot("m", 0.1, action_name=name))
         assert stood(leaf) == (Outcome.SERVER_LOST, End.SUCCEEDED)
 
-    def test_an_end_that_becomes_known_in_shutdown_is_told(self, serve: Any, name: str) -> None:
+    def test_a_goal_that_ended_by_its_status_is_tried_again_though_its_result_was_lost(
+        self, serve: Any, name: str, run: Run
+    ) -> None:
         serve("1:drop_result=1000")
+        timeouts = Timeouts(result=1.5, cancel=0.7)
+        leaf = run(MoveRobot("m", 9.0, action_name=name, timeout=timeouts, retry=Retry(2)))
+        first = leaf.history[0]
+        assert (first.outcome, first.end) == (Outcome.RESULT_TIMEOUT, End.CANCELED)
+        assert len(leaf.history) == 2
+
+    def test_an_end_that_becomes_known_in_shutdown_is_told(self, serve: Any, name: str) -> None:
+        serve("1:delay_cancel=1.5", "1:drop_result=1000")
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.5, cancel=0.3))
         told: list[End] = []
 
@@ -610,11 +620,12 @@ class TestDeadlines:
             runner.observe(tell)
             runner.run(timeout=20.0)
             assert leaf.end is told[-1] is End.UNKNOWN
+            until(lambda: leaf.history[0].goal._seen_status)
         assert leaf.end is told[-1] is End.CANCELED
         assert runner.unaccounted == []
 
     def test_who_ends_the_program_at_news_in_shutdown_is_heard(self, serve: Any, name: str) -> None:
-        serve("1:drop_result=1000")
+        serve("1:delay_cancel=1.5", "1:drop_result=1000")
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.5, cancel=0.3))
         runner = TreeRunner(leaf)
 
@@ -624,6 +635,7 @@ class TestDeadlines:
 
         runner.observe(leave)
         runner.run(timeout=20.0)
+        until(lambda: leaf.history[0].goal._seen_status)
         with pytest.raises(SystemExit):
             runner.shutdown()
         runner.shutdown()

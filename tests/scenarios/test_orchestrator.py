@@ -661,6 +661,59 @@ def test_a_stopped_orchestrator_takes_up_its_work_again(
     record.outcome = "both SUCCEEDED, exit code 0"
 
 
+STOPPED: dict[str, tuple[float, str | None, float, str]] = {
+    "feedback": (5.0, None, 2.0, "result: 60 s, feedback: 1 s"),
+    "accept": (2.0, "1:delay_accept=0.6", 2.0, "result: 60 s, accept: 1 s"),
+    "result": (2.0, None, 3.0, "result: 3 s"),
+    "lease": (8.0, None, 4.5, "result: 60 s"),
+}
+"""By what passes meanwhile: metres, a fault, seconds of SIGSTOP, deadlines."""
+
+
+@pytest.mark.parametrize(
+    "passed",
+    ["feedback", *(pytest.param(each, marks=pytest.mark.chaos) for each in [*STOPPED][1:])],
+)
+def test_an_orchestrator_that_was_stopped_leaves_a_goal_alone_that_is_well(
+    launch: Launch, serve: Serve, tree: Tree, name: str, passed: str, record: Record
+) -> None:
+    """SIGSTOP to the orchestrator until this deadline, or the server's lease, is over; SIGCONT"""
+    distance, fault, stopped, timeout = STOPPED[passed]
+    journal = serve(*[fault] if fault else [])
+    run = launch("run", str(tree(name, distance=distance, timeout=f"{{{timeout}}}")), "--verbose")
+    if passed == "accept":
+        run.line("sending a goal to")
+        journal.wait_for("received")
+    else:
+        run.line("executing on")
+        holds_for(lambda: True, 1.0)  # feedback comes, and leases are known
+    run.send(signal.SIGSTOP)
+    holds_for(lambda: True, stopped)
+    run.send(signal.SIGCONT)
+    assert run.wait() == 0, run
+    assert "late" not in str(run)
+    assert journal.events() == ["received", "accepted", "succeeded"]
+    record.outcome = "SUCCEEDED, not late; exit code 0"
+
+
+@pytest.mark.chaos
+def test_a_drain_that_was_stopped_takes_in_what_came_meanwhile(
+    launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
+) -> None:
+    """SIGTERM, and SIGSTOP until the goal is canceled and the drain's deadline over; SIGCONT"""
+    journal = serve("1:delay_cancel=1")
+    run = launch("run", str(tree(name)))
+    run.line("executing on")
+    run.send(signal.SIGTERM)
+    journal.wait_for("cancel_requested")
+    run.send(signal.SIGSTOP)
+    journal.wait_for("canceled")
+    holds_for(lambda: True, CANCEL + 2.0)
+    run.send(signal.SIGCONT)
+    assert run.wait() == 128 + signal.SIGTERM, run
+    record.outcome = "the goal's end is known; exit code 143"
+
+
 # The rest of the machine
 
 

@@ -132,12 +132,17 @@ TWO_RUNNERS = """
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.chaos)]
+    "number",
+    [
+        signal.SIGTERM,
+        pytest.param(signal.SIGHUP, marks=pytest.mark.chaos),
+        pytest.param(signal.SIGQUIT, marks=pytest.mark.chaos),
+    ],
 )
 def test_a_signal_that_ends_a_process_ends_the_goals_of_all_its_runners(
     host: Host, name: str, program: Callable[[str], Process], number: signal.Signals, record: Record
 ) -> None:
-    """One runner in run() on the main thread, one more that was started; SIGTERM or SIGHUP"""
+    """One runner in run() on the main thread, one more that was started; the signal named"""
     journals = [host.open(name), host.open(f"{name}_b")]
     process = program(TWO_RUNNERS)
     for _ in journals:
