@@ -16,6 +16,7 @@ class Deadlines:
     def __init__(self, now: Now) -> None:
         self._due: dict[Event, float] = {}
         self._ros_seen = now.ros
+        self._not_before = float("-inf")
 
     def arm(self, event: Event, seconds: float | None, now: Now) -> None:
         """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
@@ -32,11 +33,14 @@ class Deadlines:
 
     def left(self, now: Now) -> list[tuple[float, Event]]:
         """Return the seconds until each, the earliest first; negative where it has passed."""
-        return sorted(((self._left(event, now), event) for event in self._due), key=_seconds)
+        waits = sorted(((self._left(event, now), event) for event in self._due), key=_seconds)
+        held = self._not_before - now.steady
+        return [(max(left, held), event) for left, event in waits] if held > 0.0 else waits
 
     def take_passed(self, event: Event, now: Now) -> bool:
         """Whether this one is still set and has passed; it is forgotten then."""
-        if event not in self._due or self._left(event, now) > 0.0:
+        held = now.steady < self._not_before
+        if held or event not in self._due or self._left(event, now) > 0.0:
             return False
         del self._due[event]
         return True
@@ -47,9 +51,8 @@ class Deadlines:
             self._due[event] += seconds
 
     def hold(self, seconds: float, now: Now) -> None:
-        """Let none fall due within so many seconds."""
-        for event in self._due:
-            self._due[event] += max(0.0, seconds - self._left(event, now))
+        """Let none take effect within so many seconds of the steady clock."""
+        self._not_before = max(self._not_before, now.steady + seconds)
 
     def follow(self, now: Now) -> None:
         """Where the ROS clock has jumped back, let the deadlines on it jump with it."""

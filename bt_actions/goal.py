@@ -233,7 +233,7 @@ class Goal:
             self._deadlines.postpone(seconds)
 
     def hold(self, seconds: float, now: Now) -> None:
-        """Let no deadline take effect within so many seconds: what is awaited is on its way."""
+        """Let no deadline take effect for so many seconds: what is awaited may be on its way."""
         self._deadlines.hold(seconds, now)
 
     # Steps of the table: each decides, acts on the goal, and returns the next state
@@ -543,6 +543,11 @@ class Goal:
         self._asked_since += 1
         return self._asked_since > questions
 
+    @property
+    def _has_ended_by_status(self) -> bool:
+        """The status topic shows the end, and a question for the result since was in vain."""
+        return self._seen_status is not None and self._asked_since > 0
+
     def _finished_by_status(self) -> State:
         if self._seen_status is not None:
             self.end = ENDS[self._seen_status]
@@ -660,7 +665,7 @@ class Goal:
 
     def _cancel_due(self, now: Now, detail: Any) -> State:
         """The leaf has waited long enough; the questions go on, unless the status shows the end."""
-        if self._seen_status is not None:
+        if self._has_ended_by_status:
             return self._finished_by_status()
         self._settle_as_planned()
         self._ask(now)
@@ -669,7 +674,7 @@ class Goal:
     def _drained(self, now: Now, detail: Any) -> State:
         """Nobody waits any longer; what is not known by now is UNKNOWN, and may become known."""
         self.waited_for = True
-        if self._seen_status is not None:
+        if self._has_ended_by_status:
             return self._finished_by_status()
         self._settle_as_planned()
         if self.suspect:

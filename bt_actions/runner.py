@@ -176,7 +176,7 @@ class TreeRunner:
         Raises TimeoutError after `timeout` seconds, TreeError when a behaviour raised or the
         spin thread died (goals are drained first in each case), and RuntimeError on an executor's
         thread, in a second run at a time, or where nobody spins the node. On the main thread and
-        with a node of its own, SIGINT, SIGTERM, SIGHUP and SIGQUIT take effect after the drain.
+        with a node of its own, SIGINT, SIGTERM and SIGHUP take effect after the goals were drained.
         """
         from bt_actions.ros.spinning import on_executor_thread
 

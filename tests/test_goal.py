@@ -646,8 +646,29 @@ def test_an_end_that_the_status_shows_is_known_when_nobody_waits_any_longer(last
     life = executing()
     life.on(Event.INTERRUPTED)
     life.on(Event.STATUS, STATUS_CANCELED)
+    life.pass_time(ASK_AGAIN)
     life.on(last)
     life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+@pytest.mark.parametrize("last", [Event.CANCEL_DUE, Event.DRAINED])
+def test_a_result_that_nobody_has_asked_for_since_the_status_may_still_come(last: Event) -> None:
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.STATUS, STATUS_CANCELED)
+    life.on(last)
+    assert (life.goal.state, life.goal.end) == (State.CANCELING, End.UNKNOWN)
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.CANCELED, End.SUCCEEDED)
+
+
+def test_what_was_held_takes_effect_in_the_order_in_which_it_fell_due() -> None:
+    life = executing(Timeouts(result=3.0, feedback=2.0))
+    life.now = Now(life.now.steady + 4.0, life.now.ros + 4.0)
+    life.goal.hold(1.0, life.now)
+    life.pass_time(1.0)
+    life.on(Event.RESULT, ABORTED)
+    life.ended(Outcome.STALLED, End.ABORTED)
 
 
 def test_a_replaced_goal_that_is_interrupted_has_the_deadline_of_its_own_cancel() -> None:

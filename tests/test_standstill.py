@@ -26,30 +26,30 @@ def standstill() -> Standstill:
 
 def test_who_is_in_time_waits_for_nothing(standstill: Standstill) -> None:
     assert standstill.answers_take(10.2) == 0.0
-    assert not standstill.hides_servers(10.2)
+    assert not standstill.servers_take(10.2)
 
 
 def test_whoever_asks_first_notices(standstill: Standstill) -> None:
     end = 10.0 + STOOD_STILL + 0.1
     assert standstill.answers_take(end) == pytest.approx(ANSWERS_TAKE)
     assert standstill.answers_take(end + 0.4) == pytest.approx(ANSWERS_TAKE - 0.4)
-    assert not standstill.hides_servers(end), "no lease is so short"
+    assert not standstill.servers_take(end), "no lease is so short"
 
 
 def test_servers_are_hidden_where_a_lease_may_have_run_out(standstill: Standstill) -> None:
     end = 10.0 + OUT_OF_SIGHT + 0.1
-    assert standstill.hides_servers(end)
+    assert standstill.servers_take(end)
     moment = end
     while moment < end + BACK_IN_SIGHT - 0.2:
-        assert standstill.hides_servers(moment)
+        assert standstill.servers_take(moment)
         moment += 0.2
-    assert not standstill.hides_servers(end + BACK_IN_SIGHT)
+    assert not standstill.servers_take(end + BACK_IN_SIGHT)
 
 
 def test_a_rest_is_no_standstill(standstill: Standstill) -> None:
     standstill.rests()
     assert standstill.answers_take(99.0) == 0.0
-    assert not standstill.hides_servers(99.0)
+    assert not standstill.servers_take(99.0)
 
 
 def test_where_a_machine_is_never_in_time_what_is_due_takes_effect_all_the_same(
@@ -62,3 +62,13 @@ def test_where_a_machine_is_never_in_time_what_is_due_takes_effect_all_the_same(
     for _ in range(int(CALM / 0.2) + 1):
         standstill.lives(moment := moment + 0.2)
     assert standstill.answers_take(moment + 2.0), "once more, after a calm"
+
+
+def test_many_short_ones_use_up_nothing_of_what_a_long_one_is_granted(
+    standstill: Standstill,
+) -> None:
+    moment = 10.0
+    for _ in range(2 * IN_A_ROW):
+        standstill.lives(moment := moment + STOOD_STILL + 0.1)
+    assert not standstill.answers_take(moment + 0.1)
+    assert standstill.servers_take(moment + 3.5) == pytest.approx(BACK_IN_SIGHT)

@@ -16,6 +16,7 @@ from types import FrameType
 from typing import Any, Self
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_MAY_BE_IGNORED = (signal.SIGHUP, signal.SIGQUIT)
 
 
 _to_ignore: set[signal.Signals] = set()
@@ -31,7 +32,7 @@ def _ignore() -> None:
 class Signals:
     """Catches the signals that end a program, from `__enter__` to `__exit__`; main thread only.
 
-    SIGHUP stays ignored where the program was started so (nohup).
+    SIGHUP and SIGQUIT stay ignored where the program was started so (nohup, a shell's &).
     """
 
     def __init__(self) -> None:
@@ -47,7 +48,7 @@ class Signals:
     def __enter__(self) -> Self:
         self._wakeup_before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
         for number in _ENDING:
-            if number is signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
+            if number in _MAY_BE_IGNORED and signal.getsignal(number) is signal.SIG_IGN:
                 continue
             self._before[number] = signal.signal(number, _only_the_byte)
         return self

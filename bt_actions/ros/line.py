@@ -29,6 +29,7 @@ from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for
 from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
+from bt_actions.standstill import STOOD_STILL
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
 
@@ -215,7 +216,9 @@ class Line:
                 if goal.due_in(now) == 0.0:
                     self.pump()
                     now = self.traffic.clocks.now()
-                    goal.hold(standstill.answers_take(now.steady), now)
+                    waits_for_server = goal.state is State.WAITING_FOR_SERVER
+                    take = standstill.servers_take if waits_for_server else standstill.answers_take
+                    goal.hold(take(now.steady), now)
                 self._apply(ticket, lambda _: goal.poll(now), None)
 
     def mind(self, ticket: Ticket) -> None:
@@ -517,7 +520,8 @@ class Line:
             self._orphan()
             return Server.ABSENT
         if self.watch.is_crowded:  # what answers came in time count, though nobody spun the node
-            if standstill.answers_take(time.monotonic()):
+            late = self._look_at and now - self._look_at > STOOD_STILL
+            if late or standstill.answers_take(time.monotonic()):
                 self.watch.stood_still(now)
             self.pump()
             if self.client.closed:  # by what came, and nobody used the line
@@ -534,7 +538,7 @@ class Line:
             self._probe()
         for ticket in list(self.goals.values()):
             gone = self.watch.gone(now, ticket.testimony.sent_to)
-            hidden = now < ticket.not_gone_before or standstill.hides_servers(time.monotonic())
+            hidden = now < ticket.not_gone_before or standstill.servers_take(time.monotonic()) > 0.0
             if gone and hidden:
                 continue  # it has not been discovered yet, though its status may have come already
             if ticket.goal.sent:
@@ -593,7 +597,8 @@ class Line:
             if ticket.goal.outcome is None:
                 self.tell(ticket, Event.INTERRUPTED)
         patience = max((each.goal.drains_within for each in self.goals.values()), default=0.0)
-        if time.monotonic() - self._heard_at > max(SILENT_FOR, patience):
+        silent = time.monotonic() - self._heard_at > max(SILENT_FOR, patience)
+        if silent and not standstill.answers_take(time.monotonic()):
             self.put_away(all_of_them=True)  # from here nobody can see whether the server is gone
 
     def attend(self, now: float) -> float:

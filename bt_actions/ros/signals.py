@@ -28,8 +28,9 @@ from rclpy.utilities import get_default_context
 
 from bt_actions.ros.alive import is_open
 
-_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
-_ENDING = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
+_ENDING = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 _OPTIONS = {
     frozenset({signal.SIGINT, signal.SIGTERM}): SignalHandlerOptions.ALL,

@@ -330,8 +330,8 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
 
 def _may_wait(deadline: float) -> bool:
     """Whether there is time left; where this process stood still, for what is about to arrive."""
-    now = time.monotonic()
     with lock:
+        now = time.monotonic()
         return now < deadline or standstill.answers_take(now) > 0.0
 
 

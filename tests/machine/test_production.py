@@ -47,7 +47,7 @@ MISTAKES: dict[str, tuple[type, str, Callable[..., Any]]] = {
     "remembers nothing that is lost": (Domain, "keep_lost", lambda self, *lost: None),
     "takes who is not in sight yet for lost": (
         Standstill,
-        "hides_servers",
+        "servers_take",
         lambda self, now: False,
     ),
     "takes what has not come in yet for late": (Standstill, "answers_take", lambda self, now: 0.0),

@@ -601,7 +601,7 @@ class TestDeadlines:
         self, serve: Any, name: str, run: Run
     ) -> None:
         serve("1:drop_result=1000")
-        timeouts = Timeouts(result=1.5, cancel=0.7)
+        timeouts = Timeouts(result=1.5, cancel=1.5)
         leaf = run(MoveRobot("m", 9.0, action_name=name, timeout=timeouts, retry=Retry(2)))
         first = leaf.history[0]
         assert (first.outcome, first.end) == (Outcome.RESULT_TIMEOUT, End.CANCELED)

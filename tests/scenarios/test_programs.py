@@ -136,7 +136,6 @@ TWO_RUNNERS = """
     [
         signal.SIGTERM,
         pytest.param(signal.SIGHUP, marks=pytest.mark.chaos),
-        pytest.param(signal.SIGQUIT, marks=pytest.mark.chaos),
     ],
 )
 def test_a_signal_that_ends_a_process_ends_the_goals_of_all_its_runners(

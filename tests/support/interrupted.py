@@ -23,7 +23,7 @@ from bt_actions.ros.signals import ended_by_signals
 
 def handlers() -> object:
     """Return what is in force for the signals that end a process."""
-    ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+    ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     return [signal.getsignal(number) for number in ending], get_current_signal_handlers_options()
 
 
