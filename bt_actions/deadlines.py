@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from bt_actions.goal_terms import ON_ROS_CLOCK, Event, Now
 
+HELD_AT_MOST = 30.0
+"""Seconds for which deadlines are held, one time after the other, until one must take effect."""
+
 
 class Deadlines:
     """Moments by which something must have happened, each named by the event that it is if not."""
@@ -17,10 +20,12 @@ class Deadlines:
         self._due: dict[Event, float] = {}
         self._ros_seen = now.ros
         self._not_before = float("-inf")
+        self._held = 0.0  # seconds in all, since one was armed
 
     def arm(self, event: Event, seconds: float | None, now: Now) -> None:
         """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
         if seconds is not None:
+            self._held = 0.0
             self._due[event] = (now.ros if event in ON_ROS_CLOCK else now.steady) + seconds
 
     def disarm(self, event: Event) -> None:
@@ -51,8 +56,14 @@ class Deadlines:
             self._due[event] += seconds
 
     def hold(self, seconds: float, now: Now) -> None:
-        """Let none take effect within so many seconds of the steady clock."""
-        self._not_before = max(self._not_before, now.steady + seconds)
+        """Let none take effect within so many seconds of the steady clock, `HELD_AT_MOST` in all.
+
+        A deadline that is armed since is news, with which that begins anew.
+        """
+        if self._held + seconds > HELD_AT_MOST:
+            seconds = 0.0
+        self._held += seconds
+        self._not_before = now.steady + seconds
 
     def follow(self, now: Now) -> None:
         """Where the ROS clock has jumped back, let the deadlines on it jump with it."""

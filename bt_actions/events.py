@@ -24,7 +24,7 @@ class TreeStarted:
 
 @dataclass(frozen=True, slots=True)
 class NodeChanged:
-    """A node of the tree has another status, or was ticked anew."""
+    """A node of the tree has another status."""
 
     time: float
     path: tuple[str, ...]

@@ -105,7 +105,8 @@ class Goal:
         self._judged_before = False  # and its server was lost since
         self._doubts = 0
         self._seen_status: int | None = None  # terminal, from the status topic
-        self._asked_since = 0  # questions for the result since then
+        self._asked_since = 0  # questions for the result since then, in vain,
+        self._first_asked = 0.0  # and when the first of them was asked
         self._asked = 0  # in a row, of a server that has it and does not say that it has ended
         self._commands: list[Command] = []
         self._deadlines = Deadlines(now)
@@ -302,7 +303,8 @@ class Goal:
 
     def _invalid(self, now: Now, detail: Any) -> State:
         """Give up: INVALID_GOAL."""
-        return self._give_up_unsent(Outcome.INVALID_GOAL, str(detail))
+        bare = isinstance(detail, KeyError) or not str(detail)  # KeyError("x") says 'x' only
+        return self._give_up_unsent(Outcome.INVALID_GOAL, repr(detail) if bare else str(detail))
 
     def _withdraw(self, now: Now, detail: Any) -> State:
         """Give up: CANCELED; nothing was sent."""
@@ -311,6 +313,7 @@ class Goal:
     def _send(self, now: Now, detail: Any) -> State:
         """Send it; until the server says how it ended, its end is UNKNOWN."""
         self._deadlines.disarm(Event.SERVER_DUE)
+        self._deadlines.hold(0.0, now)  # it was for a server that is out of sight
         self._deadlines.arm(Event.ACCEPT_DUE, self.timeouts.accept, now)
         self._sent = True
         self.end = End.UNKNOWN
@@ -448,7 +451,7 @@ class Goal:
 
     def _ask_for_lost_result(self, now: Now, detail: Any) -> State:
         """Ask again; after several questions believe the status, or go on asking."""
-        if self._result_seems_lost(RESULT_QUESTIONS):
+        if self._result_seems_lost(now, RESULT_QUESTIONS):
             self._settle_as_planned()
             self._settle(Outcome.SERVER_LOST, f"{self.server} finished, but gave no result")
             return self._finished_by_status()
@@ -531,22 +534,19 @@ class Goal:
 
     def _ask_again(self, now: Now, detail: Any) -> State:
         """Ask again, cancel and result; after several questions believe the status."""
-        if self._result_seems_lost(DOUBTS):
+        if self._result_seems_lost(now, DOUBTS):
             return self._finished_by_status()
         self._ask(now)
         return State.CANCELING
 
-    def _result_seems_lost(self, questions: int) -> bool:
+    def _result_seems_lost(self, now: Now, questions: int) -> bool:
         """The status topic showed the end; has the result been asked for often enough since?"""
         if self._seen_status is None:
             return False
+        if self._asked_since == 0:
+            self._first_asked = now.steady
         self._asked_since += 1
         return self._asked_since > questions
-
-    @property
-    def _has_ended_by_status(self) -> bool:
-        """The status topic shows the end, and a question for the result since was in vain."""
-        return self._seen_status is not None and self._asked_since > 0
 
     def _finished_by_status(self) -> State:
         if self._seen_status is not None:
@@ -665,16 +665,22 @@ class Goal:
 
     def _cancel_due(self, now: Now, detail: Any) -> State:
         """The leaf has waited long enough; the questions go on, unless the status shows the end."""
-        if self._has_ended_by_status:
+        if self._seen_status is None:
+            self._settle_as_planned()
+            self._ask(now)
+            return State.CANCELING
+        if self._asked_since == 0:
+            self._ask_again(now, detail)
+        left = self._first_asked + ASK_AGAIN - now.steady
+        if left <= 0.0:
             return self._finished_by_status()
-        self._settle_as_planned()
-        self._ask(now)
+        self._deadlines.arm(Event.CANCEL_DUE, left, now)  # the result itself tells more
         return State.CANCELING
 
     def _drained(self, now: Now, detail: Any) -> State:
         """Nobody waits any longer; what is not known by now is UNKNOWN, and may become known."""
         self.waited_for = True
-        if self._has_ended_by_status:
+        if self._asked_since > 0:
             return self._finished_by_status()
         self._settle_as_planned()
         if self.suspect:

@@ -344,9 +344,10 @@ class TreeRunner:
             self._shutting_down.release()
 
     def _take_down(self) -> None:
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
+        thread = self._thread
+        if thread is not None:
+            thread.join()
+            self._thread = None  # also where wait() has done so meanwhile
             if isinstance(self._outcome, BaseException):  # and nobody has called wait()
                 _error(f"the tree that was started raised {self._outcome!r}")
         try:

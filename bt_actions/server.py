@@ -142,7 +142,8 @@ class ServerWatch:
             return Server.ABSENT
         if self._crowded_since is None:
             return Server.READY
-        if self._both_answered or now - self._crowded_since > LEASE:
+        no_ghost = now - self._crowded_since > LEASE and now >= self._not_alone_before
+        if self._both_answered or no_ghost:
             return Server.AMBIGUOUS
         return Server.READY if self.alone else Server.SETTLING
 

@@ -2,61 +2,51 @@
 
 When it goes on, what was sent to it meanwhile is still on its way in, and a server whose lease has
 run out here is out of sight until it announces itself again. So for a moment nobody may conclude
-anything from what is missing. No ROS, no thread, no clock of its own, and it decides nothing.
+anything from what is missing. No ROS, no thread, no clock of its own, and it decides nothing; where
+a machine is never in time, whoever asks must come to an end all the same (`AT_MOST`).
 """
 
 from __future__ import annotations
 
-STOOD_STILL = 0.5
+STOOD_STILL = 0.3
 """Seconds without a sign of life,"""
 ANSWERS_TAKE = 1.0
-"""and seconds until what was sent meanwhile has come in."""
+"""and seconds, at most, until what was sent meanwhile has come in: twice as long as it stood still,
+if that is less."""
 OUT_OF_SIGHT = 1.5
 """Seconds without a sign of life from which on a lease may have run out: none that is useful is
 shorter than 3 s, and each is renewed long before its end;"""
 BACK_IN_SIGHT = 4.0
 """and seconds until all are in sight again: Fast DDS announces a process every 3 s or sooner."""
-IN_A_ROW = 20
-"""So many standstills count, with less than `CALM` seconds of life between them: where a machine is
-never in time, what is due must take effect all the same."""
-CALM = 5.0
+AT_MOST = 20
+"""So many standstills in a row are borne with by whoever has nothing else to go by."""
 NEVER = float("-inf")
 
 
-class _Grace:
-    """How long something is borne with after standstills of a certain length."""
-
-    def __init__(self, longer_than: float, seconds: float) -> None:
-        self._longer_than, self._seconds = longer_than, seconds
-        self._until = self._last = NEVER
-        self._in_a_row = 0
-
-    def stood_still(self, seconds: float, now: float) -> None:
-        if seconds <= self._longer_than:
-            return
-        self._in_a_row = self._in_a_row + 1 if now - seconds - self._last < CALM else 1
-        self._last = now
-        if self._in_a_row <= IN_A_ROW:
-            self._until = now + self._seconds
-
-    def left(self, now: float) -> float:
-        return max(0.0, self._until - now)
-
-
 class Standstill:
-    """What is to be borne with, after standstills, at any moment (seconds of the steady clock)."""
+    """What is to be borne with, after standstills, at any moment (seconds of the steady clock).
+
+    Who asks lives: a question is a sign of life, too.
+    """
 
     def __init__(self) -> None:
+        self.times = 0
+        """How often this process stood still;"""
+        self.long_times = 0
+        """and how often for so long that who sees it may have lost sight of it, too."""
         self._lived_at: float | None = None
-        self._answers = _Grace(STOOD_STILL, ANSWERS_TAKE)
-        self._servers = _Grace(OUT_OF_SIGHT, BACK_IN_SIGHT)
+        self._answers_by = self._servers_by = NEVER
 
     def lives(self, now: float) -> None:
         """Take a sign of life; there are to be several a second."""
         still = 0.0 if self._lived_at is None else now - self._lived_at
         self._lived_at = now
-        self._answers.stood_still(still, now)
-        self._servers.stood_still(still, now)
+        if still > STOOD_STILL:
+            self.times += 1
+            self._answers_by = max(self._answers_by, now + min(2 * still, ANSWERS_TAKE))
+        if still > OUT_OF_SIGHT:
+            self.long_times += 1
+            self._servers_by = now + BACK_IN_SIGHT
 
     def rests(self) -> None:
         """There will be no sign of life for a while, which means nothing."""
@@ -64,10 +54,10 @@ class Standstill:
 
     def answers_take(self, now: float) -> float:
         """Return for how many seconds answers may still be coming in that came in time; or 0."""
-        self.lives(now)  # whoever asks may be the first to run again
-        return self._answers.left(now)
+        self.lives(now)  # it may be the first to run again
+        return max(0.0, self._answers_by - now)
 
     def servers_take(self, now: float) -> float:
         """Return for how many seconds a server may be out of sight that is there; or 0."""
         self.lives(now)
-        return self._servers.left(now)
+        return max(0.0, self._servers_by - now)

@@ -14,7 +14,7 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +57,7 @@ def _not_deaf_to_signals() -> None:
     for number, handler in (
         (signal.SIGINT, signal.default_int_handler),
         (signal.SIGHUP, signal.SIG_DFL),
+        (signal.SIGQUIT, signal.SIG_DFL),
     ):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)
@@ -157,8 +158,8 @@ def start_program(domain: int, no_leaks: None) -> Iterator[Callable[..., Process
 
     processes: list[Process] = []
 
-    def start(*arguments: str, prefix: Sequence[str] = ()) -> Process:
-        processes.append(Process(arguments, prefix=prefix))
+    def start(*arguments: str, **more: Any) -> Process:
+        processes.append(Process(arguments, **more))
         return processes[-1]
 
     yield start

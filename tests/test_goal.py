@@ -12,6 +12,7 @@ import pytest
 
 import bt_actions.deadlines
 import bt_actions.goal
+from bt_actions.deadlines import HELD_AT_MOST
 from bt_actions.goal import (
     ASK_AGAIN,
     ASK_IN_ANY_CASE,
@@ -304,6 +305,13 @@ def test_a_message_that_cannot_be_built_is_not_sent() -> None:
     life.on(Event.INVALID, "no variable $pick_at")
     life.ended(Outcome.INVALID_GOAL, End.NEVER_STARTED)
     assert life.goal.reason == "no variable $pick_at"
+
+
+@pytest.mark.parametrize("error", [KeyError("pick_at"), ValueError()])
+def test_an_error_that_says_little_by_itself_is_named(error: Exception) -> None:
+    life = waiting()
+    life.on(Event.INVALID, error)
+    assert life.goal.reason == repr(error)
 
 
 def test_a_request_that_does_not_leave_started_nothing() -> None:
@@ -647,6 +655,7 @@ def test_an_end_that_the_status_shows_is_known_when_nobody_waits_any_longer(last
     life.on(Event.INTERRUPTED)
     life.on(Event.STATUS, STATUS_CANCELED)
     life.pass_time(ASK_AGAIN)
+    life.pass_time(ASK_AGAIN)
     life.on(last)
     life.ended(Outcome.CANCELED, End.CANCELED)
 
@@ -662,10 +671,59 @@ def test_a_result_that_nobody_has_asked_for_since_the_status_may_still_come(last
     life.ended(Outcome.CANCELED, End.SUCCEEDED)
 
 
+@pytest.mark.parametrize("asked", ["at that moment", "just before"])
+def test_a_question_for_a_result_has_time_to_be_answered_at_the_end_of_the_wait(asked: str) -> None:
+    life = executing(Timeouts(result=3.0, cancel=2.0))
+    life.pass_time(3.0)
+    life.on(Event.STATUS, STATUS_SUCCEEDED)
+    if asked == "just before":
+        life.pass_time(1.9)
+        life.pass_time(0.1)
+    else:
+        life.pass_time(2.0)  # nobody polled between: the question and the verdict are due in one
+    assert life.goal.outcome is None
+    life.on(Event.RESULT, SUCCEEDED)
+    life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
+    assert life.goal.late
+
+
+def test_who_owes_a_result_at_the_end_of_the_wait_is_given_one_question_and_no_more() -> None:
+    life = executing(Timeouts(result=3.0, cancel=2.0))
+    life.pass_time(3.0)
+    life.on(Event.STATUS, STATUS_CANCELED)
+    life.pass_time(2.0)
+    life.pass_time(ASK_AGAIN)
+    life.ended(Outcome.RESULT_TIMEOUT, End.CANCELED)
+
+
+def test_what_was_held_for_a_server_out_of_sight_does_not_hold_up_its_answer() -> None:
+    life = waiting()
+    life.goal.hold(4.0, life.now)
+    life.on(Event.SERVER_READY)
+    assert life.goal.deadline(life.now) == (Event.ACCEPT_DUE, LIMITS.accept)
+
+
+def test_what_is_held_again_and_again_takes_effect_in_the_end_unless_there_is_news() -> None:
+    life = executing(Timeouts(feedback=2.0))
+
+    def held() -> list[Command]:
+        life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
+        life.goal.hold(1.0, life.now)
+        return life.pass_time(0.0)
+
+    for _ in range(2):
+        assert [held() for _ in range(int(HELD_AT_MOST))] == [[]] * int(HELD_AT_MOST)
+        life.on(Event.FEEDBACK, "at last")
+    for _ in range(int(HELD_AT_MOST)):
+        assert held() == []
+    assert CANCEL in held()
+
+
 def test_what_was_held_takes_effect_in_the_order_in_which_it_fell_due() -> None:
     life = executing(Timeouts(result=3.0, feedback=2.0))
     life.now = Now(life.now.steady + 4.0, life.now.ros + 4.0)
     life.goal.hold(1.0, life.now)
+    assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, 1.0)
     life.pass_time(1.0)
     life.on(Event.RESULT, ABORTED)
     life.ended(Outcome.STALLED, End.ABORTED)

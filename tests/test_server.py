@@ -206,3 +206,12 @@ def test_after_a_standstill_of_ours_answers_have_time_to_come_in(watch: ServerWa
         assert watch.state(now) is Server.SETTLING
     watch.observe(late + SETTLED_AFTER, True, gids(OLD, NEW))
     assert watch.state(late + SETTLED_AFTER) is Server.READY
+
+
+def test_a_ghost_that_a_standstill_has_hidden_has_a_moment_to_go(watch: ServerWatch) -> None:
+    crowd(watch)
+    late = 1.0 + LEASE + 10.0
+    watch.stood_still(late)
+    watch.observe(late, True, gids(OLD, NEW))
+    assert watch.state(late) is Server.SETTLING
+    assert watch.state(late + SETTLED_AFTER) is Server.AMBIGUOUS

@@ -1,4 +1,4 @@
-"""When a process that stood still must not conclude anything from what is missing."""
+"""What a process may not conclude, and for how long, after it stood still."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import pytest
 from bt_actions.standstill import (
     ANSWERS_TAKE,
     BACK_IN_SIGHT,
-    CALM,
-    IN_A_ROW,
     OUT_OF_SIGHT,
     STOOD_STILL,
     Standstill,
@@ -17,11 +15,11 @@ from bt_actions.standstill import (
 
 @pytest.fixture
 def standstill() -> Standstill:
-    """Of a process that has lived until second 10."""
-    made = Standstill()
-    for tenth in range(101):
-        made.lives(tenth / 10)
-    return made
+    """Of a process that has lived for 10 seconds."""
+    alive = Standstill()
+    for moment in range(101):
+        alive.lives(moment / 10)
+    return alive
 
 
 def test_who_is_in_time_waits_for_nothing(standstill: Standstill) -> None:
@@ -30,19 +28,32 @@ def test_who_is_in_time_waits_for_nothing(standstill: Standstill) -> None:
 
 
 def test_whoever_asks_first_notices(standstill: Standstill) -> None:
-    end = 10.0 + STOOD_STILL + 0.1
+    end = 10.0 + ANSWERS_TAKE
     assert standstill.answers_take(end) == pytest.approx(ANSWERS_TAKE)
-    assert standstill.answers_take(end + 0.4) == pytest.approx(ANSWERS_TAKE - 0.4)
+    assert standstill.answers_take(end + 0.2) == pytest.approx(ANSWERS_TAKE - 0.2)
     assert not standstill.servers_take(end), "no lease is so short"
+    assert (standstill.times, standstill.long_times) == (1, 0)
+
+
+def test_a_short_one_takes_no_more_than_twice_its_time(standstill: Standstill) -> None:
+    still = STOOD_STILL + 0.1
+    assert standstill.answers_take(10.0 + still) == pytest.approx(2 * still)
+
+
+def test_a_short_one_takes_nothing_from_the_grace_of_a_long_one(standstill: Standstill) -> None:
+    standstill.lives(20.0)
+    assert standstill.answers_take(20.31) == pytest.approx(ANSWERS_TAKE - 0.31)
 
 
 def test_servers_are_hidden_where_a_lease_may_have_run_out(standstill: Standstill) -> None:
     end = 10.0 + OUT_OF_SIGHT + 0.1
     assert standstill.servers_take(end)
+    assert standstill.long_times == 1
     moment = end
-    while moment < end + BACK_IN_SIGHT - 0.2:
-        assert standstill.servers_take(moment)
+    while moment + 0.2 < end + BACK_IN_SIGHT:
         moment += 0.2
+        assert standstill.servers_take(moment)
+        assert bool(standstill.answers_take(moment)) == (moment < end + ANSWERS_TAKE)
     assert not standstill.servers_take(end + BACK_IN_SIGHT)
 
 
@@ -50,25 +61,14 @@ def test_a_rest_is_no_standstill(standstill: Standstill) -> None:
     standstill.rests()
     assert standstill.answers_take(99.0) == 0.0
     assert not standstill.servers_take(99.0)
+    assert standstill.times == 0
 
 
-def test_where_a_machine_is_never_in_time_what_is_due_takes_effect_all_the_same(
-    standstill: Standstill,
-) -> None:
-    moment, held = 10.0, 0
-    while standstill.answers_take(moment := moment + 2.0):
-        held += 1
-    assert held == IN_A_ROW
-    for _ in range(int(CALM / 0.2) + 1):
-        standstill.lives(moment := moment + 0.2)
-    assert standstill.answers_take(moment + 2.0), "once more, after a calm"
-
-
-def test_many_short_ones_use_up_nothing_of_what_a_long_one_is_granted(
+def test_many_of_them_use_up_nothing_of_what_the_next_one_is_granted(
     standstill: Standstill,
 ) -> None:
     moment = 10.0
-    for _ in range(2 * IN_A_ROW):
-        standstill.lives(moment := moment + STOOD_STILL + 0.1)
-    assert not standstill.answers_take(moment + 0.1)
-    assert standstill.servers_take(moment + 3.5) == pytest.approx(BACK_IN_SIGHT)
+    for _ in range(100):
+        standstill.lives(moment := moment + OUT_OF_SIGHT + 0.1)
+    assert standstill.answers_take(moment + 3.0) == ANSWERS_TAKE
+    assert standstill.servers_take(moment + 3.0) == BACK_IN_SIGHT

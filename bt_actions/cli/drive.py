@@ -145,7 +145,7 @@ class Drive:
                 self._show(self._view.frame)
                 drawn = now
             wait = max(0.0, drawn + FRAME - now)
-            if deadline is not None and self._stop is None:
+            if deadline is not None:
                 wait = min(wait, max(0.0, deadline - now))
             received, ready = self._signals.wait(
                 wait, readable=self._view.fileno, writable=self._watched
@@ -234,12 +234,17 @@ class Drive:
             self._take_events()
 
     def _await_readers(self) -> None:
-        """Let who reads slowly get everything; a signal, or the --timeout, ends the wait."""
+        """Let who reads slowly get everything; a signal, or the --timeout, ends the wait.
+
+        Not a --timeout that has passed before, while the tree was shut down.
+        """
         if self._output is None:
             return
         until = self._deadline if self._stop is None else None
         if self._abandoned:
             until = self._clock() + PATIENCE_WHEN_LEFT
+        elif until is not None and until <= self._clock():
+            until = None
         while not self._all_is_written(self._output):
             now = self._clock()
             again = self._stop is None or now - self._stop.at > SAME_WISH

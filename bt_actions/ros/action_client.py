@@ -33,6 +33,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
+from bt_actions.hearing import Hearing
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 
@@ -115,6 +116,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         self._result_requests: dict[int, _Question] = {}
         self._cancel_requests: dict[int, _Question] = {}
         self._inbox: deque[tuple[str, Any, Any]] = deque()
+        self.hearing = Hearing()
+        """Under the one lock, as all requests."""
         self._closed = False
         self._impl = action_type.Impl  # before rclpy's part: the executor may take at once
         services = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
@@ -141,7 +144,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request.goal = goal
         with self._lock:
             number = self._client_handle.send_goal_request(request)
-            self._goal_requests[number] = _Question(goal_id)
+            self._goal_requests[number] = question = _Question(goal_id)
+            self.hearing.asked(question.asked)
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result; every accepted goal must be asked for, or the server keeps it."""
@@ -153,18 +157,20 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request.goal_info.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
             number = self._client_handle.send_cancel_request(request)
-            self._keep(self._cancel_requests, number, _Question(goal_id))
+            self._keep(self._cancel_requests, number, question := _Question(goal_id))
+            self.hearing.asked(question.asked)
 
     def probe(self, probe: int, random_id: bytes) -> None:
         """Ask for a goal that nobody knows: each live server answers once, with status 0."""
-        self._ask_result(random_id, probe)
+        self.hearing.asked(self._ask_result(random_id, probe))
 
-    def _ask_result(self, goal_id: bytes, about: bytes | int) -> None:
+    def _ask_result(self, goal_id: bytes, about: bytes | int) -> float:
         request = self._impl.GetResultService.Request()
         request.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
             number = self._client_handle.send_result_request(request)
-            self._keep(self._result_requests, number, _Question(about))
+            self._keep(self._result_requests, number, question := _Question(about))
+        return question.asked
 
     @staticmethod
     def _keep(filed: dict[int, _Question], number: int, question: _Question) -> None:
@@ -259,7 +265,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         if question is None or len(question.answers) >= ANSWERS_KEPT:
             return
         if isinstance(question.about, int):
-            self._inbox.append(("probe", question.about, None))
+            self._inbox.append(("probe", question.about, (question.asked,)))
             return
         question.answers.append(answer)
         self._inbox.append((kind, question.about, (question.asked, tuple(question.answers))))
@@ -281,6 +287,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
 
     def _tell(self, kind: str, about: Any, detail: Any) -> None:
         tell = self._listener
+        if kind in ("goal", "result", "cancel", "probe"):
+            self.hearing.answered(asked=detail[0])
         if kind == "feedback":
             tell.feedback_came(about, detail)
         elif kind == "goal":

@@ -28,6 +28,7 @@ from bt_actions.goal_ids import Author, author_of
 from bt_actions.goal_terms import ENDS
 from bt_actions.policy import End
 from bt_actions.ros.graph import servers
+from bt_actions.standstill import AT_MOST, Standstill
 
 STATUS = "/_action/status"
 ASK_AGAIN = 1.0
@@ -106,10 +107,13 @@ def cleanup(
         here = node.get_name(), node.get_namespace()  # remapped, as that of the run will be
         sweep.unanswered = {expand_topic_name(name, *here) for name in wanted}
         began, waits = time.monotonic(), False
-        looked = began + look
+        looked, still = began + look, Standstill()
         while True:
             now = time.monotonic()
             looked = max(looked, sweep.newest + SETTLE)
+            held = max(still.answers_take(now), still.servers_take(now))
+            if held > 0.0 and still.times <= AT_MOST:  # what there is may not be in sight again
+                looked = max(looked, now + held)
             lacks = sorted(sweep.unanswered)
             if lacks and now >= looked and not waits:
                 waits = True

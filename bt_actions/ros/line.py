@@ -21,7 +21,6 @@ from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
-from bt_actions.ros.alarm import standstill
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.graph import servers
 from bt_actions.ros.interfaces import interface_name
@@ -29,7 +28,7 @@ from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for
 from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
-from bt_actions.standstill import STOOD_STILL
+from bt_actions.standstill import ANSWERS_TAKE, AT_MOST
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
 
@@ -42,6 +41,8 @@ LOOK_WHILE_LOST = 1.0
 PUMP_EVERY = 0.01
 """Seconds between two looks of the alarm at a server: somebody waits for it; goals run on it; only
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
+LATE = 0.5
+"""Seconds by which a look is so late that answers may have come in between, unseen."""
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
 SILENT_FOR = 40.0
@@ -76,6 +77,7 @@ class Line:
         self._sight: Sight | None = None  # where the client lives if our node was blind to it
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
+        self._long_standstills = alarm.standstill.long_times
         self.in_sight_since = time.monotonic()
         """Since when a server of this name has been shown without a break that was seen."""
         self._just_came = True
@@ -216,15 +218,30 @@ class Line:
                 if goal.due_in(now) == 0.0:
                     self.pump()
                     now = self.traffic.clocks.now()
-                    waits_for_server = goal.state is State.WAITING_FOR_SERVER
-                    take = standstill.servers_take if waits_for_server else standstill.answers_take
-                    goal.hold(take(now.steady), now)
+                    held = alarm.standstill.answers_take(now.steady)
+                    if goal.state is State.WAITING_FOR_SERVER:
+                        held = max(held, alarm.standstill.servers_take(now.steady))
+                    elif self.in_doubt(now.steady):
+                        held = max(held, LOOK_WHILE_RUNNING)
+                    goal.hold(held, now)
                 self._apply(ticket, lambda _: goal.poll(now), None)
+
+    def in_doubt(self, now: float) -> float:
+        """Return for how many seconds a server that is silent may not have heard us; or 0."""
+        return 0.0 if self._is_absent(now) else self.client.hearing.in_doubt(now)
+
+    @staticmethod
+    def given_up(ticket: Ticket) -> bool:
+        """Whether whoever began it has given it up; not where all stood still: a tick may return.
+
+        In this order: to ask is to give up.
+        """
+        return not alarm.standstill.answers_take(time.monotonic()) and ticket.given_up
 
     def mind(self, ticket: Ticket) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""
         try:
-            if ticket.given_up and not standstill.answers_take(time.monotonic()):
+            if self.given_up(ticket):
                 self.tell(ticket, Event.INTERRUPTED)
             self.poll(ticket)
         except Exception as error:  # noqa: BLE001 - a mistake of ours: any
@@ -354,8 +371,9 @@ class Line:
     def misses(self) -> bool:
         """Whether a server is wanted that may be there, though nothing shows all of it.
 
-        Not while answers may be under way: in a second, what runs on an absent server is lost. And
-        not where remapping rules give our node another server than a new participant would find.
+        Or it is shown, and does not answer. Not while answers may be under way: in a second, what
+        runs on an absent server is lost. And not where remapping rules give our node another server
+        than a new participant would find.
         """
         now = time.monotonic()
         if self.orphaned or not self.goals or self._remapped:
@@ -366,10 +384,16 @@ class Line:
             return False  # nobody here wants it; it is remembered, as what is put away is
         domain = self.traffic.domain
         known = domain.lost_sight or (self.name, self.action_type) in domain.known
-        absent = self.watch.state(now) is Server.ABSENT
         running = (State.SENDING, State.EXECUTING)
         still = all(ticket.goal.state not in running for ticket in self.goals.values())
-        return known and absent and still
+        return (known and self._is_absent(now) and still) or self._is_mute(now)
+
+    def _is_absent(self, now: float) -> bool:
+        return self.watch.state(now) is Server.ABSENT
+
+    def _is_mute(self, now: float) -> bool:
+        """Whether a server is in sight that has not answered for long; once it was found why."""
+        return self._sight is None and not self._is_absent(now) and self.client.hearing.is_mute(now)
 
     def is_waited_for(self) -> bool:
         """Whether a goal is still to be sent."""
@@ -379,14 +403,34 @@ class Line:
         """Return a client like our own in another participant."""
         return ActionClient(sight.node, self.action_type, self.name, self)
 
+    def prefers(self, client: ActionClient) -> bool:
+        """Whether this client, which is ready, is heard where our own is not, or sees the server.
+
+        A server that answers nobody now is busy; to go on with another client would not help.
+        """
+        if self._is_absent(time.monotonic()):
+            return True
+        client.pump()
+        hearing = client.hearing
+        if not (hearing.heard or hearing.asks) or hearing.wants_question(time.monotonic()):
+            client.probe(next(_probes), uuid.uuid4().bytes)
+        return hearing.heard
+
     def move_to(self, sight: Sight, client: ActionClient) -> None:
         """Go on with a client in a participant that sees the server; the alarm takes its answers.
 
-        Nothing that matters is under way in the old one: see `misses`.
+        What is under way in the old one is not heard there, see `misses`, and is asked anew.
         """
         sight.users.add(self)
+        blind = self._is_absent(time.monotonic())
         self._go_on_with(client, sight)
-        log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
+        if blind:
+            log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
+            return
+        log.info(f"{self.name}: does not hear this node any more; a new one is heard")
+        for ticket in list(self.goals.values()):
+            ticket.goal.hold(ANSWERS_TAKE, self.traffic.clocks.now())
+            self.tell(ticket, Event.SERVER_CHANGED)
 
     def _go_on_with(self, client: ActionClient, sight: Sight | None) -> None:
         self.close()
@@ -520,8 +564,8 @@ class Line:
             self._orphan()
             return Server.ABSENT
         if self.watch.is_crowded:  # what answers came in time count, though nobody spun the node
-            late = self._look_at and now - self._look_at > STOOD_STILL
-            if late or standstill.answers_take(time.monotonic()):
+            late = self._look_at and now - self._look_at > LATE
+            if late or alarm.standstill.answers_take(time.monotonic()):
                 self.watch.stood_still(now)
             self.pump()
             if self.client.closed:  # by what came, and nobody used the line
@@ -534,12 +578,14 @@ class Line:
             return Server.ABSENT
         self._adopt()
         self._take_over(now)
-        if self.watch.wants_probe(now):
+        if alarm.standstill.long_times != self._long_standstills:
+            self._long_standstills = alarm.standstill.long_times
+            self.client.hearing.doubt(now)
+        if self.watch.wants_probe(now) or self.client.hearing.wants_question(now):
             self._probe()
         for ticket in list(self.goals.values()):
             gone = self.watch.gone(now, ticket.testimony.sent_to)
-            hidden = now < ticket.not_gone_before or standstill.servers_take(time.monotonic()) > 0.0
-            if gone and hidden:
+            if (gone and now < ticket.not_gone_before) or self._is_hidden(ticket):
                 continue  # it has not been discovered yet, though its status may have come already
             if ticket.goal.sent:
                 if gone and not ticket.goal.lost:
@@ -564,6 +610,20 @@ class Line:
         elif state is Server.READY:
             self._warned_crowd = False
         return state
+
+    def _is_hidden(self, ticket: Ticket) -> bool:
+        """Whether a server of this goal may be out of sight because this process stood still.
+
+        Not for ever, where it does so again and again and the server is not seen in between.
+        """
+        still, sent_to = alarm.standstill, ticket.testimony.sent_to
+        if sent_to <= self.watch.gids and not self.watch.gone(time.monotonic(), sent_to):
+            ticket.hidden_since = None
+            return False
+        if ticket.hidden_since is None:
+            ticket.hidden_since = still.times
+        is_news = still.times - ticket.hidden_since <= AT_MOST
+        return is_news and still.servers_take(time.monotonic()) > 0.0
 
     def _come_home(self) -> None:
         """The participant that we moved to is gone, if we did; our node is not."""
@@ -598,7 +658,7 @@ class Line:
                 self.tell(ticket, Event.INTERRUPTED)
         patience = max((each.goal.drains_within for each in self.goals.values()), default=0.0)
         silent = time.monotonic() - self._heard_at > max(SILENT_FOR, patience)
-        if silent and not standstill.answers_take(time.monotonic()):
+        if silent and not alarm.standstill.answers_take(time.monotonic()):
             self.put_away(all_of_them=True)  # from here nobody can see whether the server is gone
 
     def attend(self, now: float) -> float:

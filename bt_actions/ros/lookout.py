@@ -33,13 +33,14 @@ from bt_actions.ros.shared import lock
 FIRST_AFTER = 1.5
 """Seconds out of sight until the first look; a server that was restarted is seen before."""
 PAUSE = 1.0
-"""Seconds between two looks at first, and for a while after somebody begins to wait;"""
+"""Seconds between two looks for a while after somebody begins to wait, or a look found a server;"""
 URGENT_FOR = 30.0
 """so long;"""
 LONGEST_PAUSE = 60.0
 """later, each pause is twice the last, up to this."""
-LASTS = 3.0
-"""Seconds that a look lasts; what is there comes in sight in 0.1 to 1.0 (measured)."""
+LASTS = 5.0
+"""Seconds that a look lasts; what is there comes in sight in 0.1 to 1.0, or when Fast DDS announces
+the next time, which is after 3 s (both measured)."""
 GLANCE = 0.05
 """Seconds between two questions to the graph in a look."""
 AHEAD = 0.7
@@ -66,6 +67,9 @@ class Seeker(Protocol):
 
     def client_in(self, sight: Sight) -> ActionClient:
         """A client like its own in another participant."""
+
+    def prefers(self, client: ActionClient) -> bool:
+        """Whether this client, which is ready, does what its own does not."""
 
     def move_to(self, sight: Sight, client: ActionClient) -> None:
         """Go on with this client."""
@@ -179,7 +183,7 @@ class Lookout:
                 if not self._told:
                     self._told = True
                     log.warning(f"no second look for lost servers: {error!r}")
-            pause = PAUSE if found or pause < PAUSE else min(2 * pause, LONGEST_PAUSE)
+            pause = PAUSE if found else min(2 * pause, LONGEST_PAUSE)
 
     def _wait(self, pause: float) -> None:
         """Wait for the next look; no longer than a moment when somebody begins to wait."""
@@ -243,7 +247,11 @@ class _Look:
                 self._clients[line] = line.client_in(self._sight)
             if line in self._clients and self._clients[line].server_is_ready():
                 self._ready_since.setdefault(line, now)
-        ready = [line for line in lines if line in self._ready_since]
+        ready = [
+            line
+            for line in lines
+            if line in self._ready_since and line.prefers(self._clients[line])
+        ]
         if any(now - self._ready_since[line] >= AHEAD for line in ready):
             for line in ready:
                 line.move_to(self._sight, self._clients.pop(line))

@@ -122,6 +122,9 @@ class Ticket:
     """Until when it is no news that its server is not shown: it may be stopped for less than its
     lease, or not be discovered yet. Both in seconds of the steady clock."""
 
+    hidden_since: int | None = None
+    """Standstills of this process by then; None while its servers are in sight."""
+
     def __post_init__(self) -> None:
         self.testimony = Testimony(self.goal)
 

@@ -24,13 +24,12 @@ from typing import Any
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
-from bt_actions.goal import Goal
+from bt_actions.goal import ASK_AGAIN, Goal
 from bt_actions.goal_ids import new_goal_id
 from bt_actions.goal_terms import Event, State
 from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
 from bt_actions.ros import alarm, shared
-from bt_actions.ros.alarm import standstill
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.line import Line
@@ -38,6 +37,7 @@ from bt_actions.ros.log import log
 from bt_actions.ros.shared import Beginner, Change, Observer, Ticket, changed, domain_of, lock
 from bt_actions.ros.signals import ended_by_signals
 from bt_actions.server import Server
+from bt_actions.standstill import AT_MOST
 
 JUST_PAST = 0.1
 """Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
@@ -173,7 +173,7 @@ class Traffic:
         line = ticket.line
         with lock:
             line.poll(ticket)
-            if _closing or ticket.given_up:
+            if _closing or line.given_up(ticket):
                 line.tell(ticket, Event.INTERRUPTED)
             if ticket.goal.state is not State.WAITING_FOR_SERVER:
                 return
@@ -194,7 +194,7 @@ class Traffic:
         line = ticket.line
         return (
             ticket.goal.state is State.WAITING_FOR_SERVER
-            and not (_closing or ticket.given_up)
+            and not (_closing or line.given_up(ticket))
             and not line.orphaned
             and is_valid(self.node)
             and line.watch.state(time.monotonic()) is Server.READY
@@ -298,7 +298,8 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     """Cancel these goals and wait until each is accounted for, under one deadline.
 
     The deadline is the largest `timeout.cancel` among them, plus `timeout.accept` (twice, if that
-    is more) where the acceptance is open. Answers are taken here too, so it does not matter
+    is more) where the acceptance is open. Where this process stood still, it leaves time for what
+    is about to arrive, and for one more question. Answers are taken here too, so it does not matter
     whether anybody spins, whether the context is valid, or on which thread this runs. `hurry` is
     called again and again without the lock, and ends the wait early when it says so. No goal is
     waited for a second time. Returns the goals whose end is UNKNOWN.
@@ -314,8 +315,17 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
         waits = [t for t in wanted if not t.accounted_for and not t.goal.waited_for]
         patience = max((ticket.goal.drains_within for ticket in waits), default=0.0)
         deadline = time.monotonic() + patience + JUST_PAST
-    while waits and _may_wait(deadline) and not hurry():
+        still = alarm.standstill
+        first = still.times
+    while waits and not hurry():
         with lock:
+            now = time.monotonic()
+            doubts = (ticket.line.in_doubt(now) for ticket in waits)
+            held = max(still.answers_take(now), *doubts)
+            if held > 0.0 and still.times - first <= AT_MOST:
+                deadline = max(deadline, now + held + ASK_AGAIN)
+            if now >= deadline:
+                break
             for line in {ticket.line for ticket in waits}:
                 line.pump()
             for ticket in waits:
@@ -326,13 +336,6 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     for ticket in waits:
         ticket.line.tell(ticket, Event.DRAINED)
     return [ticket for ticket in wanted if not ticket.accounted_for]
-
-
-def _may_wait(deadline: float) -> bool:
-    """Whether there is time left; where this process stood still, for what is about to arrive."""
-    with lock:
-        now = time.monotonic()
-        return now < deadline or standstill.answers_take(now) > 0.0
 
 
 def _who_begins() -> Beginner | None:

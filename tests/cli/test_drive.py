@@ -7,7 +7,9 @@ import io
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from py_trees.common import Status
@@ -27,7 +29,10 @@ from tests.cli.fakes import FakeAction, FakeRunner, Story
 class Run:
     """One drive over a fake runner, and what was written."""
 
-    def __init__(self, runner: FakeRunner, timeout: float | None = None) -> None:
+    def __init__(
+        self, runner: FakeRunner, timeout: float | None = None, output: object = None
+    ) -> None:
+        self.output: Any = output
         self.leaf = FakeAction("Move")
         self.report = Report(self.leaf)
         self.out = io.StringIO()
@@ -43,6 +48,7 @@ class Run:
                 LineView(self.report, self.out),
                 signals,
                 timeout=self.timeout,
+                output=self.output,
             )
             ended = drive.run()
             self.code = drive.finish(Closing(ended.code, ended.cause))
@@ -147,6 +153,30 @@ def test_a_timeout_that_expires_when_the_tree_has_finished_changes_nothing(story
     ended = run.go()
     later.join()
     assert ended.code is Exit.SUCCESS
+
+
+class SlowReader:
+    """Takes everything after so many looks."""
+
+    def __init__(self, looks: int) -> None:
+        self.left = looks
+
+    def written(self, within: float) -> bool:
+        time.sleep(within)
+        self.left -= 1
+        return self.left <= 0
+
+
+def test_a_timeout_that_expires_in_the_shutdown_does_not_cut_off_the_output(story: Story) -> None:
+    reader = SlowReader(5)
+    run = Run(FakeRunner(waits=True), timeout=0.05, output=reader)
+    run.runner.before = [story.start(), story.finish(Status.SUCCESS)]
+    later = threading.Timer(0.3, run.runner.interrupted.set)  # its shutdown takes so long
+    later.start()
+    run.go()
+    later.join()
+    assert reader.left == 0
+    assert run.code is Exit.SUCCESS
 
 
 def test_a_goal_whose_end_is_unknown_wins_over_every_other_code(story: Story) -> None:

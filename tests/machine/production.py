@@ -16,6 +16,7 @@ from unittest import mock
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import Event, Now, State
+from bt_actions.hearing import Hearing
 from bt_actions.policy import End, Outcome
 from bt_actions.ros import alarm, line, shared, traffic
 from bt_actions.ros.action_client import GOALS_KEPT
@@ -54,6 +55,7 @@ class ModelClient:
     def __init__(self, node: Any, action_type: Any, name: str, listener: Any) -> None:
         self.node, self.name, self._listener = node, name, listener
         self.closed = False
+        self.hearing = Hearing()
         self._asked: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
         self._past: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
 
@@ -85,6 +87,8 @@ class ModelClient:
         caller = now()
         number = caller.file(self)
         self._asked[number] = (kind, about, caller.moment(), {})
+        if kind != "result":
+            self.hearing.asked(caller.moment())
         view = caller.seen.get(goal_id)
         nobody = caller.world.servers[0]
         message = Message(
@@ -113,6 +117,7 @@ class ModelClient:
         if self.closed or question is None:
             return
         kind, about, asked, by_server = question
+        self.hearing.answered(asked)
         if kind == "probe":
             self._listener.probe_answered(about)
             return
@@ -209,7 +214,7 @@ class Caller:
         _playing[:] = [self]
         shared._domains.clear()
         alarm._open.clear()
-        line.standstill = Standstill()
+        alarm.standstill = Standstill()
         self._traffics = {number: self._traffic(number) for number in NODES}
         self._lines: dict[tuple[str, int], Line] = {}  # made when a leaf first wants them
         world.client = self  # type: ignore[assignment]
@@ -404,7 +409,7 @@ class Caller:
 
     def attend(self) -> None:
         """What the alarm does, which is late where the process was frozen."""
-        line.standstill.rests()
+        alarm.standstill.rests()
         self._attend()
         if self.takes("freezes"):
             self._freeze((0.9, 2.5, 6.0)[self._moments % 3])
@@ -421,7 +426,7 @@ class Caller:
 
         So do servers that it sees, beyond their lease.
         """
-        line.standstill.lives(self.moment())
+        alarm.standstill.lives(self.moment())
         world, hidden = self.world, set[tuple[bytes, int]]()
         if seconds > LEASE:
             hidden = {(server.gid, node) for server in world.servers for node in NODES}
@@ -431,7 +436,8 @@ class Caller:
         before = {
             view: view.goal.state
             for view in self.tickets
-            if view.goal.state in (State.SENDING, State.EXECUTING) and not view.ledger.crowded
+            if not view.ledger.crowded
+            and view.goal.state in (State.WAITING_FOR_SERVER, State.SENDING, State.EXECUTING)
         }
         self._attend()
         for view, state in before.items():
@@ -566,7 +572,7 @@ def installed() -> Iterator[None]:
         (traffic, "log", mock.Mock()),
         (traffic, "new_goal_id", lambda: now().new_goal_id()),
         (traffic, "drain", _drain),
-        (line, "standstill", Standstill()),
+        (alarm, "standstill", Standstill()),
         (alarm, "_open", set()),
         (alarm, "mind", lambda each: alarm._open.add(each)),
         (shared, "_domains", {}),

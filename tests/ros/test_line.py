@@ -13,12 +13,15 @@ from typing import Any
 import pytest
 
 from bt_actions import End, Outcome
+from bt_actions.goal_terms import Now, State
+from bt_actions.hearing import Hearing
 from bt_actions.ros import alarm, traffic
 from bt_actions.ros import line as module
 from bt_actions.ros.line import LEASE, Line
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.server import ServerWatch
+from bt_actions.standstill import AT_MOST, Standstill
 
 OURS, NEW = b"ours", b"new"
 
@@ -140,6 +143,93 @@ def test_a_line_without_goals_is_not_late(monkeypatch: pytest.MonkeyPatch) -> No
     seen.probe_answered(0.5, 1)
     look(line, seen, 4.0)
     assert seen.alone
+
+
+STILL = Standstill()
+"""Of 1 s, which hides no server."""
+STILL.lives(0.0)
+STILL.lives(1.0)
+
+
+@pytest.mark.parametrize("state", [State.WAITING_FOR_SERVER, State.EXECUTING])
+def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
+    monkeypatch: pytest.MonkeyPatch, state: State
+) -> None:
+    monkeypatch.setattr(alarm, "standstill", STILL)
+    held: list[float] = []
+    goal = SimpleNamespace(state=state, due_in=lambda _: 0.0, hold=lambda s, _: held.append(s))
+    clocks = SimpleNamespace(now=lambda: Now(1.2, 1.2))
+    line: Any = SimpleNamespace(
+        is_parents=False,
+        traffic=SimpleNamespace(clocks=clocks),
+        pump=lambda: None,
+        in_doubt=lambda _: 0.0,
+        _apply=lambda *_: None,
+    )
+    ticket: Any = SimpleNamespace(goal=goal, paused_at=None)
+    Line.poll(line, ticket)
+    assert held == [pytest.approx(0.8)]
+
+
+def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also where another one, which may have the goal too, is in sight."""
+    still = Standstill()
+    monkeypatch.setattr(alarm, "standstill", still)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
+    ticket: Any = SimpleNamespace(
+        testimony=SimpleNamespace(sent_to=frozenset({OURS, NEW})), hidden_since=None
+    )
+    line: Any = SimpleNamespace(watch=watch(NEW))
+    still.lives(moment := 10.0)
+    assert not Line._is_hidden(line, ticket)
+    for _ in range(AT_MOST):
+        still.lives(moment := moment + 3.0)
+        assert Line._is_hidden(line, ticket)
+    still.lives(moment := moment + 3.0)
+    assert not Line._is_hidden(line, ticket)
+    line.watch = watch(OURS, NEW)
+    assert not Line._is_hidden(line, ticket)
+    still.lives(moment := moment + 3.0)
+    line.watch = watch(NEW)
+    assert Line._is_hidden(line, ticket)
+
+
+@pytest.mark.parametrize("busy", [False, True])
+def test_a_client_is_preferred_to_one_that_is_not_heard_where_it_is_itself(busy: bool) -> None:
+    """A busy server answers nobody."""
+    asked: list[int] = []
+    hearing = Hearing()
+    client: Any = SimpleNamespace(hearing=hearing, pump=lambda: None)
+    client.probe = lambda probe, _: (asked.append(probe), hearing.asked(time.monotonic()))
+    line: Any = SimpleNamespace(_is_absent=lambda _: False)
+    assert not Line.prefers(line, client)
+    if not busy:
+        hearing.answered(time.monotonic())
+    assert Line.prefers(line, client) is not busy
+    assert asked
+
+
+def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Who is asked gives it up."""
+    asked: list[None] = []
+
+    class Asked:
+        @property
+        def given_up(self) -> bool:
+            asked.append(None)
+            return True
+
+    still = Standstill()
+    still.lives(time.monotonic() - 2.0)
+    monkeypatch.setattr(alarm, "standstill", still)
+    assert not Line.given_up(Asked())  # type: ignore[arg-type]
+    assert not asked
+    monkeypatch.setattr(alarm, "standstill", Standstill())
+    assert Line.given_up(Asked())  # type: ignore[arg-type]
 
 
 def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(

@@ -220,6 +220,9 @@ def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
         def server_is_ready(self) -> bool:
             return True
 
+        def prefers(self, client: Any) -> bool:
+            return True
+
         def move_to(self, sight: Sight, client: Any) -> None:
             sight.users.add(self)
             sight.left_by(self)

@@ -603,6 +603,25 @@ def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
     assert told == [(["/r1/move", "/r2/move"], False), (["/r1/move", "/r2/move"], True)]
 
 
+def test_cleanup_that_was_stopped_looks_again(
+    launch: Launch, new_host: HostFactory, tree: Tree, name: str, node: Any, record: Record
+) -> None:
+    """SIGKILL to the orchestrator; SIGSTOP to cleanup for all of its look; SIGCONT"""
+    journal = new_host(short_lease=False).open(name)
+    run = launch("run", str(tree(name, distance=90.0)))
+    run.line("executing on")
+    run.send(signal.SIGKILL)
+    run.wait()
+    cleanup = launch("cleanup")
+    until(lambda: "bt_actions_cleanup" in node.get_node_names(), within=20.0)
+    cleanup.send(signal.SIGSTOP)
+    holds_for(lambda: True, 6.0)
+    cleanup.send(signal.SIGCONT)
+    assert cleanup.wait(60.0) == 0, cleanup
+    assert journal.ends() == ["canceled"], cleanup
+    record.outcome = "cleanup: CANCELED, exit code 0"
+
+
 def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     launch: Launch, serve: Serve, tree: Tree, name: str, domain: int, record: Record
 ) -> None:
@@ -697,11 +716,31 @@ def test_an_orchestrator_that_was_stopped_leaves_a_goal_alone_that_is_well(
 
 
 @pytest.mark.chaos
+@pytest.mark.parametrize("stopped", [1.3, 1.9])
+def test_a_server_that_opens_while_the_orchestrator_is_stopped_is_seen(
+    launch: Launch, serve: Serve, tree: Tree, name: str, stopped: float, record: Record
+) -> None:
+    """SIGSTOP to the orchestrator while the server opens and timeout.server passes; SIGCONT"""
+    path = tree(name, distance=1.0, timeout="{server: 1 s, result: 60 s}")
+    run = launch("run", str(path), "--verbose")
+    run.line("waiting for the server")
+    run.send(signal.SIGSTOP)
+    began = time.monotonic()
+    journal = serve()
+    holds_for(lambda: True, began + stopped - time.monotonic())
+    run.send(signal.SIGCONT)
+    assert run.wait() == 0, run
+    assert journal.events() == ["received", "accepted", "succeeded"]
+    record.outcome = "SUCCEEDED, exit code 0"
+
+
+@pytest.mark.chaos
+@pytest.mark.parametrize("result", ["comes", "is lost"])
 def test_a_drain_that_was_stopped_takes_in_what_came_meanwhile(
-    launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
+    launch: Launch, serve: Serve, tree: Tree, name: str, result: str, record: Record
 ) -> None:
     """SIGTERM, and SIGSTOP until the goal is canceled and the drain's deadline over; SIGCONT"""
-    journal = serve("1:delay_cancel=1")
+    journal = serve("1:delay_cancel=1", *["1:drop_result=1000"] * (result == "is lost"))
     run = launch("run", str(tree(name)))
     run.line("executing on")
     run.send(signal.SIGTERM)
@@ -711,6 +750,7 @@ def test_a_drain_that_was_stopped_takes_in_what_came_meanwhile(
     holds_for(lambda: True, CANCEL + 2.0)
     run.send(signal.SIGCONT)
     assert run.wait() == 128 + signal.SIGTERM, run
+    assert "not accounted for" not in str(run)
     record.outcome = "the goal's end is known; exit code 143"
 
 

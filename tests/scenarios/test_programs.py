@@ -8,12 +8,13 @@ from __future__ import annotations
 import signal
 import textwrap
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
-from tests.support.processes import Host, Process
+from tests.support.processes import Host, HostFactory, Process
 from tests.support.reliability import Record
-from tests.support.waiting import until
+from tests.support.waiting import holds_for, until
 
 Start = Callable[..., Process]
 
@@ -32,11 +33,11 @@ def said(event):
 
 
 @pytest.fixture
-def program(start_program: Start, name: str) -> Callable[[str], Process]:
+def program(start_program: Start, name: str) -> Start:
     """Start a program that knows its action's name."""
 
-    def start(body: str) -> Process:
-        return start_program("-c", HEAD.format(name=name) + textwrap.dedent(body))
+    def start(body: str, **more: Any) -> Process:
+        return start_program("-c", HEAD.format(name=name) + textwrap.dedent(body), **more)
 
     return start
 
@@ -73,7 +74,7 @@ LOOP_AFTER_A_RUN = """
 def test_rclpys_signal_handlers_are_in_force_again_after_a_run(
     host: Host,
     name: str,
-    program: Callable[[str], Process],
+    program: Start,
     number: signal.Signals,
     own_handler: bool,
     record: Record,
@@ -109,7 +110,7 @@ ON_THE_USERS_CONTEXT = """
     ],
 )
 def test_a_node_of_its_own_in_the_users_context_ends_its_goals_before_a_signal_takes_effect(
-    host: Host, name: str, program: Callable[[str], Process], number: signal.Signals, record: Record
+    host: Host, name: str, program: Start, number: signal.Signals, record: Record
 ) -> None:
     """rclpy.init(), a runner with an executor of the user's and no node; a signal in run()"""
     journal = host.open(name)
@@ -139,7 +140,7 @@ TWO_RUNNERS = """
     ],
 )
 def test_a_signal_that_ends_a_process_ends_the_goals_of_all_its_runners(
-    host: Host, name: str, program: Callable[[str], Process], number: signal.Signals, record: Record
+    host: Host, name: str, program: Start, number: signal.Signals, record: Record
 ) -> None:
     """One runner in run() on the main thread, one more that was started; the signal named"""
     journals = [host.open(name), host.open(f"{name}_b")]
@@ -194,7 +195,7 @@ AT_EXIT = """
 def test_a_goal_that_is_left_running_is_named_before_a_signal_ends_the_process(
     host: Host,
     name: str,
-    program: Callable[[str], Process],
+    program: Start,
     where: str,
     numbers: list[signal.Signals],
     cancel: str,
@@ -257,7 +258,7 @@ IS_IN_C = """inner.start()
 def test_a_signal_ends_all_goals_while_a_tick_takes_long(
     host: Host,
     name: str,
-    program: Callable[[str], Process],
+    program: Start,
     how: str,
     number: signal.Signals,
     record: Record,
@@ -305,7 +306,7 @@ A_FORK = """
     "how", ["sys.exit(0)", pytest.param("raise ValueError", marks=pytest.mark.chaos)]
 )
 def test_a_child_that_ends_leaves_its_parents_goal_alone(
-    host: Host, name: str, program: Callable[[str], Process], how: str, record: Record
+    host: Host, name: str, program: Start, how: str, record: Record
 ) -> None:
     """A behaviour forks in its tick beside a running goal; the child ends while it runs"""
     journal = host.open(name)
@@ -313,3 +314,41 @@ def test_a_child_that_ends_leaves_its_parents_goal_alone(
     journal.wait_for("succeeded", within=60.0)
     assert journal.events() == ["received", "accepted", "succeeded"], process
     record.outcome = "SUCCEEDED; the child has canceled nothing"
+
+
+A_PUBLISHER_IN_MID_GOAL = """
+    import time
+    from std_msgs.msg import String
+    leaf = MoveRobot("m", 9.0, action_name=name, timeout=T)
+    runner = TreeRunner(leaf)
+    runner.observe(said)
+    runner.start()
+    executing.wait()
+    time.sleep(3.0)  # all that it has announced so far is acknowledged
+    publisher = runner.node.create_publisher(String, "/news", 1)
+    time.sleep(0.2)  # so has that, but nobody has acknowledged it
+    print("announced", flush=True)
+    print(runner.wait(60.0).name, leaf.outcome, leaf.end, flush=True)
+    runner.shutdown()
+"""
+
+
+@pytest.mark.parametrize("lease", ["stock", pytest.param("short", marks=pytest.mark.chaos)])
+def test_who_was_stopped_beyond_its_lease_and_is_not_heard_any_more_finds_another_way(
+    new_host: HostFactory,
+    name: str,
+    program: Start,
+    lease: str,
+    record: Record,
+) -> None:
+    """SIGSTOP, just after it has announced a publisher, for twice its lease; SIGCONT"""
+    journal = new_host(short_lease=lease == "short").open(name)
+    process = program(A_PUBLISHER_IN_MID_GOAL, short_lease=True)
+    process.line("announced", within=60.0)
+    process.send(signal.SIGSTOP)
+    holds_for(lambda: True, 6.0)
+    process.send(signal.SIGCONT)
+    assert process.wait(60.0) == 0, process
+    assert "SUCCESS SUCCEEDED SUCCEEDED" in str(process)
+    assert journal.events() == ["received", "accepted", "succeeded"]
+    record.outcome = "SUCCEEDED, exit code 0"
