@@ -10,7 +10,7 @@ from __future__ import annotations
 from bt_actions.goal_terms import ON_ROS_CLOCK, Event, Now
 
 HELD_AT_MOST = 30.0
-"""Seconds for which deadlines are held, one time after the other, until one must take effect."""
+"""Seconds for which a deadline is held, one time after the other, until it takes effect."""
 
 
 class Deadlines:
@@ -20,12 +20,12 @@ class Deadlines:
         self._due: dict[Event, float] = {}
         self._ros_seen = now.ros
         self._not_before = float("-inf")
-        self._held = 0.0  # seconds in all, since one was armed
+        self._held: dict[Event, float] = {}  # seconds in all, since it was armed
 
     def arm(self, event: Event, seconds: float | None, now: Now) -> None:
         """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
         if seconds is not None:
-            self._held = 0.0
+            self._held.pop(event, None)
             self._due[event] = (now.ros if event in ON_ROS_CLOCK else now.steady) + seconds
 
     def disarm(self, event: Event) -> None:
@@ -40,11 +40,16 @@ class Deadlines:
         """Return the seconds until each, the earliest first; negative where it has passed."""
         waits = sorted(((self._left(event, now), event) for event in self._due), key=_seconds)
         held = self._not_before - now.steady
-        return [(max(left, held), event) for left, event in waits] if held > 0.0 else waits
+        if held <= 0.0:
+            return waits
+        return sorted(
+            ((max(left, held) if self._may_hold(event) else left, event) for left, event in waits),
+            key=_seconds,
+        )
 
     def take_passed(self, event: Event, now: Now) -> bool:
         """Whether this one is still set and has passed; it is forgotten then."""
-        held = now.steady < self._not_before
+        held = now.steady < self._not_before and self._may_hold(event)
         if held or event not in self._due or self._left(event, now) > 0.0:
             return False
         del self._due[event]
@@ -56,14 +61,17 @@ class Deadlines:
             self._due[event] += seconds
 
     def hold(self, seconds: float, now: Now) -> None:
-        """Let none take effect within so many seconds of the steady clock, `HELD_AT_MOST` in all.
+        """Let none take effect within so many seconds of the steady clock.
 
-        A deadline that is armed since is news, with which that begins anew.
+        For one that has passed it is `HELD_AT_MOST` in all, until it is armed anew.
         """
-        if self._held + seconds > HELD_AT_MOST:
-            seconds = 0.0
-        self._held += seconds
+        for event in self._due:
+            if self._left(event, now) <= 0.0:
+                self._held[event] = self._held.get(event, 0.0) + seconds
         self._not_before = now.steady + seconds
+
+    def _may_hold(self, event: Event) -> bool:
+        return self._held.get(event, 0.0) <= HELD_AT_MOST
 
     def follow(self, now: Now) -> None:
         """Where the ROS clock has jumped back, let the deadlines on it jump with it."""

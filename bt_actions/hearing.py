@@ -2,18 +2,26 @@
 
 Discovery may tell one side only: a server may have dropped a process that was stopped, or cut off,
 for longer than its lease, and never take it in again (ros/lookout.py). It is shown then, and what
-it is asked gets lost. Told of questions and answers; what takes a server long (a result, a busy
-executor) shows in the same way, so this is no proof. No ROS, no thread, no clock of its own.
+it is asked gets lost. Told of questions and answers; what takes a server long (a busy executor)
+shows in the same way, so silence is no proof. Nor may it be filled with questions: a server keeps
+the last ten requests of all its clients together, and answers no other. No ROS, no thread, no
+clock of its own.
 """
 
 from __future__ import annotations
 
-ASK_EVERY = 1.0
-"""Seconds without an answer until it is worth another question."""
+ASK_AGAIN = 3.0
+"""Seconds from the first question to the last; Fast DDS announces a process every 3 s or sooner."""
 MUTE_AFTER = 2.0
 """Seconds without an answer to any question until the server may not hear them;"""
+TRIES = 2
+"""so often is another way looked for while it is silent,"""
+TRY_LASTS = 6.0
+"""each for so many seconds;"""
+TRY_AGAIN = 60.0
+"""and then only after so many since the last."""
 DOUBT_LASTS = 10.0
-"""and, after a standstill, seconds within which a way to be heard is found, if there is one."""
+"""Seconds after a standstill within which a way to be heard is found, if there is one."""
 NEVER = float("-inf")
 
 
@@ -21,15 +29,16 @@ class Hearing:
     """The questions of one client that any server answers at once (seconds, steady clock)."""
 
     def __init__(self) -> None:
-        self._unanswered_since: float | None = None
-        self._asked_at = NEVER
-        self._in_doubt_until = NEVER
         self.heard = False
         """Whether any question was ever answered."""
+        self._unanswered_since: float | None = None
+        self._questions: list[float] = []
+        """When to ask just in order to be answered."""
+        self._in_doubt_until = NEVER
+        self._tries, self._tried_at = 0, NEVER
 
     def asked(self, now: float) -> None:
         """Take note of a question."""
-        self._asked_at = now
         if self._unanswered_since is None:
             self._unanswered_since = now
 
@@ -37,27 +46,37 @@ class Hearing:
         """Take note of an answer to a question that was asked at this moment."""
         self.heard = True
         if self._unanswered_since is not None and asked >= self._unanswered_since:
-            self._unanswered_since, self._in_doubt_until = None, NEVER
+            self._unanswered_since, self._questions, self._tries = None, [], 0
+            self._in_doubt_until = NEVER
 
     def doubt(self, now: float) -> None:
-        """This process stood still: what was heard before proves nothing, and is to be asked."""
-        self._unanswered_since, self._asked_at = now, NEVER
+        """What was heard before proves nothing, as this process stood still: it is to be asked."""
+        self._unanswered_since, self._tries = now, 0
+        self._questions = [now, now + ASK_AGAIN]
         self._in_doubt_until = now + DOUBT_LASTS
 
     def in_doubt(self, now: float) -> float:
         """Return for how many seconds silence may mean this more than anything else; or 0."""
         return max(0.0, self._in_doubt_until - now)
 
-    @property
-    def asks(self) -> bool:
-        """Whether a question is open."""
-        return self._unanswered_since is not None
+    def take_question(self, now: float) -> bool:
+        """Whether to ask something now, just in order to be answered; it counts as asked then."""
+        if not self._questions or now < self._questions[0]:
+            return False
+        del self._questions[0]
+        return True
 
-    def wants_question(self, now: float) -> bool:
-        """Whether it is time to ask something, just to be answered."""
-        return self._unanswered_since is not None and now - self._asked_at >= ASK_EVERY
+    def tried(self, now: float) -> None:
+        """Another way is looked for from now on."""
+        self._tries += 1
+        self._tried_at = now
 
     def is_mute(self, now: float) -> bool:
-        """Whether there has been a question, and no answer to any, for long."""
+        """Whether there was no answer to any question for long, and another way may be looked for.
+
+        Also while that is done.
+        """
         since = self._unanswered_since
-        return since is not None and now - since >= MUTE_AFTER
+        if since is None or now - since < MUTE_AFTER:
+            return False
+        return self._tries < TRIES or not TRY_LASTS <= now - self._tried_at < TRY_AGAIN

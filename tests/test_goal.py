@@ -706,17 +706,30 @@ def test_what_was_held_for_a_server_out_of_sight_does_not_hold_up_its_answer() -
 def test_what_is_held_again_and_again_takes_effect_in_the_end_unless_there_is_news() -> None:
     life = executing(Timeouts(feedback=2.0))
 
-    def held() -> list[Command]:
+    def is_held() -> bool:
         life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
         life.goal.hold(1.0, life.now)
-        return life.pass_time(0.0)
+        return CANCEL not in life.pass_time(0.0)
 
     for _ in range(2):
-        assert [held() for _ in range(int(HELD_AT_MOST))] == [[]] * int(HELD_AT_MOST)
+        assert all(is_held() for _ in range(int(HELD_AT_MOST)))
         life.on(Event.FEEDBACK, "at last")
+    assert all(is_held() for _ in range(int(HELD_AT_MOST)))
+    assert not is_held()
+
+
+def test_no_feedback_puts_off_a_result_that_is_held_again_and_again() -> None:
+    life = executing(Timeouts(result=5.0, feedback=2.0))
+    life.pass_time(1.0)
     for _ in range(int(HELD_AT_MOST)):
-        assert held() == []
-    assert CANCEL in held()
+        life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
+        life.goal.hold(1.0, life.now)
+        assert CANCEL not in life.pass_time(0.0)
+        life.on(Event.FEEDBACK, "it runs")
+    life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
+    life.goal.hold(1.0, life.now)
+    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 0.0)
+    assert CANCEL in life.pass_time(0.0)
 
 
 def test_what_was_held_takes_effect_in_the_order_in_which_it_fell_due() -> None:

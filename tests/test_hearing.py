@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.hearing import ASK_EVERY, DOUBT_LASTS, MUTE_AFTER, Hearing
+from bt_actions.hearing import (
+    ASK_AGAIN,
+    DOUBT_LASTS,
+    MUTE_AFTER,
+    TRIES,
+    TRY_AGAIN,
+    TRY_LASTS,
+    Hearing,
+)
 
 
 @pytest.fixture
@@ -19,42 +27,58 @@ def hearing() -> Hearing:
 def test_who_is_asked_nothing_owes_nothing() -> None:
     fresh = Hearing()
     assert not fresh.heard
-    assert not fresh.wants_question(99.0)
+    assert not fresh.take_question(99.0)
     assert not fresh.is_mute(99.0)
     assert not fresh.in_doubt(99.0)
 
 
 def test_who_has_answered_owes_nothing(hearing: Hearing) -> None:
     assert hearing.heard
-    assert not hearing.asks
-    assert not hearing.wants_question(99.0)
     assert not hearing.is_mute(99.0)
 
 
-def test_who_is_silent_is_asked_again_and_may_be_deaf(hearing: Hearing) -> None:
+def test_who_is_silent_may_be_deaf_and_is_not_pestered(hearing: Hearing) -> None:
     hearing.asked(20.0)
-    assert hearing.asks
-    assert not hearing.wants_question(20.0 + ASK_EVERY - 0.1)
-    assert hearing.wants_question(20.0 + ASK_EVERY)
-    hearing.asked(20.0 + ASK_EVERY)
-    assert not hearing.wants_question(20.0 + ASK_EVERY)
+    hearing.asked(20.0 + MUTE_AFTER - 0.1)
     assert not hearing.is_mute(20.0 + MUTE_AFTER - 0.1)
     assert hearing.is_mute(20.0 + MUTE_AFTER), "questions that get lost do not put it off"
-    hearing.answered(20.0 + ASK_EVERY)
+    assert not hearing.take_question(99.0)
+    hearing.answered(20.0 + MUTE_AFTER - 0.1)
     assert not hearing.is_mute(99.0)
 
 
 def test_an_answer_of_before_the_standstill_proves_nothing(hearing: Hearing) -> None:
     hearing.asked(20.0)
     hearing.doubt(30.0)
-    assert hearing.wants_question(30.0), "at once"
     hearing.answered(20.0)
     assert hearing.in_doubt(31.0) == DOUBT_LASTS - 1.0
     assert hearing.is_mute(30.0 + MUTE_AFTER)
-    hearing.asked(30.0)
     hearing.answered(30.0)
     assert not hearing.in_doubt(31.0)
     assert not hearing.is_mute(99.0)
+
+
+def test_after_a_standstill_it_is_asked_twice_and_no_more(hearing: Hearing) -> None:
+    hearing.doubt(30.0)
+    asked = [now / 10 for now in range(300, 1000) if hearing.take_question(now / 10)]
+    assert asked == [30.0, 30.0 + ASK_AGAIN]
+    hearing.doubt(100.0)
+    assert hearing.take_question(100.0)
+    hearing.answered(100.0)
+    assert not hearing.take_question(199.0), "it was answered"
+
+
+def test_another_way_is_looked_for_now_and_then(hearing: Hearing) -> None:
+    hearing.asked(20.0)
+    now = 30.0
+    for number in range(1, TRIES + 1):
+        assert hearing.is_mute(now), number
+        hearing.tried(now)
+        assert hearing.is_mute(now + TRY_LASTS - 0.1), "a look is not broken off"
+        now += TRY_LASTS
+    assert not hearing.is_mute(now)
+    assert not hearing.is_mute(now - TRY_LASTS + TRY_AGAIN - 0.1)
+    assert hearing.is_mute(now - TRY_LASTS + TRY_AGAIN)
 
 
 def test_a_doubt_without_an_end_ends(hearing: Hearing) -> None:

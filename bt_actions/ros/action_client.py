@@ -118,6 +118,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         self._inbox: deque[tuple[str, Any, Any]] = deque()
         self.hearing = Hearing()
         """Under the one lock, as all requests."""
+        self.on_trial = False
+        """The listener has another client; here it wants to hear of statuses alone."""
         self._closed = False
         self._impl = action_type.Impl  # before rclpy's part: the executor may take at once
         services = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
@@ -289,6 +291,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         tell = self._listener
         if kind in ("goal", "result", "cancel", "probe"):
             self.hearing.answered(asked=detail[0])
+        if self.on_trial and kind != "status":
+            return
         if kind == "feedback":
             tell.feedback_came(about, detail)
         elif kind == "goal":

@@ -81,7 +81,7 @@ def _attend() -> None:
             if _open:
                 busy_at = time.monotonic()
             for line in list(_open):
-                standstill.lives(time.monotonic())
+                standstill.lives(time.monotonic())  # each look takes its time
                 try:
                     wait = min(wait, line.attend(time.monotonic()))
                 except Exception as error:  # noqa: BLE001 - the last guard of every deadline
@@ -89,5 +89,6 @@ def _attend() -> None:
             _wakes_at = time.monotonic() + wait
             standstill.lives(time.monotonic())
             _bell.wait(wait)
+            standstill.lives(time.monotonic())
         standstill.rests()
         _thread = None

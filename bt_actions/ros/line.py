@@ -51,6 +51,8 @@ their server is there: longer than a ghost is shown, or a question waits (goal.D
 BESIDE = 1.0
 """Seconds for which a server may be in sight before another one that was there all the time, or
 that came back with it; 0.5 measured."""
+LAST_WORD = 0.5
+"""Seconds within which a server that is not busy answers."""
 TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter.
 
@@ -78,6 +80,7 @@ class Line:
         self._remapped = _remapped(traffic.node, name)
         self._look_at = 0.0
         self._long_standstills = alarm.standstill.long_times
+        self._last_question_at = NEVER  # to a server that has answered another client
         self.in_sight_since = time.monotonic()
         """Since when a server of this name has been shown without a break that was seen."""
         self._just_came = True
@@ -221,7 +224,7 @@ class Line:
                     held = alarm.standstill.answers_take(now.steady)
                     if goal.state is State.WAITING_FOR_SERVER:
                         held = max(held, alarm.standstill.servers_take(now.steady))
-                    elif self.in_doubt(now.steady):
+                    if self.in_doubt(now.steady):
                         held = max(held, LOOK_WHILE_RUNNING)
                     goal.hold(held, now)
                 self._apply(ticket, lambda _: goal.poll(now), None)
@@ -392,43 +395,69 @@ class Line:
         return self.watch.state(now) is Server.ABSENT
 
     def _is_mute(self, now: float) -> bool:
-        """Whether a server is in sight that has not answered for long; once it was found why."""
-        return self._sight is None and not self._is_absent(now) and self.client.hearing.is_mute(now)
+        """Whether a server is in sight that has not answered for long.
+
+        Not where nobody has taken its answers; and only once, from our own participant.
+        """
+        if self._sight is not None or self._is_absent(now) or not self.client.hearing.is_mute(now):
+            return False
+        self.pump()
+        return self.client.hearing.is_mute(now)
 
     def is_waited_for(self) -> bool:
         """Whether a goal is still to be sent."""
         return any(not ticket.goal.sent for ticket in self.goals.values())
 
     def client_in(self, sight: Sight) -> ActionClient:
-        """Return a client like our own in another participant."""
-        return ActionClient(sight.node, self.action_type, self.name, self)
+        """Return a client like our own in another participant, on trial."""
+        now = time.monotonic()
+        client = ActionClient(sight.node, self.action_type, self.name, self)
+        client.on_trial = True
+        if not self._is_absent(now):
+            self.client.hearing.tried(now)
+            client.hearing.doubt(now)
+            self._last_question_at = NEVER
+        return client
 
     def prefers(self, client: ActionClient) -> bool:
         """Whether this client, which is ready, is heard where our own is not, or sees the server.
 
-        A server that answers nobody now is busy; to go on with another client would not help.
+        A server that answers nobody is busy; one that has just answered this client would answer
+        our own as well, if it heard it.
         """
-        if self._is_absent(time.monotonic()):
+        now = time.monotonic()
+        if self._is_absent(now):
             return True
+        if not self._is_mute(now):
+            return False
         client.pump()
-        hearing = client.hearing
-        if not (hearing.heard or hearing.asks) or hearing.wants_question(time.monotonic()):
-            client.probe(next(_probes), uuid.uuid4().bytes)
-        return hearing.heard
+        if not client.hearing.heard:
+            if client.hearing.take_question(now):
+                _ask(client)
+            return False
+        if self._last_question_at == NEVER:
+            self._last_question_at = now
+            self._probe()
+        return now - self._last_question_at >= LAST_WORD
 
     def move_to(self, sight: Sight, client: ActionClient) -> None:
         """Go on with a client in a participant that sees the server; the alarm takes its answers.
 
         What is under way in the old one is not heard there, see `misses`, and is asked anew.
         """
+        now = time.monotonic()
+        blind, seen = self._is_absent(now), self.watch.gids
+        self.pump()
         sight.users.add(self)
-        blind = self._is_absent(time.monotonic())
+        client.on_trial = False
         self._go_on_with(client, sight)
         if blind:
             log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
             return
         log.info(f"{self.name}: does not hear this node any more; a new one is heard")
         for ticket in list(self.goals.values()):
+            if ticket.testimony.sent_to & seen:  # it may be shown later than another of its name
+                ticket.not_gone_before = max(ticket.not_gone_before, now + LEASE)
             ticket.goal.hold(ANSWERS_TAKE, self.traffic.clocks.now())
             self.tell(ticket, Event.SERVER_CHANGED)
 
@@ -581,7 +610,7 @@ class Line:
         if alarm.standstill.long_times != self._long_standstills:
             self._long_standstills = alarm.standstill.long_times
             self.client.hearing.doubt(now)
-        if self.watch.wants_probe(now) or self.client.hearing.wants_question(now):
+        if self.client.hearing.take_question(now) or self.watch.wants_probe(now):
             self._probe()
         for ticket in list(self.goals.values()):
             gone = self.watch.gone(now, ticket.testimony.sent_to)
@@ -684,6 +713,12 @@ class Line:
                 wait = min(wait, due)
         self._bound_the_lost()
         return max(wait, 0.001)
+
+
+def _ask(client: ActionClient) -> None:
+    """Ask just in order to be answered."""
+    with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
+        client.probe(next(_probes), uuid.uuid4().bytes)
 
 
 def _remapped(node: Any, name: str) -> bool:

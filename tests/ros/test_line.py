@@ -196,19 +196,40 @@ def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
     assert Line._is_hidden(line, ticket)
 
 
-@pytest.mark.parametrize("busy", [False, True])
-def test_a_client_is_preferred_to_one_that_is_not_heard_where_it_is_itself(busy: bool) -> None:
+@pytest.mark.parametrize("heard", ["it alone", "both", "nobody"])
+def test_a_client_is_preferred_where_it_is_heard_and_our_own_is_not(
+    monkeypatch: pytest.MonkeyPatch, heard: str
+) -> None:
     """A busy server answers nobody."""
-    asked: list[int] = []
-    hearing = Hearing()
-    client: Any = SimpleNamespace(hearing=hearing, pump=lambda: None)
-    client.probe = lambda probe, _: (asked.append(probe), hearing.asked(time.monotonic()))
-    line: Any = SimpleNamespace(_is_absent=lambda _: False)
-    assert not Line.prefers(line, client)
-    if not busy:
-        hearing.answered(time.monotonic())
-    assert Line.prefers(line, client) is not busy
-    assert asked
+    moment = 100.0
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
+    own, trial = Hearing(), Hearing()
+    asked: list[Hearing] = []
+
+    def client(hearing: Hearing, hears: bool) -> Any:
+        def probe(_: int, __: bytes) -> None:
+            asked.append(hearing)
+            hearing.asked(moment)
+            if hears:
+                hearing.answered(moment)
+
+        return SimpleNamespace(hearing=hearing, pump=lambda: None, probe=probe)
+
+    line: Any = SimpleNamespace(client=client(own, heard == "both"), _last_question_at=module.NEVER)
+    line._is_absent = lambda _: False
+    line._is_mute = own.is_mute
+    line._probe = lambda: line.client.probe(1, b"")
+    own.asked(moment)
+    other = client(trial, heard != "nobody")
+    trial.doubt(moment)
+    assert not Line.prefers(line, other), "it is too early"
+    preferred = False
+    for _ in range(60):
+        moment += 0.1
+        preferred = preferred or Line.prefers(line, other)
+    assert preferred is (heard == "it alone")
+    assert asked.count(trial) == (2 if heard == "nobody" else 1)
+    assert asked.count(own) == (heard != "nobody")
 
 
 def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
