@@ -10,13 +10,14 @@ clock of its own.
 
 from __future__ import annotations
 
-ASK_AGAIN = 3.0
-"""Seconds from the first question to the last; Fast DDS announces a process every 3 s or sooner."""
+AT_ONCE, TWICE = (0.0,), (0.0, 3.0)
+"""Seconds after which to ask. A new participant is asked in twice: it may be known to all only when
+Fast DDS announces it the next time, after 3 s."""
 MUTE_AFTER = 2.0
 """Seconds without an answer to any question until the server may not hear them;"""
 TRIES = 2
 """so often is another way looked for while it is silent,"""
-TRY_LASTS = 6.0
+TRY_LASTS = 5.5
 """each for so many seconds;"""
 TRY_AGAIN = 60.0
 """and then only after so many since the last."""
@@ -32,7 +33,7 @@ class Hearing:
         self.heard = False
         """Whether any question was ever answered."""
         self._unanswered_since: float | None = None
-        self._questions: list[float] = []
+        self._ask_at: list[float] = []
         """When to ask just in order to be answered."""
         self._in_doubt_until = NEVER
         self._tries, self._tried_at = 0, NEVER
@@ -46,13 +47,17 @@ class Hearing:
         """Take note of an answer to a question that was asked at this moment."""
         self.heard = True
         if self._unanswered_since is not None and asked >= self._unanswered_since:
-            self._unanswered_since, self._questions, self._tries = None, [], 0
+            self._unanswered_since, self._ask_at, self._tries = None, [], 0
             self._in_doubt_until = NEVER
 
-    def doubt(self, now: float) -> None:
-        """What was heard before proves nothing, as this process stood still: it is to be asked."""
-        self._unanswered_since, self._tries = now, 0
-        self._questions = [now, now + ASK_AGAIN]
+    def doubt(self, now: float, ask_after: tuple[float, ...] = AT_ONCE) -> None:
+        """What was heard before proves nothing, as this process stood still: it is to be asked.
+
+        Where a doubt is open, it has been asked already.
+        """
+        if not self.in_doubt(now):
+            self._ask_at, self._tries = [now + seconds for seconds in ask_after], 0
+        self._unanswered_since = now
         self._in_doubt_until = now + DOUBT_LASTS
 
     def in_doubt(self, now: float) -> float:
@@ -61,9 +66,9 @@ class Hearing:
 
     def take_question(self, now: float) -> bool:
         """Whether to ask something now, just in order to be answered; it counts as asked then."""
-        if not self._questions or now < self._questions[0]:
+        if not self._ask_at or now < self._ask_at[0]:
             return False
-        del self._questions[0]
+        del self._ask_at[0]
         return True
 
     def tried(self, now: float) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.hearing import (
-    ASK_AGAIN,
+    AT_ONCE,
     DOUBT_LASTS,
     MUTE_AFTER,
     TRIES,
     TRY_AGAIN,
     TRY_LASTS,
+    TWICE,
     Hearing,
 )
 
@@ -58,14 +59,23 @@ def test_an_answer_of_before_the_standstill_proves_nothing(hearing: Hearing) -> 
     assert not hearing.is_mute(99.0)
 
 
-def test_after_a_standstill_it_is_asked_twice_and_no_more(hearing: Hearing) -> None:
-    hearing.doubt(30.0)
+@pytest.mark.parametrize("ask_after", [AT_ONCE, TWICE])
+def test_in_a_doubt_it_is_asked_so_often(hearing: Hearing, ask_after: tuple[float, ...]) -> None:
+    hearing.doubt(30.0, ask_after)
     asked = [now / 10 for now in range(300, 1000) if hearing.take_question(now / 10)]
-    assert asked == [30.0, 30.0 + ASK_AGAIN]
+    assert asked == [30.0 + seconds for seconds in ask_after]
     hearing.doubt(100.0)
-    assert hearing.take_question(100.0)
     hearing.answered(100.0)
     assert not hearing.take_question(199.0), "it was answered"
+
+
+def test_standstills_that_follow_each_other_are_one_doubt(hearing: Hearing) -> None:
+    for now in (30.0, 36.0, 42.0):
+        hearing.doubt(now)
+        assert hearing.take_question(now) is (now == 30.0)
+        assert hearing.in_doubt(now) == DOUBT_LASTS
+        assert hearing.is_mute(now + MUTE_AFTER) is (now < 42.0)
+        hearing.tried(now + MUTE_AFTER)
 
 
 def test_another_way_is_looked_for_now_and_then(hearing: Hearing) -> None:

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
+from bt_actions.hearing import TWICE
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
@@ -231,7 +232,11 @@ class Line:
 
     def in_doubt(self, now: float) -> float:
         """Return for how many seconds a server that is silent may not have heard us; or 0."""
-        return 0.0 if self._is_absent(now) else self.client.hearing.in_doubt(now)
+        if self._is_absent(now):
+            return 0.0
+        if alarm.standstill.long_times != self._long_standstills:
+            return LOOK_WHILE_RUNNING  # until the next look
+        return self.client.hearing.in_doubt(now)
 
     @staticmethod
     def given_up(ticket: Ticket) -> bool:
@@ -397,9 +402,9 @@ class Line:
     def _is_mute(self, now: float) -> bool:
         """Whether a server is in sight that has not answered for long.
 
-        Not where nobody has taken its answers; and only once, from our own participant.
+        Not where nobody has taken its answers.
         """
-        if self._sight is not None or self._is_absent(now) or not self.client.hearing.is_mute(now):
+        if self._is_absent(now) or not self.client.hearing.is_mute(now):
             return False
         self.pump()
         return self.client.hearing.is_mute(now)
@@ -415,7 +420,7 @@ class Line:
         client.on_trial = True
         if not self._is_absent(now):
             self.client.hearing.tried(now)
-            client.hearing.doubt(now)
+            client.hearing.doubt(now, TWICE)
             self._last_question_at = NEVER
         return client
 
@@ -448,6 +453,9 @@ class Line:
         now = time.monotonic()
         blind, seen = self._is_absent(now), self.watch.gids
         self.pump()
+        if self.client.closed:  # by what came, and nobody used the line
+            client.destroy()
+            return
         sight.users.add(self)
         client.on_trial = False
         self._go_on_with(client, sight)
@@ -610,10 +618,13 @@ class Line:
         if alarm.standstill.long_times != self._long_standstills:
             self._long_standstills = alarm.standstill.long_times
             self.client.hearing.doubt(now)
-        if self.client.hearing.take_question(now) or self.watch.wants_probe(now):
+        asks = not self._is_absent(now) and self.client.hearing.take_question(now)
+        if asks or self.watch.wants_probe(now):
             self._probe()
         for ticket in list(self.goals.values()):
             gone = self.watch.gone(now, ticket.testimony.sent_to)
+            if not gone:
+                ticket.not_gone_before = NEVER  # it has been discovered
             if (gone and now < ticket.not_gone_before) or self._is_hidden(ticket):
                 continue  # it has not been discovered yet, though its status may have come already
             if ticket.goal.sent:
@@ -632,7 +643,7 @@ class Line:
             self.traffic.domain.lost_sight |= state is Server.ABSENT
             self.traffic.domain.known.add((self.name, self.action_type))
         if self.misses():
-            look_for(self, self.traffic.domain.number)
+            look_for(self, self.traffic.domain.number, at_once=self.in_doubt(now) > 0.0)
         if state is Server.AMBIGUOUS and not self._warned_crowd:
             self._warned_crowd = True
             log.warning(f"{self.name}: two action servers answer to this name; none is sent to")
@@ -645,14 +656,14 @@ class Line:
 
         Not for ever, where it does so again and again and the server is not seen in between.
         """
-        still, sent_to = alarm.standstill, ticket.testimony.sent_to
-        if sent_to <= self.watch.gids and not self.watch.gone(time.monotonic(), sent_to):
+        still, sent_to, now = alarm.standstill, ticket.testimony.sent_to, time.monotonic()
+        in_sight = sent_to <= self.watch.gids and not self.watch.gone(now, sent_to)
+        if in_sight or still.servers_take(now) <= 0.0:
             ticket.hidden_since = None
             return False
         if ticket.hidden_since is None:
             ticket.hidden_since = still.times
-        is_news = still.times - ticket.hidden_since <= AT_MOST
-        return is_news and still.servers_take(time.monotonic()) > 0.0
+        return still.times - ticket.hidden_since < AT_MOST
 
     def _come_home(self) -> None:
         """The participant that we moved to is gone, if we did; our node is not."""

@@ -123,12 +123,15 @@ class Sight:
         self._context.try_shutdown()
 
 
-def look_for(line: Seeker, domain: int) -> None:
-    """Look for what this line misses, until it misses nothing; the caller holds the lock."""
+def look_for(line: Seeker, domain: int, *, at_once: bool = False) -> None:
+    """Look for what this line misses, until it misses nothing; the caller holds the lock.
+
+    With `at_once`, whatever pause between two looks for others has been reached begins anew.
+    """
     lookout = _lookouts.get(domain)
     if lookout is None:
         lookout = _lookouts[domain] = Lookout(domain)
-    lookout.add(line)
+    lookout.add(line, at_once=at_once)
 
 
 class Lookout:
@@ -146,11 +149,13 @@ class Lookout:
         self._thread: threading.Thread | None = None
         self._urgent_since: float | None = None
         self._told = False
+        self._begins_anew = False
 
-    def add(self, line: Seeker) -> None:
+    def add(self, line: Seeker, *, at_once: bool = False) -> None:
         """Look for what this line misses, too."""
         if line not in self._missing:
             self._missing.add(line)
+            self._begins_anew |= at_once
             self._bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             self._thread = _start(self._run)
@@ -173,6 +178,9 @@ class Lookout:
         while True:
             with lock:
                 self._wait(pause)
+                if self._begins_anew:
+                    pause, self._begins_anew, self._urgent_since = FIRST_AFTER, False, None
+                    self._wait(pause)
                 if not self._still_missing():
                     self._urgent_since = None
                     return
@@ -190,7 +198,7 @@ class Lookout:
         started = time.monotonic()
         while self._still_missing():
             left = started + (min(pause, PAUSE) if self._is_urgent() else pause) - time.monotonic()
-            if left <= 0.0:
+            if left <= 0.0 or (self._begins_anew and pause > FIRST_AFTER):
                 return
             self._bell.wait(min(left, PAUSE))
 

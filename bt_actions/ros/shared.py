@@ -123,7 +123,7 @@ class Ticket:
     lease, or not be discovered yet. Both in seconds of the steady clock."""
 
     hidden_since: int | None = None
-    """Standstills of this process by then; None while its servers are in sight."""
+    """Standstills of this process by then; None while its servers are in sight, or need not be."""
 
     def __post_init__(self) -> None:
         self.testimony = Testimony(self.goal)

@@ -189,11 +189,13 @@ def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
         assert Line._is_hidden(line, ticket)
     still.lives(moment := moment + 3.0)
     assert not Line._is_hidden(line, ticket)
+    for _ in range(50):
+        still.lives(moment := moment + 0.1)
+    assert not Line._is_hidden(line, ticket), "a calm, in which the other may turn out a ghost"
+    still.lives(moment := moment + 3.0)
+    assert Line._is_hidden(line, ticket)
     line.watch = watch(OURS, NEW)
     assert not Line._is_hidden(line, ticket)
-    still.lives(moment := moment + 3.0)
-    line.watch = watch(NEW)
-    assert Line._is_hidden(line, ticket)
 
 
 @pytest.mark.parametrize("heard", ["it alone", "both", "nobody"])
@@ -228,8 +230,27 @@ def test_a_client_is_preferred_where_it_is_heard_and_our_own_is_not(
         moment += 0.1
         preferred = preferred or Line.prefers(line, other)
     assert preferred is (heard == "it alone")
-    assert asked.count(trial) == (2 if heard == "nobody" else 1)
+    assert asked.count(trial) == 1
     assert asked.count(own) == (heard != "nobody")
+
+
+def test_a_standstill_that_no_look_has_seen_yet_is_a_doubt(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In the user's callable that makes the goal, say: it is not sent before somebody has asked."""
+    still = Standstill()
+    monkeypatch.setattr(alarm, "standstill", still)
+    client = SimpleNamespace(hearing=Hearing())
+    line: Any = SimpleNamespace(client=client, _is_absent=lambda _: False, _long_standstills=0)
+    still.lives(10.0)
+    assert not Line.in_doubt(line, 10.0)
+    still.lives(16.0)
+    assert Line.in_doubt(line, 16.0)
+    line._long_standstills = still.long_times
+    assert not Line.in_doubt(line, 16.0)
+    line._is_absent = lambda _: True
+    line._long_standstills = 0
+    assert not Line.in_doubt(line, 16.0)
 
 
 def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(

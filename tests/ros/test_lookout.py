@@ -312,3 +312,31 @@ def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
     leaf.shutdown()
     remapped.destroy_node()
     context.shutdown()
+
+
+class Missing:
+    """A line that nobody waits for."""
+
+    def misses(self) -> bool:
+        return True
+
+    def is_waited_for(self) -> bool:
+        return False
+
+
+def test_who_is_in_doubt_waits_for_no_pause_that_others_have_reached() -> None:
+    looks = lookout.Lookout(0)
+    first, second = Missing(), Missing()
+    looks._missing = {first}  # type: ignore[arg-type]
+    looks._thread = threading.current_thread()
+
+    def wait() -> None:
+        with lock:
+            looks._wait(600.0)
+
+    waits = threading.Thread(target=wait, daemon=True)
+    waits.start()
+    with lock:
+        looks.add(second, at_once=True)  # type: ignore[arg-type]
+    waits.join(30.0)
+    assert not waits.is_alive()
