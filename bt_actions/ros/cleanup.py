@@ -89,8 +89,53 @@ def cleanup(
     stopped, or a ghost) are waited for up to LOOK_LONGEST seconds, and `missing` is called with
     them, in the beginning of that, and in the end if it was in vain, as it is told. Blocks.
 
+    Where this process stands still for long meanwhile, servers may never tell its participant
+    anything again (ros/lookout.py), and it looks again with a new one, unless `context` is given.
+
     Raises CannotStart.
     """
+    left: dict[bytes, LeftBehind] = {}
+    told: set[str] = set()
+
+    def sight(action: str) -> None:
+        if action not in told:
+            told.add(action)
+            sighted(action)
+
+    for again in (True, True, False):
+        stood_still = _look_and_cancel(
+            left,
+            again and context is None,
+            look=look,
+            patience=patience,
+            found=found,
+            sighted=sight,
+            elsewhere=elsewhere,
+            wanted=wanted,
+            namespace=namespace,
+            missing=missing,
+            context=context,
+        )
+        if not stood_still:
+            break
+    return list(left.values())
+
+
+def _look_and_cancel(
+    left: dict[bytes, LeftBehind],
+    stops_when_still: bool,
+    *,
+    look: float,
+    patience: float,
+    found: Callable[[LeftBehind], None],
+    sighted: Callable[[str], None],
+    elsewhere: Callable[[str, bytes], None],
+    wanted: Collection[str],
+    namespace: str,
+    missing: Callable[[list[str], bool], None],
+    context: Context | None,
+) -> bool:
+    """Add what is found to `left`; return whether it was broken off because of a standstill."""
     own = Context() if context is None else context
     try:
         if context is None:
@@ -103,6 +148,7 @@ def cleanup(
     executor = SingleThreadedExecutor(context=own)
     executor.add_node(node)
     sweep = _Sweep(node, found, sighted, elsewhere)
+    sweep.left = left
     try:
         here = node.get_name(), node.get_namespace()  # remapped, as that of the run will be
         sweep.unanswered = {expand_topic_name(name, *here) for name in wanted}
@@ -112,6 +158,8 @@ def cleanup(
             now = time.monotonic()
             looked = max(looked, sweep.newest + SETTLE)
             held = max(still.answers_take(now), still.servers_take(now))
+            if still.long_times and stops_when_still:
+                return True
             if held > 0.0 and still.times <= AT_MOST:  # what there is may not be in sight again
                 looked = max(looked, now + held)
             lacks = sorted(sweep.unanswered)
@@ -133,7 +181,7 @@ def cleanup(
         node.destroy_node()
         if context is None:
             own.shutdown()
-    return list(sweep.left.values())
+    return False
 
 
 class _Sweep:
