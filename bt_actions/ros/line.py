@@ -438,7 +438,7 @@ class Line:
         client.pump()
         if not client.hearing.heard:
             if client.hearing.take_question(now):
-                _ask(client)
+                _ask(client, next(_probes))
             return False
         if self._last_question_at == NEVER:
             self._last_question_at = now
@@ -684,8 +684,7 @@ class Line:
         self._last_probes.append(probe)
         if len(self._last_probes) > PROBES_KEPT:
             self.client.forget(self._last_probes.popleft())
-        with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
-            self.client.probe(probe, uuid.uuid4().bytes)
+        _ask(self.client, probe)
 
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""
@@ -726,10 +725,10 @@ class Line:
         return max(wait, 0.001)
 
 
-def _ask(client: ActionClient) -> None:
+def _ask(client: ActionClient, probe: int) -> None:
     """Ask just in order to be answered."""
     with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
-        client.probe(next(_probes), uuid.uuid4().bytes)
+        client.probe(probe, uuid.uuid4().bytes)
 
 
 def _remapped(node: Any, name: str) -> bool:
