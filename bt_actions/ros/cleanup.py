@@ -8,9 +8,10 @@ action type is needed for any of it.
 
 from __future__ import annotations
 
+import contextlib
 import time
 import uuid
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -94,48 +95,21 @@ def cleanup(
 
     Raises CannotStart.
     """
-    left: dict[bytes, LeftBehind] = {}
-    told: set[str] = set()
-
-    def sight(action: str) -> None:
-        if action not in told:
-            told.add(action)
-            sighted(action)
-
-    for again in (True, True, False):
-        stood_still = _look_and_cancel(
-            left,
-            again and context is None,
-            look=look,
-            patience=patience,
-            found=found,
-            sighted=sight,
-            elsewhere=elsewhere,
-            wanted=wanted,
-            namespace=namespace,
-            missing=missing,
-            context=context,
-        )
-        if not stood_still:
-            break
-    return list(left.values())
+    sweep = _Sweep(found, sighted, elsewhere, missing)
+    for tries_left in (2, 1, 0) if context is None else (0,):
+        still = Standstill()
+        still.lives(time.monotonic())  # it counts from when the participant is made
+        with _participant(context, namespace) as (node, executor):
+            sweep.begin(node, wanted)
+            if sweep.goes_through(executor, still, look, patience, breaks_off=tries_left > 0):
+                break
+    return list(sweep.left.values())
 
 
-def _look_and_cancel(
-    left: dict[bytes, LeftBehind],
-    stops_when_still: bool,
-    *,
-    look: float,
-    patience: float,
-    found: Callable[[LeftBehind], None],
-    sighted: Callable[[str], None],
-    elsewhere: Callable[[str, bytes], None],
-    wanted: Collection[str],
-    namespace: str,
-    missing: Callable[[list[str], bool], None],
-    context: Context | None,
-) -> bool:
-    """Add what is found to `left`; return whether it was broken off because of a standstill."""
+@contextlib.contextmanager
+def _participant(
+    context: Context | None, namespace: str
+) -> Iterator[tuple[Node, SingleThreadedExecutor]]:
     own = Context() if context is None else context
     try:
         if context is None:
@@ -147,78 +121,94 @@ def _look_and_cancel(
         raise CannotStart(str(error).splitlines()[0]) from error
     executor = SingleThreadedExecutor(context=own)
     executor.add_node(node)
-    sweep = _Sweep(node, found, sighted, elsewhere)
-    sweep.left = left
     try:
-        here = node.get_name(), node.get_namespace()  # remapped, as that of the run will be
-        sweep.unanswered = {expand_topic_name(name, *here) for name in wanted}
-        began, waits = time.monotonic(), False
-        looked, still = began + look, Standstill()
-        while True:
-            now = time.monotonic()
-            looked = max(looked, sweep.newest + SETTLE)
-            held = max(still.answers_take(now), still.servers_take(now))
-            if still.long_times and stops_when_still:
-                return True
-            if held > 0.0 and still.times <= AT_MOST:  # what there is may not be in sight again
-                looked = max(looked, now + held)
-            lacks = sorted(sweep.unanswered)
-            if lacks and now >= looked and not waits:
-                waits = True
-                missing(lacks, False)
-            if waits and lacks and now < began + LOOK_LONGEST:
-                looked = now + 1.0
-            if now < looked:
-                sweep.discover(now)
-            elif sweep.over or now >= looked + patience:
-                break
-            sweep.ask()
-            executor.spin_once(timeout_sec=0.05)
-        if lacks:
-            missing(lacks, True)
+        yield node, executor
     finally:
         executor.shutdown()
         node.destroy_node()
         if context is None:
             own.shutdown()
-    return False
 
 
 class _Sweep:
+    """What was found, in one participant after another."""
+
     def __init__(
         self,
-        node: Node,
         found: Callable[[LeftBehind], None],
         sighted: Callable[[str], None],
         elsewhere: Callable[[str, bytes], None],
+        missing: Callable[[list[str], bool], None],
     ) -> None:
-        self._node = node
         self._found = found
         self._sighted = sighted
         self._elsewhere = elsewhere
+        self._missing = missing
         self._foreign: set[bytes] = set()
         self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
+        self._seen: set[str] = set()
+        self.left: dict[bytes, LeftBehind] = {}
+
+    def begin(self, node: Node, wanted: Collection[str]) -> None:
+        """Go on with what this node sees; servers of `wanted` actions have to answer it."""
+        self._node = node
         self._subscriptions: dict[str, Any] = {}
         self._clients: dict[str, Any] = {}
         self._asked_at = float("-inf")
-        self.left: dict[bytes, LeftBehind] = {}
-        self.unanswered: set[str] = set()
-        """Wanted actions of which no server has answered."""
-        self.newest = float("-inf")
-        """When the last action came in sight, or a server answered first."""
+        here = node.get_name(), node.get_namespace()  # remapped, as that of the run will be
+        self._unanswered = {expand_topic_name(name, *here) for name in wanted}
+        self._newest = float("-inf")  # when the last action came in sight, or a server answered
+
+    def goes_through(
+        self,
+        executor: SingleThreadedExecutor,
+        still: Standstill,
+        look: float,
+        patience: float,
+        *,
+        breaks_off: bool,
+    ) -> bool:
+        """Look, cancel, and wait; return False where it `breaks_off` because of a standstill."""
+        began, waits = time.monotonic(), False
+        looked = began + look
+        while True:
+            now = time.monotonic()
+            looked = max(looked, self._newest + SETTLE)
+            held = max(still.answers_take(now), still.servers_take(now))
+            if still.long_times and breaks_off:
+                return False
+            if held > 0.0 and still.times <= AT_MOST:  # what there is may not be in sight again
+                looked = max(looked, now + held)
+            lacks = sorted(self._unanswered)
+            if lacks and now >= looked and not waits:
+                waits = True
+                self._missing(lacks, False)
+            if waits and lacks and now < began + LOOK_LONGEST:
+                looked = now + 1.0
+            if now < looked:
+                self._discover(now)
+            elif self._over or now >= looked + patience:
+                break
+            self._ask()
+            executor.spin_once(timeout_sec=0.05)
+        if lacks:
+            self._missing(lacks, True)
+        return True
 
     @property
-    def over(self) -> bool:
+    def _over(self) -> bool:
         """Whether every goal that was found has ended."""
         return all(goal.end is not End.UNKNOWN for goal in self.left.values())
 
-    def discover(self, now: float) -> None:
+    def _discover(self, now: float) -> None:
         """Listen to every action's status that is in sight."""
         for topic, _types in self._node.get_topic_names_and_types():
             if topic.endswith(STATUS) and topic not in self._subscriptions:
                 action = topic.removesuffix(STATUS)
-                self.newest = now
-                self._sighted(action)
+                self._newest = now
+                if action not in self._seen:
+                    self._seen.add(action)
+                    self._sighted(action)
                 self._subscriptions[topic] = self._node.create_subscription(
                     GoalStatusArray,
                     topic,
@@ -252,7 +242,7 @@ class _Sweep:
                 left = self.left[goal_id] = LeftBehind(action, goal_id, author.pid)
                 self._found(left)
 
-    def ask(self) -> None:
+    def _ask(self) -> None:
         """Ask the servers to cancel what has not ended, again every second."""
         now = time.monotonic()
         self._find()
@@ -264,7 +254,7 @@ class _Sweep:
                 left.asked_at = now
         if now - self._asked_at >= ASK_AGAIN:
             self._asked_at = now
-            for action in sorted(self.unanswered):
+            for action in sorted(self._unanswered):
                 self._cancel(action, uuid.uuid4().bytes)  # nobody's: any answer shows that it lives
 
     def _cancel(self, action: str, goal_id: bytes) -> bool:
@@ -281,6 +271,6 @@ class _Sweep:
         return True
 
     def _answered(self, action: str) -> None:
-        if action in self.unanswered:
-            self.unanswered.remove(action)
-            self.newest = time.monotonic()  # its status may be under way
+        if action in self._unanswered:
+            self._unanswered.remove(action)
+            self._newest = time.monotonic()  # its status may be under way

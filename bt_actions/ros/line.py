@@ -11,25 +11,22 @@ import contextlib
 import dataclasses
 import itertools
 import time
-import uuid
 import weakref
 from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
-from bt_actions.hearing import TWICE
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
 from bt_actions.ros.alive import is_valid
-from bt_actions.ros.graph import servers
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
-from bt_actions.ros.lookout import Sight, look_for
 from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
+from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
-from bt_actions.standstill import ANSWERS_TAKE, AT_MOST
+from bt_actions.standstill import AT_MOST
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
 
@@ -52,12 +49,6 @@ their server is there: longer than a ghost is shown, or a question waits (goal.D
 BESIDE = 1.0
 """Seconds for which a server may be in sight before another one that was there all the time, or
 that came back with it; 0.5 measured."""
-LAST_WORD = 0.5
-"""Seconds within which a server that is not busy answers."""
-TOO_NEW = 3.0
-"""Seconds for which a participant has dropped nobody: no lease that is useful is shorter.
-
-After them it has discovered who was there."""
 FEEDBACK = "/_action/feedback"
 
 _probes = itertools.count(1)
@@ -77,11 +68,8 @@ class Line:
         self.client = ActionClient(traffic.node, action_type, name, self)
         self.orphaned = False
         self._heard_at = time.monotonic()  # of an orphan: when somebody last answered
-        self._sight: Sight | None = None  # where the client lives if our node was blind to it
-        self._remapped = _remapped(traffic.node, name)
+        self.way = Way(self)
         self._look_at = 0.0
-        self._long_standstills = alarm.standstill.long_times
-        self._last_question_at = NEVER  # to a server that has answered another client
         self.in_sight_since = time.monotonic()
         """Since when a server of this name has been shown without a break that was seen."""
         self._just_came = True
@@ -225,18 +213,10 @@ class Line:
                     held = alarm.standstill.answers_take(now.steady)
                     if goal.state is State.WAITING_FOR_SERVER:
                         held = max(held, alarm.standstill.servers_take(now.steady))
-                    if self.in_doubt(now.steady):
+                    if self.way.in_doubt(now.steady):
                         held = max(held, LOOK_WHILE_RUNNING)
                     goal.hold(held, now)
                 self._apply(ticket, lambda _: goal.poll(now), None)
-
-    def in_doubt(self, now: float) -> float:
-        """Return for how many seconds a server that is silent may not have heard us; or 0."""
-        if self._is_absent(now):
-            return 0.0
-        if alarm.standstill.long_times != self._long_standstills:
-            return LOOK_WHILE_RUNNING  # until the next look
-        return self.client.hearing.in_doubt(now)
 
     @staticmethod
     def given_up(ticket: Ticket) -> bool:
@@ -376,111 +356,16 @@ class Line:
 
     # The watch over the server
 
-    def misses(self) -> bool:
-        """Whether a server is wanted that may be there, though nothing shows all of it.
-
-        Or it is shown, and does not answer. Not while answers may be under way: in a second, what
-        runs on an absent server is lost. And not where remapping rules give our node another server
-        than a new participant would find.
-        """
-        now = time.monotonic()
-        if self.orphaned or not self.goals or self._remapped:
-            return False
-        if now - self.traffic.seen_since < TOO_NEW:
-            return False
-        if self.users <= 0 and all(ticket.goal.lost for ticket in self.goals.values()):
-            return False  # nobody here wants it; it is remembered, as what is put away is
-        domain = self.traffic.domain
-        known = domain.lost_sight or (self.name, self.action_type) in domain.known
-        running = (State.SENDING, State.EXECUTING)
-        still = all(ticket.goal.state not in running for ticket in self.goals.values())
-        return (known and self._is_absent(now) and still) or self._is_mute(now)
-
-    def _is_absent(self, now: float) -> bool:
-        return self.watch.state(now) is Server.ABSENT
-
-    def _is_mute(self, now: float) -> bool:
-        """Whether a server is in sight that has not answered for long.
-
-        Not where nobody has taken its answers.
-        """
-        if self._is_absent(now) or not self.client.hearing.is_mute(now):
-            return False
-        self.pump()
-        return self.client.hearing.is_mute(now)
-
-    def is_waited_for(self) -> bool:
-        """Whether a goal is still to be sent."""
-        return any(not ticket.goal.sent for ticket in self.goals.values())
-
-    def client_in(self, sight: Sight) -> ActionClient:
-        """Return a client like our own in another participant, on trial."""
-        now = time.monotonic()
-        client = ActionClient(sight.node, self.action_type, self.name, self)
-        client.on_trial = True
-        if not self._is_absent(now):
-            self.client.hearing.tried(now)
-            client.hearing.doubt(now, TWICE)
-            self._last_question_at = NEVER
-        return client
-
-    def prefers(self, client: ActionClient) -> bool:
-        """Whether this client, which is ready, is heard where our own is not, or sees the server.
-
-        A server that answers nobody is busy; one that has just answered this client would answer
-        our own as well, if it heard it.
-        """
-        now = time.monotonic()
-        if self._is_absent(now):
-            return True
-        if not self._is_mute(now):
-            return False
-        client.pump()
-        if not client.hearing.heard:
-            if client.hearing.take_question(now):
-                _ask(client, next(_probes))
-            return False
-        if self._last_question_at == NEVER:
-            self._last_question_at = now
-            self._probe()
-        return now - self._last_question_at >= LAST_WORD
-
-    def move_to(self, sight: Sight, client: ActionClient) -> None:
-        """Go on with a client in a participant that sees the server; the alarm takes its answers.
-
-        What is under way in the old one is not heard there, see `misses`, and is asked anew.
-        """
-        now = time.monotonic()
-        blind, seen = self._is_absent(now), self.watch.gids
-        self.pump()
-        if self.client.closed:  # by what came, and nobody used the line
-            client.destroy()
-            return
-        sight.users.add(self)
-        client.on_trial = False
-        self._go_on_with(client, sight)
-        if blind:
-            log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
-            return
-        log.info(f"{self.name}: does not hear this node any more; a new one is heard")
-        for ticket in list(self.goals.values()):
-            if ticket.testimony.sent_to & seen:  # it may be shown later than another of its name
-                ticket.not_gone_before = max(ticket.not_gone_before, now + LEASE)
-            ticket.goal.hold(ANSWERS_TAKE, self.traffic.clocks.now())
-            self.tell(ticket, Event.SERVER_CHANGED)
-
-    def _go_on_with(self, client: ActionClient, sight: Sight | None) -> None:
-        self.close()
-        self.client, self._sight, self.watch = client, sight, ServerWatch()
+    def open(self, client: ActionClient) -> None:
+        """Go on with another client, of which nothing is known yet."""
+        self.client, self.watch = client, ServerWatch()
         self._look_at = 0.0
         alarm.wake_by(time.monotonic())
 
     def close(self) -> None:
         """Let go of the client; answers that are still under way are lost."""
         self.client.destroy()
-        if self._sight is not None:
-            self._sight.left_by(self)
-            self._sight = None
+        self.way.leave()
 
     def neighbors(self) -> list[Line]:
         """Return the lines with goals in our ROS domain, of all nodes of this process."""
@@ -585,15 +470,9 @@ class Line:
         for ticket in settled[:-LOST_KEPT]:
             self.tell(ticket, Event.CLOSED)
 
-    def _shown(self) -> frozenset[bytes]:
-        """Return the GIDs of the servers in sight; raises where our node is gone."""
-        if self._sight is not None:
-            return self._sight.shows(self.name)
-        return servers(self.traffic.node, self.name)
-
     def _observe(self, now: float) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""
-        self.watch.observe(now, self.client.server_is_ready(), self._shown())
+        self.watch.observe(now, self.client.server_is_ready(), self.way.shown())
 
     def look(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
@@ -611,16 +490,13 @@ class Line:
         try:
             self._observe(now)
         except Exception:  # noqa: BLE001 - InvalidHandle: it was destroyed since
-            self._come_home()
+            if not self.way.come_home():
+                self._orphan()
             return Server.ABSENT
         self._adopt()
         self._take_over(now)
-        if alarm.standstill.long_times != self._long_standstills:
-            self._long_standstills = alarm.standstill.long_times
-            self.client.hearing.doubt(now)
-        asks = not self._is_absent(now) and self.client.hearing.take_question(now)
-        if asks or self.watch.wants_probe(now):
-            self._probe()
+        if self.way.wants_question(now) or self.watch.wants_probe(now):
+            self.probe()
         for ticket in list(self.goals.values()):
             gone = self.watch.gone(now, ticket.testimony.sent_to)
             if not gone:
@@ -642,8 +518,7 @@ class Line:
             self.traffic.notify(None)
             self.traffic.domain.lost_sight |= state is Server.ABSENT
             self.traffic.domain.known.add((self.name, self.action_type))
-        if self.misses():
-            look_for(self, self.traffic.domain.number, at_once=self.in_doubt(now) > 0.0)
+        self.way.seek(now)
         if state is Server.AMBIGUOUS and not self._warned_crowd:
             self._warned_crowd = True
             log.warning(f"{self.name}: two action servers answer to this name; none is sent to")
@@ -665,26 +540,14 @@ class Line:
             ticket.hidden_since = still.times
         return still.times - ticket.hidden_since < AT_MOST
 
-    def _come_home(self) -> None:
-        """The participant that we moved to is gone, if we did; our node is not."""
-        if self._sight is None:
-            if not is_valid(self.traffic.node):
-                self._orphan()
-            return  # else the next look may see more
-        try:
-            client = ActionClient(self.traffic.node, self.action_type, self.name, self)
-        except Exception:  # noqa: BLE001 - or it is gone by now, too
-            self._orphan()
-        else:
-            self._go_on_with(client, None)
-
-    def _probe(self) -> None:
+    def probe(self) -> None:
+        """Ask the server just in order to be answered."""
         probe = next(_probes)
         self.watch.probe_sent(time.monotonic(), probe)
         self._last_probes.append(probe)
         if len(self._last_probes) > PROBES_KEPT:
             self.client.forget(self._last_probes.popleft())
-        _ask(self.client, probe)
+        ask(self.client, probe)
 
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""
@@ -705,14 +568,14 @@ class Line:
         if now >= self._look_at:
             self.look(now)
             settling = self.watch.state(now) is Server.SETTLING
-            if settling or self.is_waited_for():
+            if settling or self.way.is_waited_for():
                 self._look_at = now + LOOK_WHILE_WAITING
             elif any(not ticket.accounted_for for ticket in self.goals.values()):
                 self._look_at = now + LOOK_WHILE_RUNNING
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
-        if self.orphaned or self._sight is not None:
+        if self.orphaned or self.way.sight is not None:
             self.pump()
             if not all(ticket.accounted_for for ticket in self.goals.values()):
                 wait = min(wait, PUMP_EVERY)
@@ -723,18 +586,3 @@ class Line:
                 wait = min(wait, due)
         self._bound_the_lost()
         return max(wait, 0.001)
-
-
-def _ask(client: ActionClient, probe: int) -> None:
-    """Ask just in order to be answered."""
-    with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
-        client.probe(probe, uuid.uuid4().bytes)
-
-
-def _remapped(node: Any, name: str) -> bool:
-    """Whether rules of this node lead any part of an action elsewhere."""
-    topics = [f"{name}/_action/{part}" for part in ("status", "feedback")]
-    services = [f"{name}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
-    return any(node.resolve_topic_name(topic) != topic for topic in topics) or any(
-        node.resolve_service_name(service) != service for service in services
-    )

@@ -195,7 +195,7 @@ class Traffic:
         return (
             ticket.goal.state is State.WAITING_FOR_SERVER
             and not (_closing or line.given_up(ticket))
-            and not line.in_doubt(time.monotonic())
+            and not line.way.in_doubt(time.monotonic())
             and not line.orphaned
             and is_valid(self.node)
             and line.watch.state(time.monotonic()) is Server.READY
@@ -321,7 +321,7 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     while waits and not hurry():
         with lock:
             now = time.monotonic()
-            doubts = (ticket.line.in_doubt(now) for ticket in waits)
+            doubts = (ticket.line.way.in_doubt(now) for ticket in waits)
             held = max(still.answers_take(now), *doubts)
             if held > 0.0 and still.times - first <= AT_MOST:
                 deadline = max(deadline, now + ASK_AGAIN)

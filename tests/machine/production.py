@@ -18,7 +18,7 @@ from bt_actions.goal import Goal
 from bt_actions.goal_terms import Event, Now, State
 from bt_actions.hearing import Hearing
 from bt_actions.policy import End, Outcome
-from bt_actions.ros import alarm, line, shared, traffic
+from bt_actions.ros import alarm, line, shared, traffic, way
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Ticket
@@ -560,15 +560,19 @@ def installed() -> Iterator[None]:
 
     patches: list[tuple[Any, str, Any]] = [
         (line, "time", ModelTime),
+        (way, "time", ModelTime),
         (traffic, "time", ModelTime),
         (line, "ActionClient", ModelClient),
-        (line, "servers", lambda node, name: now().world.shown(name, node.number)),
+        (way, "ActionClient", ModelClient),
+        (way, "servers", lambda node, name: now().world.shown(name, node.number)),
         (line, "is_valid", lambda node: True),
+        (way, "is_valid", lambda node: True),
         (traffic, "is_valid", lambda node: True),
-        (line, "_remapped", lambda node, name: True),  # nothing is looked for out of sight
+        (way, "_remapped", lambda node, name: True),  # nothing is looked for out of sight
         (Line, "_instead", lambda self, ticket: ""),
         (Line, "close_book", put_away),
         (line, "log", mock.Mock()),
+        (way, "log", mock.Mock()),
         (traffic, "log", mock.Mock()),
         (traffic, "new_goal_id", lambda: now().new_goal_id()),
         (traffic, "drain", _drain),

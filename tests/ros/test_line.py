@@ -14,7 +14,6 @@ import pytest
 
 from bt_actions import End, Outcome
 from bt_actions.goal_terms import Now, State
-from bt_actions.hearing import Hearing
 from bt_actions.ros import alarm, traffic
 from bt_actions.ros import line as module
 from bt_actions.ros.line import LEASE, Line
@@ -101,7 +100,7 @@ def look(line: Any, seen: ServerWatch, now: float) -> None:
         raise RuntimeError
 
     line.watch, line._observe = seen, observe
-    line.traffic, line._come_home = SimpleNamespace(node=None), lambda: None
+    line.traffic, line.way = SimpleNamespace(node=None), SimpleNamespace(come_home=lambda: True)
     line.client = SimpleNamespace(closed=False)
     Line.look(line, now)
 
@@ -163,7 +162,7 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         is_parents=False,
         traffic=SimpleNamespace(clocks=clocks),
         pump=lambda: None,
-        in_doubt=lambda _: 0.0,
+        way=SimpleNamespace(in_doubt=lambda _: 0.0),
         _apply=lambda *_: None,
     )
     ticket: Any = SimpleNamespace(goal=goal, paused_at=None)
@@ -196,61 +195,6 @@ def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
     assert Line._is_hidden(line, ticket)
     line.watch = watch(OURS, NEW)
     assert not Line._is_hidden(line, ticket)
-
-
-@pytest.mark.parametrize("heard", ["it alone", "both", "nobody"])
-def test_a_client_is_preferred_where_it_is_heard_and_our_own_is_not(
-    monkeypatch: pytest.MonkeyPatch, heard: str
-) -> None:
-    """A busy server answers nobody."""
-    moment = 100.0
-    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
-    own, trial = Hearing(), Hearing()
-    asked: list[Hearing] = []
-
-    def client(hearing: Hearing, hears: bool) -> Any:
-        def probe(_: int, __: bytes) -> None:
-            asked.append(hearing)
-            hearing.asked(moment)
-            if hears:
-                hearing.answered(moment)
-
-        return SimpleNamespace(hearing=hearing, pump=lambda: None, probe=probe)
-
-    line: Any = SimpleNamespace(client=client(own, heard == "both"), _last_question_at=module.NEVER)
-    line._is_absent = lambda _: False
-    line._is_mute = own.is_mute
-    line._probe = lambda: line.client.probe(1, b"")
-    own.asked(moment)
-    other = client(trial, heard != "nobody")
-    trial.doubt(moment)
-    assert not Line.prefers(line, other), "it is too early"
-    preferred = False
-    for _ in range(60):
-        moment += 0.1
-        preferred = preferred or Line.prefers(line, other)
-    assert preferred is (heard == "it alone")
-    assert asked.count(trial) == 1
-    assert asked.count(own) == (heard != "nobody")
-
-
-def test_a_standstill_that_no_look_has_seen_yet_is_a_doubt(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """In the user's callable that makes the goal, say: it is not sent before somebody has asked."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
-    client = SimpleNamespace(hearing=Hearing())
-    line: Any = SimpleNamespace(client=client, _is_absent=lambda _: False, _long_standstills=0)
-    still.lives(10.0)
-    assert not Line.in_doubt(line, 10.0)
-    still.lives(16.0)
-    assert Line.in_doubt(line, 16.0)
-    line._long_standstills = still.long_times
-    assert not Line.in_doubt(line, 16.0)
-    line._is_absent = lambda _: True
-    line._long_standstills = 0
-    assert not Line.in_doubt(line, 16.0)
 
 
 def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(

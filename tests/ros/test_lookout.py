@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
-from bt_actions.ros import line, lookout
+from bt_actions.ros import lookout, way
+from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight
 from bt_actions.ros.shared import lock
@@ -26,12 +27,12 @@ Blind = Callable[[MoveRobot], None]
 @pytest.fixture
 def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
     """Make a leaf's node blind to its server, from now on, and deaf and dumb."""
-    shows = line.servers
+    shows = way.servers
 
     def blind(leaf: MoveRobot) -> None:
         action = leaf._line.name
         monkeypatch.setattr(
-            line,
+            way,
             "servers",
             lambda of, about: frozenset() if of is node and about == action else shows(of, about),
         )
@@ -47,8 +48,8 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
 @pytest.fixture(autouse=True)
 def nothing_else_is_missed(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """What the tests before this have lost is not looked for meanwhile."""
-    misses = line.Line.misses
-    monkeypatch.setattr(line.Line, "misses", lambda self: self.name == name and misses(self))
+    misses = way.Way.misses
+    monkeypatch.setattr(way.Way, "misses", lambda self: self.name == name and misses(self))
     until(nobody_looks, 10.0)
 
 
@@ -137,15 +138,15 @@ class TestMoves:
 
     @pytest.fixture
     def moved(self, serve: Any, name: str, node: Any) -> Iterator[Any]:
-        """A line in a participant of its own."""
+        """The way of a line that is in a participant of its own."""
         serve()
         leaf = MoveRobot("keeps the line", 0.1, action_name=name)
         leaf.setup(node=node)
         sight = Sight(_domain(node).number)
         sight.looking = False
         with lock:
-            leaf._line.move_to(sight, leaf._line.client_in(sight))
-        yield leaf._line
+            leaf._line.way.move_to(sight, leaf._line.way.client_in(sight))
+        yield leaf._line.way
         leaf.shutdown()
         until(lambda: sight.closed)
 
@@ -162,7 +163,7 @@ class TestMoves:
     def test_a_participant_that_is_used_again_is_not_closed(
         self, moved: Any, name: str, node: Any
     ) -> None:
-        sight = moved._sight
+        sight = moved.sight
         with lock:  # the thread that closes it has to wait
             sight.left_by(moved)
             sight.users.add(moved)
@@ -173,24 +174,25 @@ class TestMoves:
     def test_a_line_whose_participant_is_gone_goes_back_to_its_node(
         self, moved: Any, name: str, node: Any
     ) -> None:
-        sight = moved._sight
+        sight = moved.sight
         sight.users.clear()
         sight.close()
         self.goes(name, node)
-        assert moved._sight is None
-        assert not moved.orphaned
+        assert moved.sight is None
+        assert not moved._line.orphaned
 
     def test_without_another_thread_no_resource_is_lost(
         self, moved: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        sight = moved._sight
+        sight = moved.sight
 
         def no_more(_thread: threading.Thread) -> None:
             raise RuntimeError("can't start new thread")
 
         with lock, monkeypatch.context() as patch:
             patch.setattr(threading.Thread, "start", no_more)
-            moved._go_on_with(line.ActionClient(node, moved.action_type, name, moved), None)
+            line = moved._line
+            moved._go_on_with(ActionClient(node, line.action_type, name, line), None)
         assert not sight.closed
         self.goes(name, node)
         sight.close()
@@ -270,14 +272,15 @@ def test_whoever_else_reads_goal_requests_moves_nobody(
     monkeypatch.setattr(lookout, "FIRST_AFTER", 0.1)
     tried: list[Any] = []
     monkeypatch.setattr(
-        line.Line,
+        way.Way,
         "client_in",
         lambda self, sight: (
-            tried.append(self) or line.ActionClient(sight.node, self.action_type, self.name, self)
+            tried.append(self)
+            or ActionClient(sight.node, self._line.action_type, self.name, self._line)
         ),
     )
     moved: list[Any] = []
-    monkeypatch.setattr(line.Line, "move_to", lambda *who: moved.append(who))
+    monkeypatch.setattr(way.Way, "move_to", lambda *who: moved.append(who))
     context = Context()  # within one participant, rmw_fastrtps refuses a second type
     context.init(domain_id=_domain(node).number)
     stranger = Node("stranger", context=context)
@@ -307,7 +310,7 @@ def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
     leaf._line.traffic.domain.lost_sight = True
     with lock:
         leaf._line.goals[b"waits"] = None
-        assert not leaf._line.misses()
+        assert not leaf._line.way.misses()
         leaf._line.goals.clear()
     leaf.shutdown()
     remapped.destroy_node()

@@ -20,6 +20,7 @@ import pytest
 from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
+from bt_actions.standstill import OUT_OF_SIGHT
 from tests.scenarios.conftest import Launch
 from tests.support.processes import PATIENCE, ROOT, HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -620,6 +621,26 @@ def test_cleanup_that_was_stopped_looks_again(
     assert cleanup.wait(60.0) == 0, cleanup
     assert journal.ends() == ["canceled"], cleanup
     record.outcome = "cleanup: CANCELED, exit code 0"
+
+
+def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(
+    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What announces itself just before is what may be dropped by a server for good."""
+    from bt_actions.ros import cleanup
+
+    made = list[str]()
+
+    class Slow(cleanup.Node):  # type: ignore[misc]  # rclpy is not typed
+        def __init__(self, name: str, **how: Any) -> None:
+            super().__init__(name, **how)
+            if not made:
+                time.sleep(OUT_OF_SIGHT + 0.1)
+            made.append(name)
+
+    monkeypatch.setattr(cleanup, "Node", Slow)
+    assert cleanup.cleanup(look=0.1, patience=0.1) == []
+    assert len(made) == 2
 
 
 def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(

@@ -333,17 +333,46 @@ A_PUBLISHER_IN_MID_GOAL = """
 """
 
 
-@pytest.mark.parametrize("lease", ["stock", pytest.param("short", marks=pytest.mark.chaos)])
+A_PUBLISHER_WHILE_A_GOAL_IS_MADE = """
+    import time
+    from std_msgs.msg import String
+    from bt_actions import ActionBehaviour
+    from robot_control_interfaces.action import MoveRobot as Type
+
+    def goal():
+        publisher = runner.node.create_publisher(String, "/news", 1)
+        time.sleep(0.2)
+        print("announced", flush=True)
+        time.sleep(2.0)  # meanwhile it is stopped
+        return Type.Goal(distance=1.0)
+
+    leaf = ActionBehaviour("m", Type, name, goal, timeout=T)
+    tree = py_trees.composites.Sequence("s", True, [py_trees.timers.Timer("t", 4.0), leaf])
+    with TreeRunner(tree) as runner:
+        print(runner.run(60.0).name, leaf.outcome, leaf.end, flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("lease", "body"),
+    [
+        ("stock", A_PUBLISHER_IN_MID_GOAL),
+        pytest.param("short", A_PUBLISHER_IN_MID_GOAL, marks=pytest.mark.chaos),
+        pytest.param("stock", A_PUBLISHER_WHILE_A_GOAL_IS_MADE, marks=pytest.mark.chaos),
+    ],
+    ids=["stock", "short", "while-a-goal-is-made"],
+)
 def test_who_was_stopped_beyond_its_lease_and_is_not_heard_any_more_finds_another_way(
     new_host: HostFactory,
     name: str,
     program: Start,
     lease: str,
+    body: str,
     record: Record,
 ) -> None:
     """SIGSTOP, just after it has announced a publisher, for twice its lease; SIGCONT"""
     journal = new_host(short_lease=lease == "short").open(name)
-    process = program(A_PUBLISHER_IN_MID_GOAL, short_lease=True)
+    process = program(body, short_lease=True)
     process.line("announced", within=60.0)
     process.send(signal.SIGSTOP)
     holds_for(lambda: True, 6.0)

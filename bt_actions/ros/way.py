@@ -1,0 +1,221 @@
+"""How one line reaches its server: in its node's participant or, where that fails, in another.
+
+Our participant may be blind to a server that runs (ros/lookout.py), or that server deaf to it
+(hearing.py). This tells the lookout when, tries a client in the participant that it makes, and has
+the line go on with that one, and come home again when it is gone. It tells no goal anything but
+that its server is to be asked anew. All under the one lock.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import uuid
+from typing import TYPE_CHECKING, Any
+
+from bt_actions.goal_terms import Event, State
+from bt_actions.hearing import NEVER, TWICE
+from bt_actions.ros import alarm
+from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.alive import is_valid
+from bt_actions.ros.graph import servers
+from bt_actions.ros.log import log
+from bt_actions.ros.lookout import Sight, look_for
+from bt_actions.server import LEASE, Server
+from bt_actions.standstill import ANSWERS_TAKE
+
+if TYPE_CHECKING:
+    from bt_actions.ros.line import Line
+
+UNTIL_THE_NEXT_LOOK = 0.2
+"""Seconds within which the line looks whenever it has goals."""
+LAST_WORD = 0.5
+"""Seconds within which a server that is not busy answers."""
+TOO_NEW = 3.0
+"""Seconds for which a participant has dropped nobody: no lease that is useful is shorter.
+
+After them it has discovered who was there."""
+ON_TRIAL = 0
+"""The number of a trial's probe, of which nobody is told."""
+
+
+class Way:
+    """The way of one line to its server (lookout.Seeker)."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self.name = line.name
+        self.sight: Sight | None = None
+        """Where the line's client lives, if not in its node's participant."""
+        self._remapped = _remapped(line.traffic.node, line.name)
+        self._long_standstills = alarm.standstill.long_times
+        self._last_question_at = NEVER  # to a server that has answered another client
+
+    def __repr__(self) -> str:
+        return f"<Way to {self.name}, {'its own' if self.sight is None else 'another'}>"
+
+    def shown(self) -> frozenset[bytes]:
+        """Return the GIDs of the servers in sight; raises where the participant is gone."""
+        if self.sight is not None:
+            return self.sight.shows(self.name)
+        return servers(self._line.traffic.node, self.name)
+
+    # Does the server hear us?
+
+    def in_doubt(self, now: float) -> float:
+        """Return for how many seconds a server that is silent may not have heard us; or 0."""
+        if self._is_absent(now):
+            return 0.0
+        if alarm.standstill.long_times != self._long_standstills:
+            return UNTIL_THE_NEXT_LOOK
+        return self._line.client.hearing.in_doubt(now)
+
+    def wants_question(self, now: float) -> bool:
+        """Whether to ask the server something now, just in order to be answered."""
+        hearing = self._line.client.hearing
+        if alarm.standstill.long_times != self._long_standstills:
+            self._long_standstills = alarm.standstill.long_times
+            hearing.doubt(now)
+        return not self._is_absent(now) and hearing.take_question(now)
+
+    def seek(self, now: float) -> None:
+        """Have another way looked for, where this one fails."""
+        if self.misses():
+            domain = self._line.traffic.domain
+            look_for(self, domain.number, at_once=self.in_doubt(now) > 0.0)
+
+    # What the lookout asks, and does
+
+    def misses(self) -> bool:
+        """Whether a server is wanted that may be there, though nothing shows all of it.
+
+        Or it is shown, and does not answer. Not while answers may be under way: in a second, what
+        runs on an absent server is lost. And not where remapping rules give our node another server
+        than a new participant would find.
+        """
+        line, now = self._line, time.monotonic()
+        if line.orphaned or not line.goals or self._remapped:
+            return False
+        if now - line.traffic.seen_since < TOO_NEW:
+            return False
+        if line.users <= 0 and all(ticket.goal.lost for ticket in line.goals.values()):
+            return False  # nobody here wants it; it is remembered, as what is put away is
+        domain = line.traffic.domain
+        known = domain.lost_sight or (self.name, line.action_type) in domain.known
+        running = (State.SENDING, State.EXECUTING)
+        still = all(ticket.goal.state not in running for ticket in line.goals.values())
+        return (known and self._is_absent(now) and still) or self._is_mute(now)
+
+    def _is_absent(self, now: float) -> bool:
+        return self._line.watch.state(now) is Server.ABSENT
+
+    def _is_mute(self, now: float) -> bool:
+        """Whether a server is in sight that has not answered for long.
+
+        Not where nobody has taken its answers.
+        """
+        line = self._line
+        if self._is_absent(now) or not line.client.hearing.is_mute(now):
+            return False
+        line.pump()
+        return line.client.hearing.is_mute(now)
+
+    def is_waited_for(self) -> bool:
+        """Whether a goal is still to be sent."""
+        return any(not ticket.goal.sent for ticket in self._line.goals.values())
+
+    def client_in(self, sight: Sight) -> ActionClient:
+        """Return a client like our own in another participant, on trial."""
+        line, now = self._line, time.monotonic()
+        client = ActionClient(sight.node, line.action_type, self.name, line)
+        client.on_trial = True
+        if not self._is_absent(now):
+            line.client.hearing.tried(now)
+            client.hearing.doubt(now, TWICE)
+            self._last_question_at = NEVER
+        return client
+
+    def prefers(self, client: ActionClient) -> bool:
+        """Whether this client, which is ready, is heard where our own is not, or sees the server.
+
+        A server that answers nobody is busy; one that has just answered this client would answer
+        our own as well, if it heard it.
+        """
+        now = time.monotonic()
+        if self._is_absent(now):
+            return True
+        if not self._is_mute(now):
+            return False
+        client.pump()
+        if not client.hearing.heard:
+            if client.hearing.take_question(now):
+                ask(client, ON_TRIAL)
+            return False
+        if self._last_question_at == NEVER:
+            self._last_question_at = now
+            self._line.probe()
+        return now - self._last_question_at >= LAST_WORD
+
+    def move_to(self, sight: Sight, client: ActionClient) -> None:
+        """Go on with a client in a participant that sees the server; the alarm takes its answers.
+
+        What is under way in the old one is not heard there, see `misses`, and is asked anew.
+        """
+        line, now = self._line, time.monotonic()
+        blind, seen = self._is_absent(now), line.watch.gids
+        line.pump()
+        if line.client.closed:  # by what came, and nobody used the line
+            client.destroy()
+            return
+        sight.users.add(self)
+        client.on_trial = False
+        self._go_on_with(client, sight)
+        if blind:
+            log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
+            return
+        log.info(f"{self.name}: does not hear this node any more; a new one is heard")
+        for ticket in list(line.goals.values()):
+            if ticket.testimony.sent_to & seen:  # it may be shown later than another of its name
+                ticket.not_gone_before = max(ticket.not_gone_before, now + LEASE)
+            ticket.goal.hold(ANSWERS_TAKE, line.traffic.clocks.now())
+            line.tell(ticket, Event.SERVER_CHANGED)
+
+    # There, and back
+
+    def come_home(self) -> bool:
+        """Go on in our node's participant, as the other is gone; return whether that is there."""
+        line = self._line
+        if self.sight is None:
+            return is_valid(line.traffic.node)  # the next look may see more
+        try:
+            client = ActionClient(line.traffic.node, line.action_type, self.name, line)
+        except Exception:  # noqa: BLE001 - or it is gone by now, too
+            return False
+        self._go_on_with(client, None)
+        return True
+
+    def _go_on_with(self, client: ActionClient, sight: Sight | None) -> None:
+        self._line.close()
+        self.sight = sight
+        self._line.open(client)
+
+    def leave(self) -> None:
+        """Need the other participant no more."""
+        if self.sight is not None:
+            self.sight.left_by(self)
+            self.sight = None
+
+
+def ask(client: ActionClient, probe: int) -> None:
+    """Ask just in order to be answered."""
+    with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
+        client.probe(probe, uuid.uuid4().bytes)
+
+
+def _remapped(node: Any, name: str) -> bool:
+    """Whether rules of this node lead any part of an action elsewhere."""
+    topics = [f"{name}/_action/{part}" for part in ("status", "feedback")]
+    services = [f"{name}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
+    return any(node.resolve_topic_name(topic) != topic for topic in topics) or any(
+        node.resolve_service_name(service) != service for service in services
+    )
