@@ -13,6 +13,7 @@ import select
 import signal
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -100,8 +101,8 @@ class _Watch:
         self._received: list[int] = []
         self._ear: _Ear | None = None
         self._seen_at = float("-inf")
-        self._missed: list[int] = []
-        self._missed_since = 0.0
+        self._missed: list[int] = []  # heard, and not seen yet
+        self._heard: Counter[int] = Counter()
         self._interrupts: list[Interrupt] = []
         self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
         self._rclpys = _rclpys()
@@ -196,7 +197,9 @@ class _Watch:
             self._do_as_before(number, frame)
             return
         self._seen_at = time.monotonic()
-        self._received.append(number)
+        these = [each for each in self._missed if each == number]
+        self._missed = [each for each in self._missed if each != number]
+        self._received += these or [number]  # Python calls this once for all that have come
         times, ends_process = len(self._received), self.ends_process()
         stuck = [interrupt(times > 1, ends_process) for interrupt in self._interrupts]
         if times > 2 or (times > 1 and any(stuck[-1:])):  # the innermost is where this thread is
@@ -214,13 +217,18 @@ class _Watch:
     def _was_heard(self, number: int, heard_at: float) -> None:
         """On the ear's thread: see to a signal that the main thread has not seen in its turn.
 
-        It may be in C for long; or it began to wait there just after the signal had come.
+        It may be in C for long; or it began to wait there just after the signal had come. Where it
+        saw two as one, because the second came before it had seen the first, it is sent one more.
         """
-        seen = self._seen_at > heard_at - TURN
-        if seen or self._is_over or signal.getsignal(number) != self._note:
+        if self._is_over or signal.getsignal(number) != self._note:
             return
-        if not self._missed or self._seen_at > self._missed_since:
-            self._missed, self._missed_since = [], heard_at
+        self._heard[number] += 1
+        if self._seen_at > heard_at - TURN:
+            known = self._received.count(number) + self._missed.count(number)
+            if self._heard[number] > known:
+                self._heard[number] -= 1  # the new one will be heard
+                signal.pthread_kill(threading.main_thread().ident or 0, number)
+            return
         self._missed.append(number)
         numbers = self._received + self._missed
         for interrupt in list(self._interrupts):

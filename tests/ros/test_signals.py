@@ -124,6 +124,32 @@ class Ends(py_trees.behaviours.Running):
 TreeRunner(Ends("ends")).run()
 say("goes on")
 """
+TWO_COME_WHILE_IT_IS_IN_C = """
+import ctypes
+heard = threading.Semaphore(0)
+was_heard = signals._Watch._was_heard
+signals._Watch._was_heard = lambda *args: (was_heard(*args), heard.release())
+mutex, c = ctypes.create_string_buffer(64), ctypes.CDLL(None)
+c.pthread_mutex_lock(mutex)
+
+def signals_come():
+    address, syscall = hex(ctypes.addressof(mutex)), f"/proc/self/task/{os.getpid()}/syscall"
+    while address not in open(syscall).read():
+        time.sleep(0.01)  # until it is in C
+    itself(signal.SIGTERM)
+    heard.acquire()
+    itself(signal.SIGTERM)
+    ACQUIRE
+    c.pthread_mutex_unlock(mutex)
+
+with ended_by_signals(lambda again, ends_process: True):
+    threading.Thread(target=signals_come).start()
+    try:
+        c.pthread_mutex_lock(mutex)
+        threading.Event().wait(20.0)
+    except KeyboardInterrupt:
+        say("does not wait")
+"""
 
 
 @pytest.mark.parametrize(
@@ -135,8 +161,10 @@ say("goes on")
         (ITS_HANDLER_CALLS_OURS, ["the user's"] * 2),
         (ONE_OF_OURS_IS_LEFT, []),
         (A_SHUTDOWN_THAT_BLOCKS, ["goes on"]),
+        (TWO_COME_WHILE_IT_IS_IN_C.replace("ACQUIRE", "heard.acquire()"), ["does not wait"]),
+        (TWO_COME_WHILE_IT_IS_IN_C.replace("ACQUIRE", ""), ["does not wait"]),
     ],
-    ids=["rclpy within", "handler within", "busy", "chained", "left", "blocks"],
+    ids=["rclpy within", "handler within", "busy", "chained", "left", "blocks", "in C", "just now"],
 )
 def test_a_program_of_the_users(start_program: Start, body: str, said: list[str]) -> None:
     process = start_program("-c", HEAD + body)
