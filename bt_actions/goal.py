@@ -557,7 +557,9 @@ class Goal:
         return State.DONE
 
     def _ask_changed_server(self, now: Now, detail: Any) -> State:
-        """Ask for the result."""
+        """Ask for the result; what is to be canceled, is asked to cancel again, too."""
+        if self.state is State.CANCELING and not self.lost and self.end is End.UNKNOWN:
+            self._commands.append(Command.CANCEL)
         if self._accepted:
             self._commands.append(Command.ASK_RESULT)
         return self.state

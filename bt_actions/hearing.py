@@ -49,6 +49,8 @@ class Hearing:
         if self._unanswered_since is not None and asked >= self._unanswered_since:
             self._unanswered_since, self._ask_at, self._tries = None, [], 0
             self._in_doubt_until = NEVER
+        elif self._in_doubt_until > NEVER and not self._ask_at:
+            self._ask_at = [asked]  # who answers what was asked before is not busy
 
     def doubt(self, now: float, ask_after: tuple[float, ...] = AT_ONCE) -> None:
         """What was heard before proves nothing, as this process stood still: it is to be asked.
@@ -65,7 +67,7 @@ class Hearing:
         return max(0.0, self._in_doubt_until - now)
 
     def take_question(self, now: float) -> bool:
-        """Whether to ask something now, just in order to be answered; it counts as asked then."""
+        """Whether to ask something now, just in order to be answered; it is not asked for twice."""
         if not self._ask_at or now < self._ask_at[0]:
             return False
         del self._ask_at[0]

@@ -19,7 +19,7 @@ shorter than 3 s, and each is renewed long before its end;"""
 BACK_IN_SIGHT = 4.0
 """and seconds until all are in sight again: Fast DDS announces a process every 3 s or sooner."""
 AT_MOST = 20
-"""So many standstills in a row are borne with by whoever has nothing else to go by."""
+"""So many standstills are borne with by whoever has nothing else to go by."""
 NEVER = float("-inf")
 
 

@@ -830,6 +830,11 @@ def test_a_suspect_bars_nothing_longer_than_its_server_that_is_back_takes_to_den
 def test_a_new_server_is_asked_whether_it_knows_the_goal() -> None:
     assert executing().on(Event.SERVER_CHANGED) == [ASK]
     assert sending().on(Event.SERVER_CHANGED) == [], "it had not been accepted"
+    life = executing()
+    life.on(Event.INTERRUPTED)
+    assert life.on(Event.SERVER_CHANGED) == [CANCEL, ASK], "which the first may not have heard"
+    life.on(Event.SERVER_LOST, "gone")
+    assert life.on(Event.SERVER_CHANGED) == [ASK]
 
 
 def test_a_lone_server_is_believed_only_when_it_denies_the_goal_several_times() -> None:

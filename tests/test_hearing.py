@@ -78,6 +78,24 @@ def test_standstills_that_follow_each_other_are_one_doubt(hearing: Hearing) -> N
         hearing.tried(now + MUTE_AFTER)
 
 
+def test_an_answer_to_what_was_asked_before_is_no_proof_but_a_reason_to_ask(
+    hearing: Hearing,
+) -> None:
+    """A standstill after the first question, and before its answer was taken."""
+    hearing.doubt(30.0)
+    assert hearing.take_question(30.0)
+    hearing.asked(30.0)
+    hearing.doubt(32.0)
+    assert not hearing.take_question(33.0), "a busy server is not asked twice"
+    hearing.answered(30.0)
+    assert hearing.in_doubt(33.0)
+    assert hearing.take_question(33.0)
+    hearing.answered(33.0)
+    assert not hearing.in_doubt(33.0)
+    hearing.answered(30.0)
+    assert not hearing.take_question(34.0)
+
+
 def test_another_way_is_looked_for_now_and_then(hearing: Hearing) -> None:
     hearing.asked(20.0)
     now = 30.0

@@ -224,7 +224,13 @@ class Line:
 
         In this order: to ask is to give up.
         """
-        return not alarm.standstill.answers_take(time.monotonic()) and ticket.given_up
+        still = alarm.standstill
+        if not still.answers_take(time.monotonic()):
+            ticket.spared_since = None
+        elif ticket.spared_since is None:
+            ticket.spared_since = still.times
+        spared = ticket.spared_since
+        return (spared is None or still.times - spared >= AT_MOST) and ticket.given_up
 
     def mind(self, ticket: Ticket) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""

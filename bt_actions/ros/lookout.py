@@ -7,7 +7,7 @@ made after the process is back sees it within a second (docs/reliability-setting
 
 So while a server that was in sight is wanted and is not, a new participant looks for it every now
 and then, on a thread of its own. Where a client is ready there, and ours is not, the line goes on
-with that one (`Line.move_to`); a participant that finds nothing is closed. Nothing is sent here,
+with that one (`Way.move_to`); a participant that finds nothing is closed. Nothing is sent here,
 and nothing decided about goals.
 """
 
@@ -54,13 +54,13 @@ _closing = False  # the process ends
 
 
 class Seeker(Protocol):
-    """Who has lost sight of a server (ros/line.py)."""
+    """Who has lost sight of a server, or is not heard by it any more (ros/way.py)."""
 
     name: str
     """Of the action."""
 
     def misses(self) -> bool:
-        """Whether a server is wanted, and is not in sight, by now."""
+        """Whether a server is wanted, and is not in sight, or does not answer, by now."""
 
     def is_waited_for(self) -> bool:
         """Whether somebody wants to send a goal."""
@@ -170,6 +170,7 @@ class Lookout:
                 self._bell.wait_for(lambda: self._missing or _closing)
                 if _closing:
                     return
+                self._begins_anew = False  # that is what follows
             self._search()
 
     def _search(self) -> None:

@@ -125,6 +125,9 @@ class Ticket:
     hidden_since: int | None = None
     """Standstills of this process by then; None while its servers are in sight, or need not be."""
 
+    spared_since: int | None = None
+    """Standstills by then, since which nobody could say that it is given up; or None."""
+
     def __post_init__(self) -> None:
         self.testimony = Testimony(self.goal)
 

@@ -2,8 +2,8 @@
 
 Our participant may be blind to a server that runs (ros/lookout.py), or that server deaf to it
 (hearing.py). This tells the lookout when, tries a client in the participant that it makes, and has
-the line go on with that one, and come home again when it is gone. It tells no goal anything but
-that its server is to be asked anew. All under the one lock.
+the line go on with that one, and come home again when it is gone. Of goals it decides nothing: they
+are told that their server is to be asked anew, and given time for that. All under the one lock.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import uuid
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goal_terms import Event, State
-from bt_actions.hearing import NEVER, TWICE
+from bt_actions.hearing import NEVER, TWICE, Hearing
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
@@ -27,8 +27,6 @@ from bt_actions.standstill import ANSWERS_TAKE
 if TYPE_CHECKING:
     from bt_actions.ros.line import Line
 
-UNTIL_THE_NEXT_LOOK = 0.2
-"""Seconds within which the line looks whenever it has goals."""
 LAST_WORD = 0.5
 """Seconds within which a server that is not busy answers."""
 TOO_NEW = 3.0
@@ -64,19 +62,22 @@ class Way:
 
     def in_doubt(self, now: float) -> float:
         """Return for how many seconds a server that is silent may not have heard us; or 0."""
-        if self._is_absent(now):
-            return 0.0
-        if alarm.standstill.long_times != self._long_standstills:
-            return UNTIL_THE_NEXT_LOOK
-        return self._line.client.hearing.in_doubt(now)
+        if self._line.orphaned or self._is_absent(now):
+            return 0.0  # there is no other way
+        return self._hearing(now).in_doubt(now)
 
     def wants_question(self, now: float) -> bool:
         """Whether to ask the server something now, just in order to be answered."""
+        hearing = self._hearing(now)
+        return not self._is_absent(now) and hearing.take_question(now)
+
+    def _hearing(self, now: float) -> Hearing:
+        """Return that of our client, which knows of all standstills by now."""
         hearing = self._line.client.hearing
         if alarm.standstill.long_times != self._long_standstills:
             self._long_standstills = alarm.standstill.long_times
             hearing.doubt(now)
-        return not self._is_absent(now) and hearing.take_question(now)
+        return hearing
 
     def seek(self, now: float) -> None:
         """Have another way looked for, where this one fails."""
@@ -159,7 +160,8 @@ class Way:
     def move_to(self, sight: Sight, client: ActionClient) -> None:
         """Go on with a client in a participant that sees the server; the alarm takes its answers.
 
-        What is under way in the old one is not heard there, see `misses`, and is asked anew.
+        What is under way in the old one is not heard there. A question for a result, or a cancel,
+        is asked anew; of a goal request nobody knows whether it has arrived.
         """
         line, now = self._line, time.monotonic()
         blind, seen = self._is_absent(now), line.watch.gids

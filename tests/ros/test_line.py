@@ -204,6 +204,8 @@ def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
     asked: list[None] = []
 
     class Asked:
+        spared_since = None
+
         @property
         def given_up(self) -> bool:
             asked.append(None)
@@ -216,6 +218,27 @@ def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
     assert not asked
     monkeypatch.setattr(alarm, "standstill", Standstill())
     assert Line.given_up(Asked())  # type: ignore[arg-type]
+
+
+def test_a_tick_that_stands_still_again_and_again_is_given_up_in_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It holds Python's lock for half a second at a time, say."""
+    still = Standstill()
+    monkeypatch.setattr(alarm, "standstill", still)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
+    ticket: Any = SimpleNamespace(given_up=True, spared_since=None)
+    still.lives(moment := 10.0)
+    for _ in range(AT_MOST):
+        still.lives(moment := moment + 0.5)
+        assert not Line.given_up(ticket)
+    still.lives(moment := moment + 0.5)
+    assert Line.given_up(ticket)
+    for _ in range(20):
+        still.lives(moment := moment + 0.1)
+    assert Line.given_up(ticket)
+    still.lives(moment := moment + 0.5)
+    assert not Line.given_up(ticket), "a new one"
 
 
 def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(

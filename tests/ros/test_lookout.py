@@ -7,13 +7,15 @@ has the real thing, which Fast DDS does to a node in about every second trial.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
-from bt_actions.ros import lookout, way
+from bt_actions.ros import alarm, lookout, way
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight
@@ -22,6 +24,7 @@ from tests.support.trees import in_turn
 from tests.support.waiting import holds_for, until
 
 Blind = Callable[[MoveRobot], None]
+now = time.monotonic
 
 
 @pytest.fixture
@@ -78,6 +81,32 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     assert journal.max_live == 1
     until(nobody_looks)
     until(lambda: not lookout._sights, what="the participant is taken away with its last line")
+
+
+@pytest.mark.parametrize("canceled", [False, True], ids=["it ends", "it is canceled"])
+def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
+    serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, canceled: bool
+) -> None:
+    """What the node asks gets lost, and what it is told, though the server is in sight."""
+    journal = serve()
+    leaf = MoveRobot("m", 60.0 if canceled else 4.0, action_name=name, timeout=Timeouts(cancel=2.0))
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        until(lambda: leaf.progress().feedback is not None)
+        client = leaf._line.client
+        with lock:
+            for request in ("cancel", "ask_result", "probe"):
+                monkeypatch.setattr(client, request, lambda *_: client.hearing.asked(now()))
+            monkeypatch.setattr(client, "take_data", lambda: None)
+            monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
+            monkeypatch.setattr(alarm.standstill, "_lived_at", now() - 5.0)
+        if canceled:
+            runner.interrupt()
+        runner.wait(40.0)
+        assert leaf.end is (End.CANCELED if canceled else End.SUCCEEDED)
+        assert leaf._line.client is not client
+    assert journal.ends() == ["canceled" if canceled else "succeeded"]
+    until(nobody_looks)
 
 
 def test_a_server_whose_goals_are_all_done_is_found_too(
@@ -308,13 +337,35 @@ def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
     leaf = MoveRobot("m", 0.1, action_name=name)
     leaf.setup(node=remapped)
     leaf._line.traffic.domain.lost_sight = True
+    leaf._line.traffic.seen_since -= way.TOO_NEW
     with lock:
-        leaf._line.goals[b"waits"] = None
+        leaf._line.goals[b"waits"] = SimpleNamespace(goal=SimpleNamespace(state=None))
         assert not leaf._line.way.misses()
+        leaf._line.way._remapped = False
+        assert leaf._line.way.misses()
         leaf._line.goals.clear()
     leaf.shutdown()
     remapped.destroy_node()
     context.shutdown()
+
+
+def test_without_a_pause_to_break_off_a_look_begins_as_soon_as_ever() -> None:
+    """Not after the first pause, and then another."""
+
+    class Looks(lookout.Lookout):
+        def _wait(self, pause: float) -> None:
+            pauses.append(pause)
+
+        def _still_missing(self) -> bool:
+            raise StopIteration
+
+    pauses, looks = list[float](), Looks(0)
+    looks._thread = threading.current_thread()
+    with lock:
+        looks.add(Missing(), at_once=True)  # type: ignore[arg-type]
+    with pytest.raises(StopIteration):
+        looks._run()
+    assert pauses == [lookout.FIRST_AFTER]
 
 
 class Missing:

@@ -6,17 +6,20 @@ moves real lines, and tests/scenarios real processes that were stopped.
 
 from __future__ import annotations
 
+import time
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from bt_actions.hearing import DOUBT_LASTS, Hearing
+from bt_actions.goal_terms import Event, State
+from bt_actions.hearing import DOUBT_LASTS, MUTE_AFTER, NEVER, Hearing
 from bt_actions.ros import alarm
 from bt_actions.ros import way as module
+from bt_actions.ros.shared import Domain
 from bt_actions.ros.way import Way
-from bt_actions.server import Server
-from bt_actions.standstill import Standstill
+from bt_actions.server import LEASE, Server
+from bt_actions.standstill import ANSWERS_TAKE, Standstill
 
 
 def way_of(client: Any, state: Server = Server.READY) -> Way:
@@ -29,6 +32,7 @@ def way_of(client: Any, state: Server = Server.READY) -> Way:
         client=client,
         traffic=SimpleNamespace(node=resolves),
         watch=SimpleNamespace(state=lambda _: state),
+        orphaned=False,
         pump=lambda: None,
         probe=lambda: client.probe(1, b""),
     )
@@ -66,6 +70,91 @@ def test_a_client_is_preferred_where_it_is_heard_and_our_own_is_not(
     assert preferred is (heard == "it alone")
     assert asked.count(trial) == 1
     assert asked.count(own) == (heard != "nobody")
+
+
+def test_who_is_not_heard_is_looked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a doubt; and when there is none, in its turn."""
+    found: list[bool] = []
+    monkeypatch.setattr(module, "look_for", lambda *_, at_once: found.append(at_once))
+    hearing = Hearing()
+    way = way_of(SimpleNamespace(hearing=hearing))
+    line: Any = way._line
+    line.traffic.seen_since, line.traffic.domain = 0.0, Domain(0)
+    line.name, line.action_type, line.users, line.orphaned = "/move", None, 1, False
+    line.goals = {b"": SimpleNamespace(goal=SimpleNamespace(state=State.EXECUTING))}
+    now = time.monotonic()
+    way.seek(now)
+    hearing.doubt(now - MUTE_AFTER)
+    way.seek(now)
+    hearing.doubt(now - DOUBT_LASTS)
+    way.seek(now)
+    assert found == [True, False]
+
+
+def test_who_moves_gives_its_goals_time_and_has_them_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The server may be shown later there than another one of its name."""
+    monkeypatch.setattr(alarm, "wake_by", lambda _: None)
+    told: list[Any] = []
+
+    def ticket(*sent_to: bytes) -> Any:
+        goal = SimpleNamespace(hold=lambda seconds, _: told.append(seconds))
+        testimony = SimpleNamespace(sent_to=frozenset(sent_to))
+        return SimpleNamespace(goal=goal, testimony=testimony, not_gone_before=NEVER)
+
+    here, nowhere = ticket(b"seen"), ticket()
+    way = way_of(SimpleNamespace(hearing=Hearing(), closed=False))
+    line: Any = way._line
+    line.watch.gids, line.goals = frozenset({b"seen"}), {b"1": here, b"2": nowhere}
+    line.traffic.clocks = SimpleNamespace(now=lambda: None)
+    line.tell = lambda ticket, event: told.append((ticket, event))
+    line.close, line.open = way.leave, lambda client: told.append(client)
+    trial: Any = SimpleNamespace(on_trial=True)
+    sight: Any = SimpleNamespace(users=set())
+    now = time.monotonic()
+    way.move_to(sight, trial)
+    changed = Event.SERVER_CHANGED
+    assert told == [trial, ANSWERS_TAKE, (here, changed), ANSWERS_TAKE, (nowhere, changed)]
+    assert not trial.on_trial
+    assert (way.sight, sight.users) == (sight, {way})
+    assert here.not_gone_before >= now + LEASE
+    assert nowhere.not_gone_before == NEVER
+
+
+def test_a_client_on_trial_tells_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Feedback would come twice; and its questions, of which none is the line's, are answered."""
+    made = SimpleNamespace(hearing=Hearing(), on_trial=False)
+    monkeypatch.setattr(module, "ActionClient", lambda *_: made)
+    way = way_of(SimpleNamespace(hearing=Hearing()))
+    way._line.action_type = None
+    assert way.client_in(SimpleNamespace(node=None)) is made  # type: ignore[arg-type]
+    assert made.on_trial
+    assert made.hearing.in_doubt(time.monotonic())
+
+
+def test_who_has_no_node_any_more_has_no_other_way_and_no_doubt(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else a drain that nobody answers would not end: there is no look that ends the doubt."""
+    still = Standstill()
+    monkeypatch.setattr(alarm, "standstill", still)
+    way = way_of(SimpleNamespace(hearing=Hearing()))
+    still.lives(10.0)
+    still.lives(16.0)
+    assert way.in_doubt(16.0)
+    way._line.orphaned = True
+    assert not way.in_doubt(16.0)
+
+
+def test_a_doubt_ends_though_nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    still = Standstill()
+    monkeypatch.setattr(alarm, "standstill", still)
+    way = way_of(SimpleNamespace(hearing=Hearing()))
+    still.lives(10.0)
+    still.lives(16.0)
+    assert way.in_doubt(16.0)
+    assert not way.in_doubt(16.0 + DOUBT_LASTS)
 
 
 def test_a_standstill_that_no_look_has_seen_yet_is_a_doubt(
