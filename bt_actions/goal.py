@@ -20,6 +20,8 @@ from typing import Any
 
 from bt_actions.deadlines import Deadlines
 from bt_actions.goal_terms import (
+    CANCEL_ACCEPTED,
+    CANCEL_REJECTED,
     CANCEL_UNKNOWN_GOAL,
     ENDS,
     OUTCOMES,
@@ -107,6 +109,7 @@ class Goal:
         self._seen_status: int | None = None  # terminal, from the status topic
         self._asked_since = 0  # questions for the result since then, in vain,
         self._first_asked = 0.0  # and when the first of them was asked
+        self._cancel_code: int | None = None  # what was answered to a cancel request
         self._asked = 0  # in a row, of a server that has it and does not say that it has ended
         self._commands: list[Command] = []
         self._deadlines = Deadlines(now)
@@ -503,11 +506,19 @@ class Goal:
         if self._seen_status is None:
             self._commands.append(Command.CANCEL)  # should it run all the same
         self._settle_as_planned()
-        self._settle(Outcome.SERVER_LOST, f"{self.server} no longer knows the goal it accepted")
+        why = f"{self.server} no longer knows the goal it accepted"
+        if self._seen_status is not None:
+            end = ENDS[self._seen_status]
+            why = (
+                f"it ended as {end}, but {self.server} knew its result no longer when asked for it"
+            )
+        self._settle(Outcome.SERVER_LOST, why)
         return self._finished_by_status()
 
     def _cancel_answered(self, now: Now, detail: Any) -> State:
         """Take note of a denial; if the goal is known after all, cancel it at once."""
+        if self._cancel_code != CANCEL_ACCEPTED:  # after that, rcl calls it TERMINATED
+            self._cancel_code = detail
         if detail != CANCEL_UNKNOWN_GOAL:
             self._denied_since = None
         else:
@@ -715,6 +726,19 @@ class Goal:
         if self.suspect:
             self.end = End.UNKNOWN
         return self._finished_by_status()
+
+    @property
+    def cancel_said(self) -> str:
+        """What its server has said of the request to cancel it, to follow a reason; or ""."""
+        if self.state is not State.CANCELING or self.lost:
+            return ""
+        words = {
+            None: "has not answered the request to cancel it",
+            CANCEL_ACCEPTED: "has agreed to cancel it, and it has not ended",
+            CANCEL_REJECTED: "refuses to cancel it",
+        }
+        said = words.get(self._cancel_code)
+        return f"; {self.server} {said}" if said else ""
 
     # Small tools of the steps
 

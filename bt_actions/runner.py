@@ -138,7 +138,7 @@ class TreeRunner:
                 ticket.goal.server,
                 ticket.goal.id.hex(),
                 ticket.goal.outcome,
-                ticket.goal.reason,
+                f"{ticket.goal.reason}{ticket.goal.cancel_said}",
             )
             for ticket in list(self._tickets)
             if ticket.goal.end is End.UNKNOWN

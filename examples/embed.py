@@ -65,7 +65,7 @@ def main() -> int:
     try:
         tree.tick_tock(period_ms=100, post_tick_handler=report)
     except (KeyboardInterrupt, ExternalShutdownException):
-        print("interrupted")
+        pass  # in its pause, tick_tock() returns at Ctrl-C
     finally:
         tree.shutdown()  # cancels what still runs, and waits until it has ended
         executor.shutdown()

@@ -64,10 +64,12 @@ class RetryChild(Gate):
         return None if self._pause.left() <= 0.0 else Status.RUNNING
 
     def update(self) -> Status:
+        of = "" if self.limit is None else f" of {self.limit}"
         if self.decorated.status is not Status.FAILURE:
+            if self.decorated.status is Status.SUCCESS and self.failures:
+                self.feedback_message = f"attempt {self.failures + 1}{of} succeeded"
             return self.decorated.status
         self.failures += 1
-        of = "" if self.limit is None else f" of {self.limit}"
         self.feedback_message = f"attempt {self.failures}{of} failed"
         if self.limit is not None and self.failures >= self.limit:
             return Status.FAILURE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ examples:
   bt-actions run pick_and_place --cleanup-first
 
 exit codes:
-  0 nothing is left   3 the end of a goal is unknown
+  0 nothing is left   3 the end of a goal is unknown, or no action server is in sight
 """
 
 
@@ -132,8 +133,14 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
         )
         return Exit.UNKNOWN
     if not goals:
+        domain = os.environ.get("ROS_DOMAIN_ID", "") or "0"
+        if not actions:
+            note(
+                f"no action is in sight in ROS domain {domain}: nobody can see what was left; "
+                "start its server, or --look longer"
+            )
+            return Exit.UNKNOWN
         count = "1 action" if len(actions) == 1 else f"{len(actions)} actions"
-        where = f" on the {count} in sight" if actions else ": no action server is in sight"
         nothing = "nothing of this machine" if foreign else "nothing"
-        write(f"{nothing} was left behind{where}\n")
+        write(f"{nothing} was left behind on the {count} in sight in ROS domain {domain}\n")
     return Exit.SUCCESS

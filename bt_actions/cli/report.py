@@ -115,12 +115,14 @@ class Row:
     def verdict(self) -> str:
         """The outcome for the table: where the goal stands while there is none.
 
-        The end is told where it is not known, and where the robot did what nobody waited for.
+        The end is told where the goal may still be running, or run again, and where the robot did
+        what nobody waited for.
         """
         if self.outcome is None:
             return self.state
         surprise = self.outcome not in STOOD and self.end in (End.SUCCEEDED, End.ABORTED)
-        told = f", end {self.end}" if surprise or self.end is End.UNKNOWN else ""
+        gone = self.end is End.SERVER_GONE and self.outcome is not Outcome.SERVER_LOST
+        told = f", end {self.end}" if surprise or gone or self.end is End.UNKNOWN else ""
         return f"{self.outcome}{told}"
 
     @property

@@ -251,6 +251,8 @@ class Line:
         commands = step(now)
         if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
             goal.reason += self._instead(ticket)
+        elif goal.outcome is Outcome.SERVER_BUSY and before[0] is State.QUEUED:
+            goal.reason += self._in_use(ticket)
         if before != (goal.state, goal.outcome, goal.end):
             ticket.traffic.note(ticket)
         for command in commands:
@@ -337,6 +339,14 @@ class Line:
         self._past[twin.goal.id] = past
         if len(self._past) > GOALS_KEPT:
             del self._past[next(iter(self._past))]
+
+    def _in_use(self, ticket: Ticket) -> str:
+        """Say who has what the goal waited for, where that is a goal that was given up."""
+        for other in self.traffic.domain.resources.holders(ticket.goal.resources):
+            if other.goal.outcome is not None and not other.accounted_for:
+                told = other.goal.cancel_said
+                return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
+        return ""
 
     def _instead(self, ticket: Ticket) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""

@@ -116,6 +116,7 @@ class Ticket:
     testimony: Testimony = field(init=False)
     told_unknown: bool = False
     """The log says that it is not accounted for; and later, on whatever node, that it is."""
+    told_gone: bool = False
     paused_at: float | None = None
     begun_at: float = NEVER
     not_gone_before: float = NEVER

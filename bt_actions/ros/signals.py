@@ -98,11 +98,10 @@ class _Watch:
 
     def __init__(self, last_words: Callable[[], object]) -> None:
         self._last_words = last_words
-        self._received: list[int] = []
+        self._received: list[int] = []  # changed by the main thread alone
+        self._heard: Counter[int] = Counter()  # by the ear's
         self._ear: _Ear | None = None
         self._seen_at = float("-inf")
-        self._missed: list[int] = []  # heard, and not seen yet
-        self._heard: Counter[int] = Counter()
         self._interrupts: list[Interrupt] = []
         self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
         self._rclpys = _rclpys()
@@ -196,10 +195,10 @@ class _Watch:
         if self._is_over:
             self._do_as_before(number, frame)
             return
+        self._received.append(number)
+        while self._heard[number] > self._received.count(number):
+            self._received.append(number)  # Python calls this once for all that have come
         self._seen_at = time.monotonic()
-        these = [each for each in self._missed if each == number]
-        self._missed = [each for each in self._missed if each != number]
-        self._received += these or [number]  # Python calls this once for all that have come
         times, ends_process = len(self._received), self.ends_process()
         stuck = [interrupt(times > 1, ends_process) for interrupt in self._interrupts]
         if times > 2 or (times > 1 and any(stuck[-1:])):  # the innermost is where this thread is
@@ -223,17 +222,17 @@ class _Watch:
         if self._is_over or signal.getsignal(number) != self._note:
             return
         self._heard[number] += 1
-        if self._seen_at > heard_at - TURN:
-            known = self._received.count(number) + self._missed.count(number)
-            if self._heard[number] > known:
-                self._heard[number] -= 1  # the new one will be heard
-                signal.pthread_kill(threading.main_thread().ident or 0, number)
+        if self._heard[number] <= self._received.count(number):
             return
-        self._missed.append(number)
-        numbers = self._received + self._missed
+        if self._seen_at > heard_at - TURN:
+            self._heard[number] -= 1  # the new one will be heard
+            signal.pthread_kill(threading.main_thread().ident or 0, number)
+            return
+        missed = list((self._heard - Counter(self._received)).elements())
+        numbers = self._received + missed
         for interrupt in list(self._interrupts):
             interrupt(len(numbers) > 1, self._end_process(numbers))
-        if len(self._missed) > 2:
+        if len(missed) > 2:
             try:
                 self._last_words()
             finally:

@@ -262,10 +262,16 @@ class Traffic:
         goal = ticket.goal
         unknown = goal.outcome is not None and goal.end is End.UNKNOWN
         if unknown and not ticket.told_unknown:
-            log.error(f"{goal!r}: not accounted for, it may still be running: {goal.reason}")
+            if ticket.told_gone:
+                log.warning(
+                    f"{goal!r}: its server is back; canceling it, should it still run there"
+                )
+            else:
+                why = f"{goal.reason}{goal.cancel_said}"
+                log.error(f"{goal!r}: not accounted for, it may still be running: {why}")
         elif not unknown and ticket.told_unknown:
             log.info(f"{goal!r}: accounted for at last")
-        ticket.told_unknown = unknown
+        ticket.told_unknown, ticket.told_gone = unknown, goal.end is End.SERVER_GONE
         now = self.clocks.now().ros
         self.notify(Change(now, ticket, goal.state, goal.outcome, goal.end, goal.reason))
 

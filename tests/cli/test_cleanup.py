@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -43,3 +45,27 @@ def test_a_goal_that_may_be_running_counts_more_than_an_output_that_is_lost(
     assert main(["cleanup"]) == (3 if end is End.UNKNOWN else lost)
     said = "not all of them have ended" in capsys.readouterr().err
     assert said is (end is End.UNKNOWN)
+
+
+def test_where_no_server_is_in_sight_nobody_says_that_nothing_is_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They may be stopped, or start later; or this is the wrong domain."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+    in_sight: list[str] = []
+
+    def cleanup(*, sighted: Callable[[str], None], **_: Any) -> list[LeftBehind]:
+        for action in in_sight:
+            sighted(action)
+        return []
+
+    monkeypatch.setattr(module, "cleanup", cleanup)
+    assert main(["cleanup"]) == 3
+    said = capsys.readouterr()
+    assert "no action is in sight in ROS domain 7" in said.err
+    assert not said.out
+    in_sight.append("/move")
+    assert main(["cleanup"]) == 0
+    assert capsys.readouterr().out == (
+        "nothing was left behind on the 1 action in sight in ROS domain 7\n"
+    )

@@ -97,6 +97,17 @@ def test_an_end_that_nobody_waited_for_is_told(leaf: FakeAction, story: Story) -
     assert row.verdict == "CANCELED, end SUCCEEDED"
 
 
+@pytest.mark.parametrize(
+    ("outcome", "verdict"),
+    [(Outcome.CANCELED, "CANCELED, end SERVER_GONE"), (Outcome.SERVER_LOST, "SERVER_LOST")],
+)
+def test_a_goal_that_may_run_on_where_its_server_went_is_no_canceled_one(
+    leaf: FakeAction, story: Story, outcome: Outcome, verdict: str
+) -> None:
+    gone = story.goal(leaf, "CANCELING", outcome=outcome, end=End.SERVER_GONE)
+    assert row_of(leaf, story.goal(leaf, "EXECUTING"), gone).verdict == verdict
+
+
 def test_a_goal_that_was_not_sent_is_not_live(leaf: FakeAction, story: Story) -> None:
     assert not row_of(leaf, story.goal(leaf, "WAITING_FOR_SERVER")).live
     assert row_of(leaf, story.goal(leaf, "SENDING")).live

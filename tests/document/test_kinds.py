@@ -99,8 +99,9 @@ def test_repeat_ends_with_the_first_failure(load: Load) -> None:
 
 def test_retry_runs_its_child_until_it_succeeds_or_the_attempts_are_used(load: Load) -> None:
     child = f"{{sequence: X, children: [{STEP}, {{check: $n > 2}}]}}"
-    status, outputs, _ = run(load, COUNTING % f"{{retry: R, attempts: 5, child: {child}}}")
+    status, outputs, root = run(load, COUNTING % f"{{retry: R, attempts: 5, child: {child}}}")
     assert (status, outputs) == (Status.SUCCESS, {"n": 3})
+    assert root.children[1].feedback_message == "attempt 3 of 5 succeeded"
     status, outputs, root = run(load, COUNTING % f"{{retry: R, attempts: 2, child: {child}}}")
     assert (status, outputs) == (Status.FAILURE, {"n": 2})
     assert root.children[1].feedback_message == "attempt 2 of 2 failed"

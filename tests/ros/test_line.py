@@ -252,14 +252,22 @@ def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(
     first, next_one = (Traffic.__new__(Traffic) for _ in range(2))
     for each in (first, next_one):
         each.clocks, each._observers = clocks, []  # type: ignore[assignment]
+    monkeypatch.setattr(traffic.log, "warning", said.append)
     goal: Any = SimpleNamespace(outcome=Outcome.CANCELED, end=End.UNKNOWN, reason="", state=None)
-    ticket: Any = SimpleNamespace(goal=goal, told_unknown=False)
+    goal.cancel_said = "; it refuses"
+    ticket: Any = SimpleNamespace(goal=goal, told_unknown=False, told_gone=False)
     with lock:
         first.note(ticket)
         next_one.note(ticket)
         goal.end = End.CANCELED
         next_one.note(ticket)
         next_one.note(ticket)
-    first_word, last_word = said
+        goal.end = End.SERVER_GONE
+        next_one.note(ticket)
+        goal.end = End.UNKNOWN
+        next_one.note(ticket)
+    first_word, last_word, of_its_return = said
     assert "not accounted for" in first_word
+    assert "it refuses" in first_word
     assert "accounted for at last" in last_word
+    assert "its server is back; canceling it" in of_its_return, "no error: it soon has an end"

@@ -558,9 +558,16 @@ class TestDeadlines:
         leaf = run(MoveRobot("m", 3.5, action_name=name, timeout=Timeouts(feedback=2.0)))
         assert leaf.outcome is Outcome.SUCCEEDED
 
-    @pytest.mark.parametrize("fault", ["1:reject_cancel", "1:drop_cancel", "1:ignore_cancel"])
+    @pytest.mark.parametrize(
+        ("fault", "said"),
+        [
+            ("1:reject_cancel", "refuses to cancel it"),
+            ("1:drop_cancel", "has not answered the request to cancel it"),
+            ("1:ignore_cancel", "has agreed to cancel it, and it has not ended"),
+        ],
+    )
     def test_a_goal_that_cannot_be_canceled_is_not_accounted_for(
-        self, serve: Any, name: str, node: Any, fault: str
+        self, serve: Any, name: str, node: Any, fault: str, said: str
     ) -> None:
         serve(fault)
         timeouts = Timeouts(result=0.2, cancel=0.4)
@@ -571,6 +578,7 @@ class TestDeadlines:
             [report] = runner.unaccounted
             assert (report.name, report.server) == ("m", name)
             assert report.goal_id == leaf.history[0].goal_id
+            assert report.reason.endswith(f"; {name} {said}")
         assert len(leaf.history) == 1
 
     def test_others_wait_for_a_goal_that_cannot_be_canceled(
@@ -585,6 +593,8 @@ class TestDeadlines:
             assert runner.run(timeout=9.0) is Status.SUCCESS
             assert runner.unaccounted == []
         assert soon.outcome is Outcome.SERVER_BUSY
+        held = f"goal {stuck.history[0].goal_id} of stuck has not ended there"
+        assert soon.reason.endswith(f"{held}; {name} refuses to cancel it")
         assert later.outcome is Outcome.SUCCEEDED
         assert stood(stuck) == (Outcome.RESULT_TIMEOUT, End.SUCCEEDED)  # known by now
         assert journal.max_live == 1

@@ -19,9 +19,9 @@ from py_trees.composites import Selector
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
 from bt_actions.goal import State
-from bt_actions.ros.line import Line
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
+from bt_actions.ros.way import Way
 from bt_actions.server import Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import Host, HostFactory, Journal
@@ -361,13 +361,13 @@ class TestStopped:
         second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
         first.timeouts = second.timeouts = timeouts
         leave(first)
-        really, began = Line._shown, time.monotonic()
+        really, began = Way.shown, time.monotonic()
 
-        def late(line: Line) -> frozenset[bytes]:
-            early = line.name == f"{name}_0" and time.monotonic() - began < 1.5
-            return frozenset() if early else really(line)
+        def late(way: Way) -> frozenset[bytes]:
+            early = way.name == f"{name}_0" and time.monotonic() - began < 1.5
+            return frozenset() if early else really(way)
 
-        monkeypatch.setattr(Line, "_shown", late)
+        monkeypatch.setattr(Way, "shown", late)
         with TreeRunner(second) as other:
             assert other.run(30.0) is Status.SUCCESS
         canceled, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
@@ -444,11 +444,11 @@ class TestStopped:
         with TreeRunner(first) as runner:
             lose(stopped, first, runner)
         stopped.send(signal.SIGCONT)
-        really, seen = Line._shown, dict[str, float]()
+        really, seen = Way.shown, dict[str, float]()
 
-        def late(line: Line) -> frozenset[bytes]:
-            shown = really(line)
-            if line.name == f"{name}_1":
+        def late(way: Way) -> frozenset[bytes]:
+            shown = really(way)
+            if way.name == f"{name}_1":
                 if shown:
                     seen.setdefault("other", time.monotonic())
             elif time.monotonic() - seen.get("other", time.monotonic()) < 0.5:
@@ -457,7 +457,7 @@ class TestStopped:
 
         with TreeRunner(second) as other:
             until_shown(other.node, f"{name}_0", 1)
-            monkeypatch.setattr(Line, "_shown", late)
+            monkeypatch.setattr(Way, "shown", late)
             assert other.run(30.0) is Status.SUCCESS
         ended, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
         assert ended.t <= received.t
