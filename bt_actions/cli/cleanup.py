@@ -66,10 +66,13 @@ def run(args: argparse.Namespace) -> int:
     return sweep(args.look, args.patience)
 
 
-def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace: str = "") -> Exit:
+def sweep(
+    look: float, patience: float, wanted: Collection[str] | None = None, namespace: str = ""
+) -> Exit:
     """Clean up, saying what is found and how it ended.
 
-    Where no server of one of the `wanted` actions answers, nobody can say: UNKNOWN.
+    Where no server of one of the `wanted` actions answers, or none of any action is in sight, and
+    nobody says which are wanted, nobody can say: UNKNOWN.
     """
     from bt_actions.policy import End
 
@@ -100,7 +103,7 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
             found=found,
             sighted=actions.append,
             elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
-            wanted=wanted,
+            wanted=wanted or (),
             namespace=namespace,
             missing=missing,
         )
@@ -134,7 +137,7 @@ def sweep(look: float, patience: float, wanted: Collection[str] = (), namespace:
         return Exit.UNKNOWN
     if not goals:
         domain = os.environ.get("ROS_DOMAIN_ID", "") or "0"
-        if not actions:
+        if not actions and wanted is None:
             note(
                 f"no action is in sight in ROS domain {domain}: nobody can see what was left; "
                 "start its server, or --look longer"

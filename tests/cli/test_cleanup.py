@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from bt_actions.cli import main
+from bt_actions.cli.cleanup import sweep
 from bt_actions.policy import End
 from bt_actions.ros import cleanup as module
 from bt_actions.ros.cleanup import LeftBehind
@@ -64,6 +65,8 @@ def test_where_no_server_is_in_sight_nobody_says_that_nothing_is_left(
     said = capsys.readouterr()
     assert "no action is in sight in ROS domain 7" in said.err
     assert not said.out
+    assert sweep(0.1, 0.1, wanted=()) == 0, "a tree without actions is in nobody's way"
+    assert capsys.readouterr().out
     in_sight.append("/move")
     assert main(["cleanup"]) == 0
     assert capsys.readouterr().out == (
