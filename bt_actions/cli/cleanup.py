@@ -37,7 +37,7 @@ examples:
   bt-actions run pick_and_place --cleanup-first
 
 exit codes:
-  0 nothing is left   3 the end of a goal is unknown, or no action server is in sight
+  0 nothing is left   3 the end of a goal is unknown, or no action server is in sight, or silent
 """
 
 
@@ -131,8 +131,8 @@ def sweep(
         return Exit.UNKNOWN
     if unseen:
         note(
-            f"no server of {listing(unseen)} answers: nobody can see what was left there; "
-            "start it, or run without --cleanup-first"
+            f"no server of {listing(unseen)} answers: nobody can see what was left there"
+            f"{'; start it, or run without --cleanup-first' if wanted else ''}"
         )
         return Exit.UNKNOWN
     if not goals:

@@ -90,8 +90,9 @@ def cleanup(
     stopped, or a ghost) are waited for up to LOOK_LONGEST seconds, and `missing` is called with
     them, in the beginning of that, and in the end if it was in vain, as it is told. Blocks.
 
-    Where this process stands still for long meanwhile, servers may never tell its participant
-    anything again (ros/lookout.py), and it looks again with a new one, unless `context` is given.
+    Where no action is wanted, servers of all in sight have to answer. Where one does not, or this
+    process stands still for long meanwhile, it may be that they will never tell this participant
+    anything (ros/lookout.py), and it looks again with a new one, unless `context` is given.
 
     Raises CannotStart.
     """
@@ -145,12 +146,20 @@ class _Sweep:
         self._elsewhere = elsewhere
         self._missing = missing
         self._foreign: set[bytes] = set()
+        self._began = time.monotonic()
+        self._waits = False
+        self._shown: set[str] = set()  # actions of which a server was shown, to any node
         self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
         self._seen: set[str] = set()
         self.left: dict[bytes, LeftBehind] = {}
 
     def begin(self, node: Node, wanted: Collection[str]) -> None:
-        """Go on with what this node sees; servers of `wanted` actions have to answer it."""
+        """Go on with what this node sees; servers of `wanted` actions have to answer it.
+
+        Where none is wanted, those of all in sight: one that was stopped may never hear of us.
+        """
+        self._all = not wanted
+        self._answered: set[str] = set()
         self._node = node
         self._subscriptions: dict[str, Any] = {}
         self._clients: dict[str, Any] = {}
@@ -168,9 +177,11 @@ class _Sweep:
         *,
         breaks_off: bool,
     ) -> bool:
-        """Look, cancel, and wait; return False where it `breaks_off` because of a standstill."""
-        began, waits = time.monotonic(), False
-        looked = began + look
+        """Look, cancel, and wait; return False where it `breaks_off`, for another participant.
+
+        Because of a standstill, or of a server in sight that does not answer.
+        """
+        looked = time.monotonic() + look
         while True:
             now = time.monotonic()
             looked = max(looked, self._newest + SETTLE)
@@ -180,11 +191,14 @@ class _Sweep:
             if held > 0.0 and still.times <= AT_MOST:  # what there is may not be in sight again
                 looked = max(looked, now + held)
             lacks = sorted(self._unanswered)
-            if lacks and now >= looked and not waits:
-                waits = True
-                self._missing(lacks, False)
-            if waits and lacks and now < began + LOOK_LONGEST:
-                looked = now + 1.0
+            if lacks and now >= looked:
+                if not self._waits:
+                    self._waits = True
+                    self._missing(lacks, False)
+                if breaks_off and not self._shown.isdisjoint(lacks):
+                    return False  # it may not hear this participant
+                if now < self._began + LOOK_LONGEST:
+                    looked = now + 1.0
             if now < looked:
                 self._discover(now)
             elif self._over or now >= looked + patience:
@@ -217,6 +231,7 @@ class _Sweep:
                 )
 
     def _read(self, action: str, message: Any) -> None:
+        self._hears(action)
         for entry in message.status_list:
             goal_id = bytes(entry.goal_info.goal_id.uuid)
             left = self.left.get(goal_id)
@@ -254,6 +269,13 @@ class _Sweep:
                 left.asked_at = now
         if now - self._asked_at >= ASK_AGAIN:
             self._asked_at = now
+            self._shown |= {
+                topic.removesuffix(STATUS)
+                for topic in self._subscriptions
+                if self._node.count_publishers(topic)
+            }
+            if self._all:
+                self._unanswered |= self._shown - self._answered
             for action in sorted(self._unanswered):
                 self._cancel(action, uuid.uuid4().bytes)  # nobody's: any answer shows that it lives
 
@@ -267,10 +289,11 @@ class _Sweep:
             return False
         request = CancelGoal.Request()
         request.goal_info.goal_id = UUID(uuid=list(goal_id))
-        client.call_async(request).add_done_callback(lambda _: self._answered(action))
+        client.call_async(request).add_done_callback(lambda _: self._hears(action))
         return True
 
-    def _answered(self, action: str) -> None:
-        if action in self._unanswered:
-            self._unanswered.remove(action)
+    def _hears(self, action: str) -> None:
+        if action not in self._answered:
+            self._answered.add(action)
+            self._unanswered.discard(action)
             self._newest = time.monotonic()  # its status may be under way

@@ -44,7 +44,7 @@ _OPTIONS = {
 TURN = 0.5
 """Seconds for the main thread to see a signal; after them it seems to be in C."""
 
-Interrupt = Callable[[bool, bool], bool]
+Interrupt = Callable[[bool, bool], bool | None]
 
 
 @contextmanager
@@ -55,8 +55,9 @@ def ended_by_signals(
 
     `again` is True from the second signal on: who sends it does not want to wait. `interrupt`
     returns True where the block does not end by itself. From the second signal on KeyboardInterrupt
-    is raised in it then, and from the third on in any case. Where the main thread is in C both are
-    called on another thread, and the process ends with the third signal that it has not seen.
+    is raised in it then, and from the third on in any case, unless it returns None: it hurries, and
+    has something to say. Where the main thread is in C both are called on another thread, and the
+    process ends with the third signal that it has not seen.
 
     The usual effect of SIGINT is KeyboardInterrupt; with rclpy's handlers, which contexts are shut
     down. The others end the process on the spot, without its exit hooks; then `ends_process` is
@@ -201,7 +202,9 @@ class _Watch:
         self._seen_at = time.monotonic()
         times, ends_process = len(self._received), self.ends_process()
         stuck = [interrupt(times > 1, ends_process) for interrupt in self._interrupts]
-        if times > 2 or (times > 1 and any(stuck[-1:])):  # the innermost is where this thread is
+        if not stuck or stuck[-1] is None:  # the innermost is where this thread is
+            return
+        if times > 2 or (times > 1 and stuck[-1]):
             raise KeyboardInterrupt
 
     def _do_as_before(self, number: int, frame: FrameType | None) -> None:

@@ -46,7 +46,7 @@ IN_FLIGHT = 8
 silently."""
 _ON_NODE = "_bt_actions_traffic"
 _begins = threading.local()
-_contexts: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
+_contexts: weakref.WeakKeyDictionary[Any, tuple[float, int]] = weakref.WeakKeyDictionary()
 _closing = False  # the process ends: a tree that ticks on begins nothing any more
 
 
@@ -57,8 +57,10 @@ class Traffic:
         self.node = node
         self.clocks = Clocks(node)
         self.domain = domain_of(node.context.get_domain_id())
-        self.seen_since = _contexts.setdefault(node.context, time.monotonic())
-        """Since when the node's context is known here; a new one is blind to nothing."""
+        since = time.monotonic(), alarm.standstill.long_times
+        self.seen_since, self.long_standstills = _contexts.setdefault(node.context, since)
+        """Since when the node's context is known here; a new one is blind to nothing. And how often
+        this process had stood still for long by then: it may be deaf where a line is made later."""
         self.made_at = time.monotonic()
         self._namespace = node.get_namespace().rstrip("/")
         self._name = node.get_name()
@@ -359,10 +361,9 @@ def close_process() -> None:
     global _closing
     hurried = False
 
-    def hurry(again: bool, _ends_process: bool) -> bool:
+    def hurry(again: bool, _ends_process: bool) -> None:
         nonlocal hurried
         hurried = hurried or again
-        return False
 
     with contextlib.suppress(KeyboardInterrupt), ended_by_signals(hurry):
         with lock:

@@ -46,7 +46,7 @@ class Way:
         self.sight: Sight | None = None
         """Where the line's client lives, if not in its node's participant."""
         self._remapped = _remapped(line.traffic.node, line.name)
-        self._long_standstills = alarm.standstill.long_times
+        self._long_standstills = line.traffic.long_standstills
         self._last_question_at = NEVER  # to a server that has answered another client
 
     def __repr__(self) -> str:

@@ -124,6 +124,21 @@ class Ends(py_trees.behaviours.Running):
 TreeRunner(Ends("ends")).run()
 say("goes on")
 """
+WORDS_ARE_SAID_TO_THE_END = """
+def words():
+    for _ in range(3):
+        itself(signal.SIGTERM)
+    say("last words")
+
+with ended_by_signals(lambda *_: False, words):
+    itself(signal.SIGTERM)
+"""
+IT_HAS_SOMETHING_TO_SAY = """
+with ended_by_signals(lambda *_: None):
+    for _ in range(4):
+        itself(signal.SIGTERM)
+    say("something")
+"""
 TWO_COME_WHILE_IT_IS_IN_C = """
 import ctypes
 heard = threading.Semaphore(0)
@@ -161,10 +176,23 @@ with ended_by_signals(lambda again, ends_process: True):
         (ITS_HANDLER_CALLS_OURS, ["the user's"] * 2),
         (ONE_OF_OURS_IS_LEFT, []),
         (A_SHUTDOWN_THAT_BLOCKS, ["goes on"]),
+        (WORDS_ARE_SAID_TO_THE_END, ["last words"]),
+        (IT_HAS_SOMETHING_TO_SAY, ["something"]),
         (TWO_COME_WHILE_IT_IS_IN_C.replace("ACQUIRE", "heard.acquire()"), ["does not wait"]),
         (TWO_COME_WHILE_IT_IS_IN_C.replace("ACQUIRE", ""), ["does not wait"]),
     ],
-    ids=["rclpy within", "handler within", "busy", "chained", "left", "blocks", "in C", "just now"],
+    ids=[
+        "rclpy within",
+        "handler within",
+        "busy",
+        "chained",
+        "left",
+        "blocks",
+        "words",
+        "said",
+        "in C",
+        "just now",
+    ],
 )
 def test_a_program_of_the_users(start_program: Start, body: str, said: list[str]) -> None:
     process = start_program("-c", HEAD + body)

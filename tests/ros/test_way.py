@@ -30,7 +30,7 @@ def way_of(client: Any, state: Server = Server.READY) -> Way:
     line: Any = SimpleNamespace(
         name="/move",
         client=client,
-        traffic=SimpleNamespace(node=resolves),
+        traffic=SimpleNamespace(node=resolves, long_standstills=alarm.standstill.long_times),
         watch=SimpleNamespace(state=lambda _: state),
         orphaned=False,
         pump=lambda: None,
@@ -173,6 +173,22 @@ def test_a_standstill_that_no_look_has_seen_yet_is_a_doubt(
     assert way.in_doubt(16.0) == DOUBT_LASTS, "until it is answered"
     client.hearing.answered(16.0)
     assert not way.in_doubt(16.0)
+
+
+def test_a_line_that_is_made_later_may_be_deaf_as_its_participant_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is known since before the standstill; another node's goals kept the alarm awake."""
+    still = Standstill()
+    monkeypatch.setattr(alarm, "standstill", still)
+    way = way_of(SimpleNamespace(hearing=Hearing()))
+    still.lives(10.0)
+    still.lives(16.0)
+    assert way.in_doubt(16.0)
+    way._line.client = SimpleNamespace(hearing=Hearing())  # type: ignore[assignment]
+    later = Way(way._line)
+    assert later.in_doubt(16.0)
+    assert later.wants_question(16.0)
 
 
 def test_what_is_out_of_sight_is_in_no_doubt(monkeypatch: pytest.MonkeyPatch) -> None:

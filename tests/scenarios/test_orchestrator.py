@@ -623,6 +623,50 @@ def test_cleanup_that_was_stopped_looks_again(
     record.outcome = "cleanup: CANCELED, exit code 0"
 
 
+def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
+    launch: Launch, new_host: HostFactory, tree: Tree, name: str, domain: int, record: Record
+) -> None:
+    """SIGKILL to the orchestrator; SIGSTOP to the server when cleanup sees it; SIGCONT after 8 s"""
+    from bt_actions.ros.cleanup import cleanup
+
+    host = new_host(short_lease=False)
+    journal = host.open(name)
+    run = launch("run", str(tree(name, distance=90.0)))
+    run.line("executing on")
+    run.send(signal.SIGKILL)
+    run.wait()
+    goes_on = threading.Timer(8.0, lambda: host.send(signal.SIGCONT))
+
+    def sighted(action: str) -> None:
+        if action == name:
+            host.send(signal.SIGSTOP)
+            goes_on.start()
+
+    left = cleanup(look=3.0, sighted=sighted)
+    goes_on.join()
+    assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
+    assert journal.ends() == ["canceled"]
+    record.outcome = "CANCELED"
+
+
+def test_cleanup_does_not_take_silence_for_nothing(
+    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bt_actions.ros import cleanup
+
+    monkeypatch.setattr(cleanup, "LOOK_LONGEST", 6.0)
+    host = new_host(short_lease=False)
+    host.open(name)
+    told = list[tuple[list[str], bool]]()
+    cleanup.cleanup(
+        look=1.0,
+        sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
+        missing=lambda actions, in_vain: told.append((actions, in_vain)),
+    )
+    host.send(signal.SIGCONT)
+    assert told == [([name], False), ([name], True)]
+
+
 def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(
     domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
