@@ -109,6 +109,7 @@ class Goal:
         self._seen_status: int | None = None  # terminal, from the status topic
         self._asked_since = 0  # questions for the result since then, in vain,
         self._first_asked = 0.0  # and when the first of them was asked
+        self._cancel_sent = False
         self._cancel_code: int | None = None  # what was answered to a cancel request
         self._asked = 0  # in a row, of a server that has it and does not say that it has ended
         self._commands: list[Command] = []
@@ -220,6 +221,7 @@ class Goal:
             self._release()
         self.state = state
         commands, self._commands = tuple(self._commands), []
+        self._cancel_sent |= Command.CANCEL in commands
         return commands
 
     def poll(self, now: Now) -> tuple[Command, ...]:
@@ -594,6 +596,7 @@ class Goal:
             return self._drop(now, detail)
         self.lost = False
         self._denied_since, self._never_came, self._asked = None, False, 0
+        self._cancel_code = None
         if self.end is End.NEVER_STARTED:  # and this is the question whether that still holds
             self._ask(now)
             return State.CANCELING
@@ -730,7 +733,8 @@ class Goal:
     @property
     def cancel_said(self) -> str:
         """What its server has said of the request to cancel it, to follow a reason; or ""."""
-        if self.state is not State.CANCELING or self.lost:
+        gone = self.lost and self.end is not End.UNKNOWN  # else its node is, and this still holds
+        if self.state is not State.CANCELING or gone or not self._cancel_sent:
             return ""
         words = {
             None: "has not answered the request to cancel it",

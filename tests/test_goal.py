@@ -506,6 +506,25 @@ def test_the_cancel_deadline_runs_to_the_terminal_status_not_to_the_acknowledgem
     life.ended(Outcome.CANCELED, End.CANCELED)
 
 
+def test_what_the_server_said_of_a_cancel_is_told_as_long_as_it_holds() -> None:
+    life = sending()
+    life.on(Event.INTERRUPTED)
+    life.on(Event.DRAINED)
+    assert not life.goal.cancel_said, "it was not asked"
+    life.on(Event.ACCEPTED)
+    assert "has not answered" in life.goal.cancel_said
+    life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED)
+    assert "refuses to cancel it" in life.goal.cancel_said
+    life.on(Event.SERVER_LOST, "gone")
+    assert not life.goal.cancel_said
+    life.on(Event.SERVER_RETURNED)
+    assert "has not answered" in life.goal.cancel_said, "it is another one, perhaps"
+    life.on(Event.CANCEL_ANSWERED, CANCEL_ACCEPTED)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_TERMINATED)
+    life.on(Event.LEFT)
+    assert "has agreed to cancel it, and it has not ended" in life.goal.cancel_said
+
+
 def test_a_cancel_that_is_refused_or_not_answered_is_asked_for_again() -> None:
     life = executing()
     life.on(Event.INTERRUPTED)

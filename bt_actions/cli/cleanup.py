@@ -103,7 +103,7 @@ def sweep(
             found=found,
             sighted=actions.append,
             elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
-            wanted=wanted or (),
+            wanted=wanted,
             namespace=namespace,
             missing=missing,
         )

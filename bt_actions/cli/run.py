@@ -139,9 +139,9 @@ def run(args: argparse.Namespace) -> int:
 
     from bt_actions.cli.session import Session, SimulationWish
 
-    if args.cleanup_first:
-        wanted = set[str]() if args.sim else _actions(root)
-        if (code := _clean_up(wanted, args.namespace)) is not Exit.SUCCESS:
+    if args.cleanup_first and not args.sim:  # which is private
+        code = _clean_up(_actions(root), args.namespace)
+        if code is not Exit.SUCCESS:
             return code
     wish = SimulationWish(args.speed or 1.0, faults, args.seed) if args.sim else None
     with Session(

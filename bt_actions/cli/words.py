@@ -73,7 +73,7 @@ def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     lines = summary(report)
     lines += [line for line in (closing.complaint, closing.error) if line]
-    if report.unaccounted:
+    if report.unaccounted and not closing.verdict:  # of a simulation, which ends with us
         lines.append("`bt-actions cleanup` asks again to cancel what may still be running:")
     lines += [f"not accounted for: {line}" for line in report.unaccounted]
     return lines

@@ -74,7 +74,7 @@ def cleanup(
     found: Callable[[LeftBehind], None] = lambda left: None,
     sighted: Callable[[str], None] = lambda action: None,
     elsewhere: Callable[[str, bytes], None] = lambda action, goal_id: None,
-    wanted: Collection[str] = (),
+    wanted: Collection[str] | None = None,
     namespace: str = "",
     missing: Callable[[list[str], bool], None] = lambda actions, in_vain: None,
     context: Context | None = None,
@@ -83,27 +83,34 @@ def cleanup(
 
     Looks for servers for `look` seconds (longer while new ones come in sight), and waits `patience`
     seconds more for the goals that it canceled to end. `found` is called with each at once,
-    `sighted` with the name of each action in sight, and `elsewhere` with the action and the id of
-    each unfinished goal of a bt_actions process on another machine, or in another container, of
-    which nobody here can tell whether it is alive. Of the actions in `wanted`, whose relative names
-    belong to `namespace`, those of which no server has answered by then (one that is shown may be
-    stopped, or a ghost) are waited for up to LOOK_LONGEST seconds, and `missing` is called with
-    them, in the beginning of that, and in the end if it was in vain, as it is told. Blocks.
+    `sighted` with the name of each action of which a server is in sight, and `elsewhere` with the
+    action and the id of each unfinished goal of a bt_actions process on another machine, or in
+    another container, of which nobody here can tell whether it is alive. Of the actions in
+    `wanted`, whose relative names belong to `namespace` (None: of all in sight), those of which no
+    server has answered by then (one that is shown may be stopped, or a ghost) are waited for up to
+    LOOK_LONGEST seconds, and `missing` is called with them, in the beginning of that, and in the
+    end if it was in vain, as it is told. Blocks.
 
-    Where no action is wanted, servers of all in sight have to answer. Where one does not, or this
-    process stands still for long meanwhile, it may be that they will never tell this participant
-    anything (ros/lookout.py), and it looks again with a new one, unless `context` is given.
+    Where a server in sight does not answer, or this process stands still for long meanwhile, it may
+    be that it will never tell this participant anything (ros/lookout.py). So it looks again with a
+    new one, unless `context` is given.
 
-    Raises CannotStart.
+    Raises CannotStart, if nothing has been looked at yet.
     """
     sweep = _Sweep(found, sighted, elsewhere, missing)
     for tries_left in (2, 1, 0) if context is None else (0,):
         still = Standstill()
         still.lives(time.monotonic())  # it counts from when the participant is made
-        with _participant(context, namespace) as (node, executor):
-            sweep.begin(node, wanted)
-            if sweep.goes_through(executor, still, look, patience, breaks_off=tries_left > 0):
-                break
+        try:
+            with _participant(context, namespace) as (node, executor):
+                sweep.begin(node, wanted)
+                if sweep.goes_through(executor, still, look, patience, breaks_off=tries_left > 0):
+                    break
+        except CannotStart:
+            if not sweep.has_begun:
+                raise
+            sweep.gives_up()
+            break
     return list(sweep.left.values())
 
 
@@ -147,25 +154,27 @@ class _Sweep:
         self._missing = missing
         self._foreign: set[bytes] = set()
         self._began = time.monotonic()
+        self.has_begun = False
         self._waits = False
+        self._answered: set[str] = set()
         self._shown: set[str] = set()  # actions of which a server was shown, to any node
         self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
-        self._seen: set[str] = set()
         self.left: dict[bytes, LeftBehind] = {}
 
-    def begin(self, node: Node, wanted: Collection[str]) -> None:
+    def begin(self, node: Node, wanted: Collection[str] | None) -> None:
         """Go on with what this node sees; servers of `wanted` actions have to answer it.
 
-        Where none is wanted, those of all in sight: one that was stopped may never hear of us.
+        Or those of all in sight: one that was stopped may never hear of us.
         """
-        self._all = not wanted
-        self._answered: set[str] = set()
+        self.has_begun = True
+        self._all = wanted is None
         self._node = node
         self._subscriptions: dict[str, Any] = {}
         self._clients: dict[str, Any] = {}
         self._asked_at = float("-inf")
         here = node.get_name(), node.get_namespace()  # remapped, as that of the run will be
-        self._unanswered = {expand_topic_name(name, *here) for name in wanted}
+        wants = {expand_topic_name(name, *here) for name in wanted or ()}
+        self._unanswered = wants - self._answered
         self._newest = float("-inf")  # when the last action came in sight, or a server answered
 
     def goes_through(
@@ -187,6 +196,7 @@ class _Sweep:
             looked = max(looked, self._newest + SETTLE)
             held = max(still.answers_take(now), still.servers_take(now))
             if still.long_times and breaks_off:
+                self._answered.clear()  # their status may be lost
                 return False
             if held > 0.0 and still.times <= AT_MOST:  # what there is may not be in sight again
                 looked = max(looked, now + held)
@@ -209,6 +219,11 @@ class _Sweep:
             self._missing(lacks, True)
         return True
 
+    def gives_up(self) -> None:
+        """There is no other participant: what has not answered never will."""
+        if lacks := sorted(self._unanswered | (self._shown - self._answered)):
+            self._missing(lacks, True)
+
     @property
     def _over(self) -> bool:
         """Whether every goal that was found has ended."""
@@ -220,15 +235,18 @@ class _Sweep:
             if topic.endswith(STATUS) and topic not in self._subscriptions:
                 action = topic.removesuffix(STATUS)
                 self._newest = now
-                if action not in self._seen:
-                    self._seen.add(action)
-                    self._sighted(action)
                 self._subscriptions[topic] = self._node.create_subscription(
                     GoalStatusArray,
                     topic,
                     lambda message, action=action: self._read(action, message),
                     qos_profile_action_status_default,
                 )
+        for topic in self._subscriptions:
+            action = topic.removesuffix(STATUS)
+            if action not in self._shown and self._node.count_publishers(topic):  # no mere client
+                self._shown.add(action)
+                self._newest = now
+                self._sighted(action)
 
     def _read(self, action: str, message: Any) -> None:
         self._hears(action)
@@ -269,11 +287,6 @@ class _Sweep:
                 left.asked_at = now
         if now - self._asked_at >= ASK_AGAIN:
             self._asked_at = now
-            self._shown |= {
-                topic.removesuffix(STATUS)
-                for topic in self._subscriptions
-                if self._node.count_publishers(topic)
-            }
             if self._all:
                 self._unanswered |= self._shown - self._answered
             for action in sorted(self._unanswered):

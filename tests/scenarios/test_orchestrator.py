@@ -658,13 +658,62 @@ def test_cleanup_does_not_take_silence_for_nothing(
     host = new_host(short_lease=False)
     host.open(name)
     told = list[tuple[list[str], bool]]()
-    cleanup.cleanup(
+
+    def look(wanted: list[str] | None) -> None:
+        cleanup.cleanup(
+            look=1.0,
+            sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
+            missing=lambda actions, in_vain: told.append((actions, in_vain)),
+            wanted=wanted,
+        )
+        host.send(signal.SIGCONT)
+
+    look(wanted=[])
+    assert told == [], "who wants no action is in no server's way"
+    look(wanted=None)
+    assert told == [([name], False), ([name], True)]
+
+
+def test_cleanup_sees_no_server_where_there_is_a_client_only(
+    name: str, node: Any, domain: int
+) -> None:
+    from bt_actions.ros.cleanup import cleanup
+
+    sighted: list[str] = []
+    leaf = MoveRobot("client", 1.0, action_name=name)
+    leaf.setup(node=node)
+    assert cleanup(look=1.0, sighted=sighted.append) == []
+    assert name not in sighted
+    leaf.shutdown()
+
+
+def test_cleanup_that_cannot_look_again_says_who_has_not_answered(
+    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it has found by then is told."""
+    from bt_actions.ros import cleanup
+
+    class Once(cleanup.Node):  # type: ignore[misc]  # rclpy is not typed
+        def __init__(self, name: str, **how: Any) -> None:
+            monkeypatch.setattr(cleanup, "Node", no_more)
+            super().__init__(name, **how)
+
+    def no_more(*_: object, **__: object) -> None:
+        raise RuntimeError("no descriptors")
+
+    monkeypatch.setattr(cleanup, "Node", Once)
+    host, told = new_host(short_lease=False), list[tuple[list[str], bool]]()
+    host.open(name)
+    left = cleanup.cleanup(
         look=1.0,
         sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
         missing=lambda actions, in_vain: told.append((actions, in_vain)),
     )
     host.send(signal.SIGCONT)
+    assert left == []
     assert told == [([name], False), ([name], True)]
+    with pytest.raises(cleanup.CannotStart, match="no descriptors"):
+        cleanup.cleanup()
 
 
 def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(

@@ -28,7 +28,7 @@ def test_cycles_in_one_process_leave_nothing(
     """Create, run, shut down, so many times in one process; "user": in a user's own context"""
     began = time.monotonic()
     program = launch(how, str(cycles), program=("-m", "tests.support.cycles"))
-    assert program.wait(PATIENCE + 10.0) == 0, program
+    assert program.wait(PATIENCE + 10.0) == 0, str(program)  # in full: where it hangs
     told = json.loads(program.lines[-1])
     warm, after = told["warm"], told["after"]
     assert program.errors == [], "no warning"
