@@ -217,6 +217,8 @@ def ends(entries: Iterable[Entry], server: str | None = None) -> dict[str, Event
     for entry in entries:
         if not entry.goal or (server is not None and entry.server != server):
             continue
+        if entry.event is Event.CANCEL_REQUESTED and entry.goal not in found:
+            continue  # of a goal that is not known here
         found.setdefault(entry.goal, None)
         if entry.event in ENDS or entry.event is Event.REJECTED:
             found[entry.goal] = entry.event

@@ -101,6 +101,7 @@ def test_a_goal_is_live_from_its_acceptance_to_its_end() -> None:
         entry(4, "a", Event.CANCELED),
         entry(5, "b", Event.RECEIVED),
         entry(5, "b", Event.REJECTED),
+        entry(6, "nobody's", Event.CANCEL_REQUESTED),
     ]
     [interval] = journal.live_intervals(entries)
     assert (interval.goal, interval.start, interval.end) == ("a", 2, 4)

@@ -95,10 +95,11 @@ def summary(journals: Iterable[Journal]) -> str:
     twice = most = 0
     for each in journals:
         entries = each.entries()
+        known = journal.ends(entries)
         for entry in entries:
-            if entry.goal and entry.event not in ("step", "cancel_accepted"):
+            if entry.goal in known and entry.event not in ("step", "cancel_accepted"):
                 goals.setdefault((entry.server, entry.goal), []).append(str(entry.event))
-        ends += Counter(str(end or "never answered") for end in journal.ends(entries).values())
+        ends += Counter(str(end or "never answered") for end in known.values())
         twice += sum(times > 1 for times in journal.executions(entries).values())
         most = max(most, journal.max_live(entries, killed=each.killed))
     if not goals:
