@@ -20,6 +20,7 @@ from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight
 from bt_actions.ros.shared import lock
+from bt_actions.standstill import Standstill
 from tests.support.trees import in_turn
 from tests.support.waiting import holds_for, until
 
@@ -88,6 +89,7 @@ def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
     serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, canceled: bool
 ) -> None:
     """What the node asks gets lost, and what it is told, though the server is in sight."""
+    monkeypatch.setattr(alarm, "standstill", Standstill())  # that of the tests is none
     journal = serve()
     leaf = MoveRobot("m", 60.0 if canceled else 4.0, action_name=name, timeout=Timeouts(cancel=2.0))
     with TreeRunner(leaf, node=node) as runner:
