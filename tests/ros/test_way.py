@@ -39,6 +39,16 @@ def way_of(client: Any, state: Server = Server.READY) -> Way:
     return Way(line)
 
 
+def after_a_standstill(monkeypatch: pytest.MonkeyPatch, state: Server = Server.READY) -> Way:
+    """The same, where this process has just stood still from second 10 to second 16."""
+    still = Standstill()
+    monkeypatch.setattr(alarm, "standstill", still)
+    way = way_of(SimpleNamespace(hearing=Hearing()), state)
+    still.lives(10.0)
+    still.lives(16.0)
+    return way
+
+
 @pytest.mark.parametrize("heard", ["it alone", "both", "nobody"])
 def test_a_client_is_preferred_where_it_is_heard_and_our_own_is_not(
     monkeypatch: pytest.MonkeyPatch, heard: str
@@ -137,22 +147,14 @@ def test_who_has_no_node_any_more_has_no_other_way_and_no_doubt(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Else a drain that nobody answers would not end: there is no look that ends the doubt."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
-    way = way_of(SimpleNamespace(hearing=Hearing()))
-    still.lives(10.0)
-    still.lives(16.0)
+    way = after_a_standstill(monkeypatch)
     assert way.in_doubt(16.0)
     way._line.orphaned = True
     assert not way.in_doubt(16.0)
 
 
 def test_a_doubt_ends_though_nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
-    way = way_of(SimpleNamespace(hearing=Hearing()))
-    still.lives(10.0)
-    still.lives(16.0)
+    way = after_a_standstill(monkeypatch)
     assert way.in_doubt(16.0)
     assert not way.in_doubt(16.0 + DOUBT_LASTS)
 
@@ -179,11 +181,7 @@ def test_a_line_that_is_made_later_may_be_deaf_as_its_participant_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It is known since before the standstill; another node's goals kept the alarm awake."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
-    way = way_of(SimpleNamespace(hearing=Hearing()))
-    still.lives(10.0)
-    still.lives(16.0)
+    way = after_a_standstill(monkeypatch)
     assert way.in_doubt(16.0)
     way._line.client = SimpleNamespace(hearing=Hearing())  # type: ignore[assignment]
     later = Way(way._line)
@@ -193,10 +191,6 @@ def test_a_line_that_is_made_later_may_be_deaf_as_its_participant_is(
 
 def test_what_is_out_of_sight_is_in_no_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is absent, for which there are other rules."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
-    way = way_of(SimpleNamespace(hearing=Hearing()), Server.ABSENT)
-    still.lives(10.0)
-    still.lives(16.0)
+    way = after_a_standstill(monkeypatch, Server.ABSENT)
     assert not way.in_doubt(16.0)
     assert not way.wants_question(16.0)
