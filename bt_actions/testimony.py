@@ -3,7 +3,8 @@
 One server's word does not speak for another's: where a second one opened, or woke up, when the
 request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
 other may run. So while more than one of the servers that the request went to may live, an ending
-is believed when a question was answered twice, or when it has turned out that one is a ghost.
+is believed when a question was answered twice, or when it has turned out that one is a ghost. And
+of a goal that has ended and turns up at another server (a twin), the first end is no news.
 
 Told of answers and of looks at the server, it returns what the goal is to be told. What follows
 from that is the goal's (goal.py); who lives is known to the watch (server.py). No ROS, no thread,
@@ -52,6 +53,7 @@ class Testimony:
         self._asked_at = NEVER
         self._crowd: frozenset[GID] = frozenset()  # when last looked at, and not known who lives
         self._told_of_two = False
+        self._first_end: End | None = None  # of a twin: how it ended elsewhere before
         self._fresh_since = NEVER
         """What was asked before may have been answered by who is gone, or did not have it yet."""
 
@@ -61,15 +63,14 @@ class Testimony:
         if _is_crowded(watch):
             self._crowd = watch.gids
 
+    def is_twins(self, sent_to: frozenset[GID], first_end: End) -> None:
+        """The goal is a twin: it has ended so at a server, and may run at another of these."""
+        self.sent_to, self._first_end = sent_to, first_end
+
     def is_at_another(self, watch: ServerWatch, now: float) -> None:
-        """The goal is a twin: it has ended at one of the servers that are shown."""
+        """The twin runs at one of the servers that are shown."""
         self.sent(watch)
         self._accepted_by, self._fresh_since = 2, now
-
-    def is_elsewhere(self, gids: frozenset[GID]) -> None:
-        """The goal is a twin: it has ended, but for these servers, which are out of sight."""
-        self.sent_to = gids
-        self.taken_over()
 
     def taken_over(self) -> None:
         """Another node minds the goal from now on, and has not seen its server yet."""
@@ -128,6 +129,8 @@ class Testimony:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
         status = answers[-1][0]
         ended = [answer for answer in answers if answer[0] in ENDS]
+        if ended and self._first_end is not None:
+            return self._finished_elsewhere(watch, asked, len(answers), ended)
         if ended:
             done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), ended[-1])
             if len(self.sent_to) > 1:
@@ -150,9 +153,34 @@ class Testimony:
         by_all = len(answers) > 1 or watch.state(now) is Server.READY
         return [(Event.RESULT_UNKNOWN, None)] if by_all and asked >= self._fresh_since else []
 
+    def _finished_elsewhere(
+        self, watch: ServerWatch, asked: float, answers: int, ended: list[tuple[int, Any]]
+    ) -> Told:
+        """Take the ends that servers tell of a twin: one of them may be the first, once more."""
+        if asked < self._fresh_since:
+            return []
+        others = ended[:]
+        for each in ended:
+            if ENDS[each[0]] is self._first_end:
+                others.remove(each)
+                break
+        if not others and watch.gids == self.sent_to and len(self.sent_to) == 1:
+            others = ended  # the first has gone
+        if others:
+            return [(Event.RESULT, others[-1])]
+        if answers >= max(2, len(watch.gids)):
+            return [(Event.RESULT_UNKNOWN, None)]  # that which took it, too, has forgotten it
+        if self._may_be_at_two(watch) or self._goal.lost or not self.sent_to - watch.gids:
+            return []
+        self.sent_to -= watch.gids
+        self._was_gone = True
+        return [(Event.SERVER_LOST, f"{self._goal.server} went away under the goal")]
+
     def shown(self, watch: ServerWatch, status: int) -> Told:
         """Take the status that one server publishes of the goal."""
         self.lives()
+        if status in ENDS and self._first_end is not None:
+            return [] if ENDS[status] is self._first_end else [(Event.STATUS, status)]
         doubtful = self._may_be_at_two(watch) or self._fresh_since > NEVER
         if status in ENDS and len(self.sent_to) > 1 and doubtful:
             status = STATUS_EXECUTING  # it has ended at one; that it was accepted is sure

@@ -330,11 +330,12 @@ class Line:
         )
         elsewhere = ticket.testimony.may_run_at(self.watch)
         if elsewhere and not ticket.goal.lost:
-            twin.testimony.is_elsewhere(elsewhere)
+            twin.testimony.is_twins(elsewhere, ticket.goal.end)
+            twin.testimony.taken_over()
             self.goals[twin.goal.id] = twin
             return
         twin.owner = None
-        twin.testimony.sent_to = ticket.testimony.sent_to
+        twin.testimony.is_twins(ticket.testimony.sent_to, ticket.goal.end)
         past = (weakref.ref(ticket.owner), ticket.goal.accepted, time.monotonic(), twin)
         self._past[twin.goal.id] = past
         if len(self._past) > GOALS_KEPT:

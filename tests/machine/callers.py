@@ -254,6 +254,7 @@ class Caller:
     def _follow_twin(self, twin: Ticket, commands: tuple[Command, ...]) -> None:
         if twin.goal.state is State.DONE and twin.line.tickets.get(twin.goal.id) is twin:
             del twin.line.tickets[twin.goal.id]
+            self.judge.twin_is_done(twin)
         for command in commands:
             self._carry_out(twin, command)
 
@@ -355,6 +356,7 @@ class Caller:
             if len(past.testimony.sent_to | line.watch.gids) == 1 and past.goal.accepted:
                 return
             twin = self._twin(past)
+            twin.testimony.is_twins(past.testimony.sent_to, past.goal.end)
             line.watch.two_answered()
             twin.testimony.is_at_another(line.watch, self._moment())
             self.tell(twin, Event.SERVER_RETURNED)
@@ -369,7 +371,9 @@ class Caller:
         """A second server may have taken it, and has gone."""
         elsewhere = ticket.testimony.may_run_at(ticket.line.watch)
         if elsewhere and ticket.goal.sent and not ticket.goal.lost:
-            self._twin(ticket).testimony.is_elsewhere(elsewhere)
+            twin = self._twin(ticket)
+            twin.testimony.is_twins(elsewhere, ticket.goal.end)
+            twin.testimony.taken_over()
 
     def _pass_on(self, ticket: Ticket, told: Told) -> None:
         for event, detail in told:

@@ -307,6 +307,15 @@ class Judge:
         rule = "an end is known when it has ended everywhere, or a twin is kept in mind"
         self._hold(not runs or ticket.goal.id in line.tickets, rule)
 
+    def twin_is_done(self, twin: Ticket) -> None:
+        """What a second server took has ended there."""
+        ticket = self.caller.tickets[int(twin.goal.id)]
+        ends = [ENDS[job.status] for job in ticket.ledger.jobs if job.status in ENDS]
+        if ticket.goal.end in ends:
+            ends.remove(ticket.goal.end)
+        true = twin.goal.end in ends or twin.goal.end not in ENDS.values()
+        self._hold(true, f"the end of a twin is none that was told before: {twin.goal!r}, {ends}")
+
     def hears_acceptance(self, ticket: Ticket, server: ModelServer) -> None:
         """A server's acceptance has been taken in, the first or one more."""
         news, ledger = server.gid not in ticket.ledger.heard, ticket.ledger

@@ -308,8 +308,12 @@ class Caller:
 
     def put_away(self, ticket: Ticket) -> None:
         """Have the judge see that a goal is DONE, and its line has put it away."""
-        view = self._by_goal.get(ticket.goal)
-        if view is not None and not view.twin and ticket.goal.state is State.DONE:
+        if ticket.goal.state is not State.DONE:
+            return
+        view = self.view(ticket)
+        if view.twin:
+            self.judge.twin_is_done(view)  # type: ignore[arg-type]
+        else:
             event = Event.CLOSED if view.ledger.closed else None
             self.judge.is_done(view, event)  # type: ignore[arg-type]
 

@@ -311,6 +311,11 @@ def believes_one_server_where_two_may_have_it(patch: Patch) -> None:
 
 
 @mutation
+def takes_the_first_end_of_a_goal_for_that_of_its_twin(patch: Patch) -> None:
+    patch.setattr(testimony.Testimony, "is_twins", lambda self, sent_to, first_end: None)
+
+
+@mutation
 def hears_the_first_of_two_acceptances(patch: Patch) -> None:
     patch.setattr(Caller, "_found_twice", lambda self, line, message: None)
 
