@@ -61,3 +61,19 @@ class Standstill:
         """Return for how many seconds a server may be out of sight that is there; or 0."""
         self.lives(now)
         return max(0.0, self._servers_by - now)
+
+
+class Leniency:
+    """Bears with one thing as long as standstills may be the cause, but with `AT_MOST` in a row."""
+
+    def __init__(self) -> None:
+        self._since: int | None = None
+
+    def bears(self, still: Standstill, *, cause: bool) -> bool:
+        """Whether to bear with it now; where there is no `cause` to, it begins anew."""
+        if not cause:
+            self._since = None
+            return False
+        if self._since is None:
+            self._since = still.times
+        return still.times - self._since < AT_MOST

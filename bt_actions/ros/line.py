@@ -26,7 +26,6 @@ from bt_actions.ros.log import log
 from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
-from bt_actions.standstill import AT_MOST
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
 
@@ -225,12 +224,8 @@ class Line:
         In this order: to ask is to give up.
         """
         still = alarm.standstill
-        if not still.answers_take(time.monotonic()):
-            ticket.spared_since = None
-        elif ticket.spared_since is None:
-            ticket.spared_since = still.times
-        spared = ticket.spared_since
-        return (spared is None or still.times - spared >= AT_MOST) and ticket.given_up
+        cause = still.answers_take(time.monotonic()) > 0.0
+        return not ticket.spared.bears(still, cause=cause) and ticket.given_up
 
     def mind(self, ticket: Ticket) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""
@@ -550,12 +545,8 @@ class Line:
         """
         still, sent_to, now = alarm.standstill, ticket.testimony.sent_to, time.monotonic()
         in_sight = sent_to <= self.watch.gids and not self.watch.gone(now, sent_to)
-        if in_sight or still.servers_take(now) <= 0.0:
-            ticket.hidden_since = None
-            return False
-        if ticket.hidden_since is None:
-            ticket.hidden_since = still.times
-        return still.times - ticket.hidden_since < AT_MOST
+        cause = not in_sight and still.servers_take(now) > 0.0
+        return ticket.hidden.bears(still, cause=cause)
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""

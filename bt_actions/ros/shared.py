@@ -16,6 +16,7 @@ from bt_actions.goal import Goal
 from bt_actions.goal_terms import State
 from bt_actions.policy import End, Outcome
 from bt_actions.resources import Resources
+from bt_actions.standstill import Leniency
 from bt_actions.testimony import Testimony
 
 if TYPE_CHECKING:
@@ -123,11 +124,11 @@ class Ticket:
     """Until when it is no news that its server is not shown: it may be stopped for less than its
     lease, or not be discovered yet. Both in seconds of the steady clock."""
 
-    hidden_since: int | None = None
-    """Standstills of this process by then; None while its servers are in sight, or need not be."""
+    hidden: Leniency = field(init=False, default_factory=Leniency)
+    """With servers that are out of sight;"""
 
-    spared_since: int | None = None
-    """Standstills by then, since which nobody could say that it is given up; or None."""
+    spared: Leniency = field(init=False, default_factory=Leniency)
+    """and with a run that seems to have given it up. Both after standstills of this process."""
 
     def __post_init__(self) -> None:
         self.testimony = Testimony(self.goal)

@@ -20,7 +20,7 @@ from bt_actions.ros.line import LEASE, Line
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.server import ServerWatch
-from bt_actions.standstill import AT_MOST, Standstill
+from bt_actions.standstill import AT_MOST, Leniency, Standstill
 
 OURS, NEW = b"ours", b"new"
 
@@ -178,7 +178,7 @@ def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
     monkeypatch.setattr(alarm, "standstill", still)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
     ticket: Any = SimpleNamespace(
-        testimony=SimpleNamespace(sent_to=frozenset({OURS, NEW})), hidden_since=None
+        testimony=SimpleNamespace(sent_to=frozenset({OURS, NEW})), hidden=Leniency()
     )
     line: Any = SimpleNamespace(watch=watch(NEW))
     still.lives(moment := 10.0)
@@ -204,7 +204,7 @@ def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
     asked: list[None] = []
 
     class Asked:
-        spared_since = None
+        spared = Leniency()
 
         @property
         def given_up(self) -> bool:
@@ -227,7 +227,7 @@ def test_a_tick_that_stands_still_again_and_again_is_given_up_in_the_end(
     still = Standstill()
     monkeypatch.setattr(alarm, "standstill", still)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
-    ticket: Any = SimpleNamespace(given_up=True, spared_since=None)
+    ticket: Any = SimpleNamespace(given_up=True, spared=Leniency())
     still.lives(moment := 10.0)
     for _ in range(AT_MOST):
         still.lives(moment := moment + 0.5)
