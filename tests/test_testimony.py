@@ -12,7 +12,7 @@ from bt_actions.server import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER = b"one", b"other"
 BOTH = frozenset({ONE, OTHER})
-DENIED, CANCELED = 2, 0
+DENIED, CANCELED, REFUSED = 2, 0, 1
 SUCCEEDED, ABORTED = (4, "done"), (6, "failed")
 CANCELED_END = (5, None)
 UNKNOWN = (0, None)
@@ -308,7 +308,8 @@ def twin(said: testimony.Testimony, watch: ServerWatch) -> testimony.Testimony:
     """Of a goal that has succeeded at one, and has turned up at the other since."""
     goal = said._goal.twin(Now(1.0, 1.0))
     twin = testimony.Testimony(goal)
-    twin.is_twins(said.sent_to, End.SUCCEEDED)
+    said._goal.end = End.SUCCEEDED
+    twin.is_twin_of(said, said.sent_to)
     twin.is_at_another(watch, 1.0)
     goal.on(Event.SERVER_RETURNED, Now(1.0, 1.0))
     return twin
@@ -333,7 +334,7 @@ def test_the_status_that_a_goal_ended_with_is_none_of_its_twin(
     assert twin.shown(watch, 5) == [(Event.STATUS, 5)], "only the other can have said so"
 
 
-def test_a_twin_is_lost_when_only_the_first_end_is_left(
+def test_a_twin_is_lost_when_only_what_was_told_before_is_left(
     twin: testimony.Testimony, watch: ServerWatch
 ) -> None:
     twin.looked(watch, 1.1)
@@ -368,3 +369,40 @@ def test_a_twin_that_its_server_has_forgotten_is_denied(
 ) -> None:
     told = twin.finished(watch, 1.2, 1.1, [SUCCEEDED, UNKNOWN])
     assert events(told) == [Event.RESULT_UNKNOWN]
+    watch.observe(2.0, True, frozenset({ONE, b"newcomer"}))
+    told = twin.finished(watch, 2.2, 2.1, [SUCCEEDED, UNKNOWN])
+    assert events(told) == [Event.SERVER_LOST], "it was denied by the newcomer"
+
+
+def test_whoever_is_left_and_has_a_twin_to_cancel_tells_its_end(
+    twin: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(1.5, True, frozenset({OTHER, b"newcomer"}))
+    twin.looked(watch, 1.5)
+    twin.canceled(watch, 1.4, [REFUSED])
+    assert events(twin.finished(watch, 1.6, 1.5, [UNKNOWN])) == []
+    assert twin.canceled(watch, 1.5, [REFUSED, DENIED]) == [], "it is the newcomer's denial"
+    assert twin.finished(watch, 1.7, 1.6, [UNKNOWN, SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
+
+
+def test_the_twin_of_a_twin_has_a_third_end(twin: testimony.Testimony, watch: ServerWatch) -> None:
+    watch.observe(2.0, True, BOTH | {b"third"})
+    twin._goal.end = End.CANCELED
+    third = testimony.Testimony(twin._goal.twin(Now(2.0, 2.0)))
+    third.is_twin_of(twin, twin.sent_to)
+    third.is_at_another(watch, 2.0)
+    assert third.finished(watch, 2.1, 2.0, [SUCCEEDED, CANCELED_END]) == []
+    told = third.finished(watch, 2.1, 2.0, [CANCELED_END, ABORTED, SUCCEEDED])
+    assert told == [(Event.RESULT, ABORTED)]
+    assert third.shown(watch, 5) == [], "by the second"
+
+
+def test_two_more_that_take_a_twin_have_to_tell_two_ends(
+    twin: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(2.0, True, BOTH | {b"third"})
+    twin.sent(watch)
+    assert events(twin.answered(watch, 2.0, [True, True, True])) == [Event.SERVER_AMBIGUOUS]
+    assert twin.finished(watch, 2.1, 2.0, [SUCCEEDED, CANCELED_END]) == []
+    told = twin.finished(watch, 2.1, 2.0, [SUCCEEDED, CANCELED_END, ABORTED])
+    assert told == [(Event.RESULT, ABORTED)]

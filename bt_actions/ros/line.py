@@ -14,9 +14,17 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goal_terms import STATUS_SUCCEEDED, Command, Event, State
+from bt_actions.goal_terms import (
+    CANCEL_ACCEPTED,
+    CANCEL_REJECTED,
+    STATUS_SUCCEEDED,
+    Command,
+    Event,
+    State,
+)
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
@@ -53,6 +61,17 @@ FEEDBACK = "/_action/feedback"
 _probes = itertools.count(1)
 
 
+@dataclass(frozen=True, slots=True)
+class _Past:
+    """A goal that is DONE, and may turn up at a second server."""
+
+    owner: Callable[[], Any]
+    """A weak reference to the leaf."""
+    accepted: bool
+    since: float
+    twin: Ticket
+
+
 class Line:
     """One action as one node sees it: the shared client, the watch, and the goals on it."""
 
@@ -73,8 +92,7 @@ class Line:
         """Since when a server of this name has been shown without a break that was seen."""
         self._just_came = True
         self._last_probes: deque[int] = deque()
-        self._past: dict[bytes, tuple[Any, bool, float, Ticket]] = {}
-        """Of goals that are DONE: owner (a weakref), was it accepted, since when, and its twin."""
+        self._past: dict[bytes, _Past] = {}
         self._warned_crowd = False
         self._warned_of: set[str] = set()
         self._adopt()
@@ -113,6 +131,8 @@ class Line:
             ticket = self.goals.get(goal_id)
             if ticket is not None:
                 self._pass_on(ticket, ticket.testimony.canceled(self.watch, asked, answers))
+            elif answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
+                self._found_twice(goal_id, (True,))
 
     def result_came(
         self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
@@ -135,25 +155,39 @@ class Line:
         past = self._past.get(goal_id)
         if past is None:
             return
-        owner, was_accepted, _, twin = past
+        twin = past.twin
         with contextlib.suppress(Exception):  # our node is gone; the next look tells
             self._observe(time.monotonic())
-        alone = len(twin.testimony.sent_to | self.watch.gids) == 1
-        if alone and (was_accepted or sum(answers) > 1):
+        if not self._may_be_several(past) and (past.accepted or sum(answers) > 1):
             return  # the acceptance was overtaken by the result, or came twice
         del self._past[goal_id]
-        twin.owner = owner()
+        twin.owner = past.owner()
         self.watch.two_answered()
         twin.testimony.is_at_another(self.watch, time.monotonic())
         self.goals[goal_id] = twin
         alarm.mind(self)
         self.tell(twin, Event.SERVER_RETURNED)
 
-    def _runs_on(self, goal_id: bytes) -> None:
-        """A server runs a goal that has ended here, unless this is older than the end."""
+    def _runs_on(self, goal_id: bytes) -> bool:
+        """A server runs a goal that has ended here; return False if it may be an older word."""
         past = self._past.get(goal_id)
-        if past is not None and time.monotonic() - past[2] > STALE:
-            self._found_twice(goal_id, (True,))
+        if past is None or time.monotonic() - past.since <= STALE:
+            return False
+        self._found_twice(goal_id, (True,))
+        return True
+
+    def _doubts_end(self, goal_id: bytes) -> None:
+        """A status may be older than the goal's end, or be all that a second server ever says.
+
+        To ask it to cancel tells which: who has ended a goal neither agrees nor refuses.
+        """
+        past = self._past.get(goal_id)
+        if past is not None and self._may_be_several(past):
+            with contextlib.suppress(Exception):  # our node is gone; the next look tells
+                self.client.cancel(goal_id)
+
+    def _may_be_several(self, past: _Past) -> bool:
+        return len(past.twin.testimony.sent_to | self.watch.gids) > 1
 
     def _rival_sent(self, ticket: Ticket) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
@@ -165,8 +199,9 @@ class Line:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
         with lock:
             for goal_id in self._past.keys() & statuses.keys() - self.goals.keys():
-                if 0 < statuses[goal_id] < STATUS_SUCCEEDED:
-                    self._runs_on(goal_id)
+                runs = 0 < statuses[goal_id] < STATUS_SUCCEEDED
+                if runs and not self._runs_on(goal_id):
+                    self._doubts_end(goal_id)
             for goal_id in self.goals.keys() & statuses.keys():
                 if statuses[goal_id] > 0:
                     ticket = self.goals[goal_id]
@@ -325,16 +360,18 @@ class Line:
         )
         elsewhere = ticket.testimony.may_run_at(self.watch)
         if elsewhere and not ticket.goal.lost:
-            twin.testimony.is_twins(elsewhere, ticket.goal.end)
+            twin.testimony.is_twin_of(ticket.testimony, elsewhere)
             twin.testimony.taken_over()
             self.goals[twin.goal.id] = twin
             return
         twin.owner = None
-        twin.testimony.is_twins(ticket.testimony.sent_to, ticket.goal.end)
-        past = (weakref.ref(ticket.owner), ticket.goal.accepted, time.monotonic(), twin)
-        self._past[twin.goal.id] = past
+        twin.testimony.is_twin_of(ticket.testimony, ticket.testimony.sent_to)
+        owner = weakref.ref(ticket.owner)
+        self._past[twin.goal.id] = _Past(owner, ticket.goal.accepted, time.monotonic(), twin)
         if len(self._past) > GOALS_KEPT:
-            del self._past[next(iter(self._past))]
+            oldest = next(iter(self._past))
+            del self._past[oldest]
+            self.client.forget(oldest)
 
     def _in_use(self, ticket: Ticket) -> str:
         """Say who has what the goal waited for, where that is a goal that was given up."""

@@ -15,6 +15,7 @@ import contextlib
 import os
 import queue
 import select
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -126,7 +127,9 @@ class Log:
                 return
             self._tell_dropped()
             self._take(logger, level, _fit(text))
-            if self._thread is None or not self._thread.is_alive():
+            if sys.is_finalizing():  # where no thread runs any more, and a new one never would
+                self._write_here()
+            elif self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._write, name=THREAD, daemon=True)
                 try:
                     self._thread.start()

@@ -8,6 +8,7 @@ which are set beneath Python's, and of which Python knows nothing.
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
 import select
 import signal
@@ -160,6 +161,10 @@ class _Watch:
         finally:
             self._interrupts.pop()
 
+    def insists(self) -> bool:
+        """Whether the ear's thread, which calls this, has one more signal to hear."""
+        return self._ear is not None and self._ear.has_more()
+
     def ends_process(self) -> bool:
         """Whether what was received ends the process on the spot."""
         return self._end_process(self._received)
@@ -204,7 +209,7 @@ class _Watch:
         stuck = [interrupt(times > 1, ends_process) for interrupt in self._interrupts]
         if not stuck or stuck[-1] is None:  # the innermost is where this thread is
             return
-        if times > 2 or (times > 1 and stuck[-1]):
+        if (times > 2 or (times > 1 and stuck[-1])) and not _is_at_an_edge(frame):
             raise KeyboardInterrupt
 
     def _do_as_before(self, number: int, frame: FrameType | None) -> None:
@@ -275,6 +280,12 @@ class _Ear:
         self.close()
         os.close(self._read)
 
+    def has_more(self) -> bool:
+        """Whether this is its thread, and a signal has come that it has not read."""
+        poll = select.poll()
+        poll.register(self._read, select.POLLIN)
+        return threading.current_thread() is self._thread and bool(poll.poll(0))
+
     def _listen(self) -> None:
         heard: list[tuple[int, float]] = []
         poll = select.poll()
@@ -294,6 +305,30 @@ class _Ear:
 
 
 _watch: _Watch | None = None
+
+
+def insists() -> bool:
+    """Whether one more signal has come since this thread, which hears them, says the last words."""
+    return _watch is not None and _watch.insists()
+
+
+_EDGES = tuple(
+    getattr(contextlib._GeneratorContextManager, name).__code__  # noqa: SLF001
+    for name in ("__enter__", "__exit__")
+)
+_BLOCKS = tuple(inspect.unwrap(each).__code__ for each in (ended_by_signals, _Watch.telling))
+
+
+def _is_at_an_edge(frame: FrameType | None) -> bool:
+    """Whether a block of ours is being entered or left: what is raised there keeps it from its end.
+
+    In contextlib, and not in the generator, where it would be in a `try`.
+    """
+    while frame is not None:
+        if frame.f_code in _EDGES and frame.f_locals["self"].gen.gi_code in _BLOCKS:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _nothing(_again: bool, _ends_process: bool) -> bool:

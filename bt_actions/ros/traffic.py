@@ -35,7 +35,7 @@ from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.line import Line
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import Beginner, Change, Observer, Ticket, changed, domain_of, lock
-from bt_actions.ros.signals import ended_by_signals
+from bt_actions.ros.signals import ended_by_signals, insists
 from bt_actions.server import Server
 from bt_actions.standstill import AT_MOST
 
@@ -372,7 +372,7 @@ def close_process() -> None:
             tickets = [ticket for line in lines for ticket in line.goals.values()]
         left = [ticket for ticket in tickets if not ticket.goal.lost]
         try:
-            drain(left, lambda: hurried)
+            drain(left, lambda: hurried or insists())
         finally:
             for ticket in left:
                 if not ticket.accounted_for:

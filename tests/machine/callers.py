@@ -356,7 +356,7 @@ class Caller:
             if len(past.testimony.sent_to | line.watch.gids) == 1 and past.goal.accepted:
                 return
             twin = self._twin(past)
-            twin.testimony.is_twins(past.testimony.sent_to, past.goal.end)
+            twin.testimony.is_twin_of(past.testimony, past.testimony.sent_to)
             line.watch.two_answered()
             twin.testimony.is_at_another(line.watch, self._moment())
             self.tell(twin, Event.SERVER_RETURNED)
@@ -372,7 +372,7 @@ class Caller:
         elsewhere = ticket.testimony.may_run_at(ticket.line.watch)
         if elsewhere and ticket.goal.sent and not ticket.goal.lost:
             twin = self._twin(ticket)
-            twin.testimony.is_twins(elsewhere, ticket.goal.end)
+            twin.testimony.is_twin_of(ticket.testimony, elsewhere)
             twin.testimony.taken_over()
 
     def _pass_on(self, ticket: Ticket, told: Told) -> None:

@@ -312,7 +312,7 @@ def believes_one_server_where_two_may_have_it(patch: Patch) -> None:
 
 @mutation
 def takes_the_first_end_of_a_goal_for_that_of_its_twin(patch: Patch) -> None:
-    patch.setattr(testimony.Testimony, "is_twins", lambda self, sent_to, first_end: None)
+    patch.setattr(testimony.Testimony, "is_twin_of", lambda self, ended, sent_to: None)
 
 
 @mutation

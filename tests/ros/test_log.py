@@ -148,15 +148,18 @@ def test_a_logger_of_a_node_that_is_gone_loses_nothing(
     assert re.fullmatch(r"\[WARN\] \[\d+\.\d{9}\] \[test\]: of a node\n", capfd.readouterr().err)
 
 
+@pytest.mark.parametrize("why", ["there are too many", "the interpreter is being taken down"])
 def test_where_no_thread_can_be_started_the_line_is_written_at_once(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, why: str
 ) -> None:
     def refuse(self: threading.Thread) -> None:
+        assert why == "there are too many", "it would wait for ever"
         raise RuntimeError("can't start new thread")
 
     log, written = Log("test"), Written()
     monkeypatch.setattr(log, "_logger", written)
     monkeypatch.setattr(threading.Thread, "start", refuse)
+    monkeypatch.setattr(sys, "is_finalizing", lambda: why != "there are too many")
     log.error("a goal is not accounted for")
     log.info("and on")
     monkeypatch.undo()

@@ -15,10 +15,11 @@ Start = Callable[..., Process]
 
 
 @pytest.mark.parametrize("rclpys", ["NO", "SIGINT", "SIGTERM", "ALL"])
+@pytest.mark.parametrize(("before", "times"), [(0, 1), (0, 3), (3, 1)], ids=["one", "3", "a 4th"])
 def test_sigint_at_any_moment_is_raised_and_leaves_nothing_behind(
-    start_program: Start, rclpys: str
+    start_program: Start, rclpys: str, before: int, times: int
 ) -> None:
-    process = start_program("-m", "tests.support.interrupted", rclpys)
+    process = start_program("-m", "tests.support.interrupted", rclpys, str(before), str(times))
     assert process.wait(within=60.0) == 0, process
     assert int(process.line("opcodes").split()[0]) > 200  # it has passed through the file
 
@@ -166,6 +167,34 @@ with ended_by_signals(lambda again, ends_process: True):
         say("does not wait")
 """
 
+ONE_MORE_COMES_IN_THE_LAST_WORDS = """
+import ctypes
+heard = threading.Semaphore(0)
+was_heard = signals._Watch._was_heard
+signals._Watch._was_heard = lambda *args: (was_heard(*args), heard.release())
+mutex, c = ctypes.create_string_buffer(64), ctypes.CDLL(None)
+c.pthread_mutex_lock(mutex)
+
+def words():
+    say("insists" if signals.insists() else "waits")
+    itself(signal.SIGTERM)
+    while not signals.insists():
+        time.sleep(0.01)
+    say("insists")
+
+def signals_come():
+    address, syscall = hex(ctypes.addressof(mutex)), f"/proc/self/task/{os.getpid()}/syscall"
+    while address not in open(syscall).read():
+        time.sleep(0.01)  # until it is in C
+    for _ in range(3):
+        itself(signal.SIGTERM)
+        heard.acquire()
+
+with ended_by_signals(lambda *_: True, words):
+    threading.Thread(target=signals_come, daemon=True).start()
+    c.pthread_mutex_lock(mutex)
+"""
+
 
 @pytest.mark.parametrize(
     ("body", "said"),
@@ -198,6 +227,12 @@ def test_a_program_of_the_users(start_program: Start, body: str, said: list[str]
     process = start_program("-c", HEAD + body)
     assert process.wait(within=60.0) == (0 if "goes on" in said else -signal.SIGTERM), process
     assert process.lines == said
+
+
+def test_one_more_signal_is_noticed_by_who_says_the_last_words(start_program: Start) -> None:
+    process = start_program("-c", HEAD + ONE_MORE_COMES_IN_THE_LAST_WORDS)
+    assert process.wait(within=60.0) == 128 + signal.SIGTERM, process
+    assert process.lines == ["waits", "insists"]
 
 
 def test_the_first_process_of_a_container_ends_by_a_signal(start_program: Start) -> None:

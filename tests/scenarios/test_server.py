@@ -741,15 +741,19 @@ class TestTwice:
             assert of_process(journal, each.pid) == CANCELED
         record.outcome = "SERVER_AMBIGUOUS, canceled at both"
 
-    @pytest.mark.parametrize("answer", ["heard", pytest.param("lost", marks=pytest.mark.chaos)])
+    @pytest.mark.parametrize(
+        "answer",
+        ["heard", pytest.param("lost", marks=pytest.mark.chaos), "lost, and no feedback"],
+    )
     def test_a_second_server_that_wakes_up_when_the_goal_has_ended(
         self, new_host: HostFactory, name: str, node: Any, answer: str, record: Record
     ) -> None:
         """The same when the first has succeeded, and one more goal; the answer heard, or lost"""
         one, other = new_host(short_lease=False), new_host(short_lease=False)
         one.open(name)
-        lost = ["*:drop_accept"] if answer == "lost" else []
-        journal = other.open(name, "*:slow=100", *lost)
+        faults = {"heard": [], "lost": ["*:drop_accept"]}
+        faults["lost, and no feedback"] = ["*:drop_accept", "*:no_feedback"]
+        journal = other.open(name, "*:slow=100", *faults[answer])
         leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=20.0))
         until_both_hear(leaf, node)
         other.freeze()
