@@ -45,12 +45,14 @@ def spun(node: Any, kind: str = "single") -> Iterator[Any]:
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()
-    yield executor
-    executor.shutdown()
-    thread.join()
-    if kind == "multi":
-        executor._executor.shutdown(wait=True)
-    node.executor = None
+    try:
+        yield executor
+    finally:
+        executor.shutdown()
+        thread.join()
+        if kind == "multi":
+            executor._executor.shutdown(wait=True)
+        node.executor = None
 
 
 class TestRun:
@@ -856,8 +858,12 @@ class TestEvents:
                 assert runner.run(timeout=9.0) is Status.SUCCESS
             goal = weakref.ref(leaf.history[0].goal)
             del leaf, runner
-            gc.collect()
-            assert goal() is None
+
+            def is_gone() -> bool:
+                gc.collect()
+                return goal() is None
+
+            until(is_gone, what="no thread has the goal in hand any more")
             assert resting.run(timeout=9.0) is Status.SUCCESS
 
 
