@@ -1,12 +1,13 @@
 """Goal ids that tell which process chose them, so that what a killed one left can be found. No ROS.
 
 A goal id is 16 bytes and ours to choose: 3 bytes that say "bt_actions", 3 for the machine (its pid
-namespace included), 4 for the process id, 2 for the moment that process started, and 4 that differ
-within it. An id made elsewhere has the first six bytes by accident once in 2**48.
+and time namespaces included), 4 for the process id, 2 for the moment that process started, and 4
+that differ within it. An id made elsewhere has the first six bytes by accident once in 2**48.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import itertools
 import os
@@ -67,19 +68,25 @@ def author_of(goal_id: bytes) -> Author | None:
 
 def _machine() -> bytes:
     named = os.environ.get(MACHINE)
-    return hashlib.sha256((named or _name_of_machine()).encode()).digest()[:3]
+    return hashlib.sha256((named or _name_of_machine(os.getpid())).encode()).digest()[:3]
 
 
-def _name_of_machine() -> str:
+@functools.lru_cache(maxsize=1)
+def _name_of_machine(_pid: int) -> str:
+    """Return what sets this machine apart for the process that asks; a fork may be elsewhere.
+
+    In another time namespace the same process has another moment of its start.
+    """
     parts = [socket.gethostname()]
     try:
         parts.append(Path("/etc/machine-id").read_text(encoding="utf-8").strip())
     except OSError:
         parts.append("")
-    try:
-        parts.append(str(Path("/proc/self/ns/pid").readlink()))
-    except OSError:
-        parts.append("")
+    for namespace in ("pid", "time"):
+        try:
+            parts.append(str(Path(f"/proc/self/ns/{namespace}").readlink()))
+        except OSError:
+            parts.append("")
     return "\n".join(parts)
 
 

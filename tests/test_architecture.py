@@ -18,7 +18,7 @@ PARTS = [
     {"behaviours"},
     {"ros"},
     {"attempts", "testimony"},
-    {"goal", "resources", "server", "hearing", "standstill", "goal_ids"},
+    {"goal", "resources", "server", "hearing", "standstill", "goal_ids", "roll_call"},
     {"deadlines"},
     {"goal_terms"},
     {"policy"},

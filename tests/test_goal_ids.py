@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.goal_ids import MACHINE, author_of, new_goal_id
+from bt_actions.goal_ids import MACHINE, _name_of_machine, author_of, new_goal_id
 
 MAKE = (
     "from bt_actions.goal_ids import new_goal_id; print(new_goal_id().hex(), flush=True); input()"
@@ -78,13 +78,13 @@ def test_an_id_from_another_machine_counts_as_alive() -> None:
 def test_a_name_of_its_own_makes_a_container_the_same_machine_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda: "of the first start")
+    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda _: "of the first start")
     monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
     unnamed = new_goal_id()
     monkeypatch.setenv(MACHINE, "arm 1")
     monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
     named = new_goal_id()
-    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda: "of the second")
+    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda _: "of the second")
     monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
     assert [author_of(each).here for each in (unnamed, named)] == [False, True]  # type: ignore[union-attr]
     monkeypatch.setenv(MACHINE, "arm 2")
@@ -94,3 +94,18 @@ def test_a_name_of_its_own_makes_a_container_the_same_machine_again(
 def test_ids_that_others_chose_have_no_author() -> None:
     assert author_of(os.urandom(16)) is None
     assert author_of(b"short") is None
+
+
+def test_another_namespace_of_pids_or_times_is_another_machine(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In each, what identifies a process here is another's, or nobody's."""
+    ours = _name_of_machine.__wrapped__(0)
+    real = Path.readlink
+    for namespace in ("pid", "time"):
+        monkeypatch.setattr(
+            Path,
+            "readlink",
+            lambda path, name=namespace: Path(f"{name}:[7]") if path.name == name else real(path),
+        )
+        assert _name_of_machine.__wrapped__(0) != ours

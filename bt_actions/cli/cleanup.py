@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
+import time
 from collections.abc import Collection
-from typing import TYPE_CHECKING
+from types import FrameType
+from typing import TYPE_CHECKING, Any, Self
 
 from bt_actions.cli.common import (
     NO_ROS,
+    SAME_WISH,
     BadInput,
     Exit,
     OutputLost,
@@ -22,7 +26,7 @@ from bt_actions.suggest import listing
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
-    from bt_actions.ros.cleanup import LeftBehind
+    from bt_actions.ros.cleanup import LeftBehind, Swept
 
 _EPILOG = """\
 A process that is killed (kill -9, out of memory) cannot cancel its goals; the robot goes on. This
@@ -38,6 +42,7 @@ examples:
 
 exit codes:
   0 nothing is left   3 the end of a goal is unknown, or no action server is in sight, or silent
+  129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
 """
 
 
@@ -71,24 +76,21 @@ def sweep(
 ) -> Exit:
     """Clean up, saying what is found and how it ended.
 
-    Where no server of one of the `wanted` actions answers, or none of any action is in sight, and
-    nobody says which are wanted, nobody can say: UNKNOWN.
+    Where not every server of one of the `wanted` actions answers, or none of any action is in
+    sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread only.
     """
-    from bt_actions.policy import End
-
     try:
         from bt_actions.ros.cleanup import CannotStart, cleanup
     except ImportError as error:
         raise BadInput(NO_ROS.format(error)) from error
 
     refuse_domain()
-
-    def found(left: LeftBehind) -> None:
-        note(f"canceling a goal of dead process {left.pid} on {left.action}: {left.goal_id.hex()}")
-
-    actions: list[str] = []
     foreign: list[str] = []
     unseen: list[str] = []
+
+    def found(left: LeftBehind) -> None:
+        stop.leaves_a_goal = True
+        note(f"canceling a goal of dead process {left.pid} on {left.action}: {left.goal_id.hex()}")
 
     def missing(names: list[str], in_vain: bool) -> None:
         if in_vain:
@@ -96,54 +98,107 @@ def sweep(
         else:
             note(f"waiting for {listing(names)}, where something may have been left")
 
-    try:
-        goals = cleanup(
-            look=look,
-            patience=patience,
-            found=found,
-            sighted=actions.append,
-            elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
-            wanted=wanted,
-            namespace=namespace,
-            missing=missing,
-        )
-    except CannotStart as error:
-        raise BadInput(f"ROS 2 cannot start: {error}") from error
+    with _Stop() as stop:
+        try:
+            swept = cleanup(
+                look=look,
+                patience=patience,
+                found=found,
+                elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
+                wanted=wanted,
+                namespace=namespace,
+                missing=missing,
+                stopped=lambda: stop.signal is not None,
+            )
+        except CannotStart as error:
+            raise BadInput(f"ROS 2 cannot start: {error}") from error
     if foreign:
         note(
             f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in another "
             "container, where it cannot be seen whether it is alive (see BT_ACTIONS_MACHINE)"
         )
-    unknown = any(goal.end is End.UNKNOWN for goal in goals)
+    hint = "; start it, or run without --cleanup-first" if wanted else ""
+    code = _tell_what_is_open(swept, unseen, stop.signal, hint, any_will_do=wanted is not None)
     try:
-        for goal in goals:
-            crowd = f": {goal.servers} servers of this name, and each may run it"
-            write(
-                f"{goal.action}  {goal.goal_id.hex()}  {goal.end}"
-                f"{crowd if goal.servers > 1 else ''}\n"
-            )
+        for goal in swept.left:
+            write(_line(goal))
+        if code is Exit.SUCCESS and not swept.left:
+            write(_nothing(swept, "nothing of this machine" if foreign else "nothing"))
     except (OutputLost, BrokenPipeError):
-        if not unknown:
+        if code is not Exit.UNKNOWN:
             raise
         discard_stdout()
-    if unknown:
-        note("not all of them have ended; they may still be running")
-        return Exit.UNKNOWN
-    if unseen:
+    return code
+
+
+def _tell_what_is_open(
+    swept: Swept, unseen: list[str], stopped_by: signal.Signals | None, hint: str, any_will_do: bool
+) -> Exit:
+    """Say what is not known, which may be something to wait for; return the exit code."""
+    from bt_actions.policy import End
+
+    code = Exit.SUCCESS
+    if stopped_by is not None:
+        note(f"stopped by {stopped_by.name} before all was seen")
+        code = Exit(128 + stopped_by)
+    elif not swept.known and not swept.unknown and not any_will_do:
         note(
-            f"no server of {listing(unseen)} answers: nobody can see what was left there"
-            f"{'; start it, or run without --cleanup-first' if wanted else ''}"
+            f"no action is in sight in ROS domain {swept.domain}: nobody can see what was left; "
+            "start its server, or --look longer"
         )
-        return Exit.UNKNOWN
-    if not goals:
-        domain = os.environ.get("ROS_DOMAIN_ID", "") or "0"
-        if not actions and wanted is None:
-            note(
-                f"no action is in sight in ROS domain {domain}: nobody can see what was left; "
-                "start its server, or --look longer"
-            )
-            return Exit.UNKNOWN
-        count = "1 action" if len(actions) == 1 else f"{len(actions)} actions"
-        nothing = "nothing of this machine" if foreign else "nothing"
-        write(f"{nothing} was left behind on the {count} in sight in ROS domain {domain}\n")
-    return Exit.SUCCESS
+        code = Exit.UNKNOWN
+    else:
+        for held_against, names in ((True, unseen), (False, set(swept.unknown).difference(unseen))):
+            for trouble in sorted({swept.unknown[name] for name in names}):
+                who = [name for name in sorted(names) if swept.unknown[name] == trouble]
+                nobody = f"{trouble.format(listing(who))}: nobody can see what was left there"
+                note(nobody + (hint if held_against else ""))
+        code = Exit.UNKNOWN if unseen else code
+    if any(goal.end is End.UNKNOWN for goal in swept.left):
+        note("not all of them have ended; they may still be running")
+        code = Exit.UNKNOWN
+    return code
+
+
+def _line(goal: LeftBehind) -> str:
+    crowd = f": {goal.servers} servers of this name, and each may run it"
+    told = crowd if goal.servers > 1 else ""
+    return f"{goal.action}  {goal.goal_id.hex()}  {goal.end}{told}\n"
+
+
+def _nothing(swept: Swept, nothing: str) -> str:
+    seen = len(swept.known)
+    where = "1 action" if seen == 1 else f"{seen} actions"
+    if swept.unknown:
+        where = f"{where} of {seen + len(swept.unknown)}"
+    return f"{nothing} was left behind on the {where} in sight in ROS domain {swept.domain}\n"
+
+
+class _Stop:
+    """The first signal is noted, for the sweep to end in good order; a second one does not wait.
+
+    Of those that are at their default, from `__enter__` to `__exit__`; main thread only.
+    """
+
+    def __init__(self) -> None:
+        self.signal: signal.Signals | None = None
+        self.leaves_a_goal = False
+        self._at = 0.0
+        self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
+
+    def __enter__(self) -> Self:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                self._before[number] = signal.signal(number, self._came)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _came(self, number: int, _frame: FrameType | None) -> None:
+        if self.signal is None:
+            self.signal = signal.Signals(number)
+            self._at = time.monotonic()
+        elif time.monotonic() - self._at > SAME_WISH:
+            os._exit(Exit.UNKNOWN if self.leaves_a_goal else 128 + number)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NoReturn, Protocol
 
 from py_trees.common import Status
 
-from bt_actions.cli.common import Exit, discard_stdout, note
+from bt_actions.cli.common import SAME_WISH, Exit, discard_stdout, note
 from bt_actions.cli.patient_output import PatientOutput
 from bt_actions.cli.report import Report
 from bt_actions.cli.signals import Signals
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
-SAME_WISH = 0.25
-"""A second signal within so many seconds is the first one, passed on by a wrapper (uv, a shell)."""
 PATIENCE_WHEN_LEFT = 1.0
 """Seconds for the output to be written where the user did not wait for the goals."""
 _LOOK = 0.02

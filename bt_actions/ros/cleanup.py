@@ -3,7 +3,8 @@
 A process that dies by SIGKILL cancels nothing. Its goals are found in the status topics of all
 actions in sight, told by their ids (goal_ids.py), and canceled one by one; goals of other clients,
 and of orchestrators that are alive, or that cannot be looked for from here, are never touched. No
-action type is needed for any of it.
+action type is needed for any of it. That a server has nothing to tell is believed when it has
+answered for long enough (roll_call.py).
 """
 
 from __future__ import annotations
@@ -18,36 +19,41 @@ from typing import Any
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from rclpy.context import Context
-from rclpy.exceptions import NameValidationException
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.exceptions import NameValidationException, NotInitializedException
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
-from rclpy.qos import qos_profile_action_status_default
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.validate_full_topic_name import validate_full_topic_name
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.goal_ids import Author, author_of
 from bt_actions.goal_terms import ENDS
 from bt_actions.policy import End
+from bt_actions.roll_call import ASK_AGAIN, RollCall
 from bt_actions.ros.graph import servers
-from bt_actions.standstill import AT_MOST, Standstill
+from bt_actions.standstill import AT_MOST, STOOD_STILL, Standstill
 
 STATUS = "/_action/status"
-ASK_AGAIN = 1.0
-"""Seconds between two requests to cancel the same goal."""
-SETTLE = 4.0
-"""Seconds after an action came in sight within which its status must have been received; where a
-client was just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
-
+TURN = 0.05
+"""Seconds between two looks for what has come in;"""
+GLANCE = 0.1
+"""and, at least, between two looks at the graph, and for who is still alive."""
 LOOK_LONGEST = 30.0
-"""Seconds for which a server of a wanted action may take to answer: a ghost is shown for 20."""
+"""Seconds for which servers may take to answer, in all: a ghost is shown for 20."""
+LOOK_AGAIN = 10.0
+"""Seconds after which, at the latest, a participant that is not answered gives way to another."""
+DEPTH = 100
+"""Of our ends: with a depth of 1 the status of one server would displace that of another."""
+CANCELS_A_TURN = 5
+"""So many goals of an action at once: a server keeps its last ten requests only."""
 
 
 @dataclass(slots=True)
 class LeftBehind:
     """A goal whose orchestrator is dead. `end` is UNKNOWN until the server tells.
 
-    Where `servers` of one name are shown, and not one, it stays UNKNOWN: either may run it, and a
-    status does not tell whose it is.
+    Where `servers` of one name were in sight, and not one, it stays UNKNOWN: either may run it, and
+    a status does not tell whose it is.
     """
 
     action: str
@@ -61,6 +67,19 @@ class LeftBehind:
     def end(self) -> End:
         """How it ended, as far as is known."""
         return self.shown if self.servers <= 1 else End.UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """What a cleanup has seen."""
+
+    left: list[LeftBehind]
+    known: list[str]
+    """The actions of which every server has told what it runs."""
+    unknown: dict[str, str]
+    """The others in sight, or wanted, each with the reason, in whose braces belongs its name."""
+    domain: int
+    """The ROS domain in force."""
 
 
 class CannotStart(RuntimeError):
@@ -77,65 +96,141 @@ def cleanup(
     wanted: Collection[str] | None = None,
     namespace: str = "",
     missing: Callable[[list[str], bool], None] = lambda actions, in_vain: None,
+    stopped: Callable[[], bool] = lambda: False,
     context: Context | None = None,
-) -> list[LeftBehind]:
+) -> Swept:
     """Cancel what dead orchestrators of this machine left; return it with its ends.
 
-    Looks for servers for `look` seconds (longer while new ones come in sight), and waits `patience`
-    seconds more for the goals that it canceled to end. `found` is called with each at once,
-    `sighted` with the name of each action of which a server is in sight, and `elsewhere` with the
-    action and the id of each unfinished goal of a bt_actions process on another machine, or in
-    another container, of which nobody here can tell whether it is alive. Of the actions in
-    `wanted`, whose relative names belong to `namespace` (None: of all in sight), those of which no
-    server has answered by then (one that is shown may be stopped, or a ghost) are waited for up to
-    LOOK_LONGEST seconds, and `missing` is called with them, in the beginning of that, and in the
-    end if it was in vain, as it is told. Blocks.
+    Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
+    canceled to end. `found` is called with each at once, `sighted` with the name of each action of
+    which a server is in sight, and `elsewhere` with the action and the id of each unfinished goal
+    of a bt_actions process on another machine, or in another container, of which nobody here can
+    tell whether it is alive. The actions in `wanted`, whose relative names belong to `namespace`
+    (None: all in sight), and those of goals that were found, are looked at until they are known,
+    for LOOK_LONGEST seconds at most, or `look`, if that is more; `missing` is called with those
+    that are not, in the beginning of waiting for one that is silent, and in the end if it was in
+    vain, as it is told. Ends in the next turn when `stopped` says so. Blocks.
 
     Where a server in sight does not answer, or this process stands still for long meanwhile, it may
     be that it will never tell this participant anything (ros/lookout.py). So it looks again with a
     new one, unless `context` is given.
 
-    Raises CannotStart, if nothing has been looked at yet.
+    Raises CannotStart, if nothing has been looked at yet; ValueError for a `look` or a `patience`
+    that is negative or no number, and for a name in `wanted` that is none; and what rclpy raises
+    where `context` is shut down meanwhile.
     """
-    sweep = _Sweep(found, sighted, elsewhere, missing)
+    if not (look >= 0.0 and patience >= 0.0):
+        raise ValueError(f"look {look} and patience {patience}: seconds are 0 or more")
+    sweep = _Sweep(look, patience, found, sighted, elsewhere, missing, stopped)
     for tries_left in (2, 1, 0) if context is None else (0,):
         still = Standstill()
         still.lives(time.monotonic())  # it counts from when the participant is made
         try:
-            with _participant(context, namespace) as (node, executor):
+            with _participant(context, namespace) as node:
                 sweep.begin(node, wanted)
-                if sweep.goes_through(executor, still, look, patience, breaks_off=tries_left > 0):
+                if sweep.goes_through(still, breaks_off=tries_left > 0):
                     break
         except CannotStart:
             if not sweep.has_begun:
                 raise
-            sweep.gives_up()
             break
-    return list(sweep.left.values())
+    return sweep.ends()
 
 
 @contextlib.contextmanager
-def _participant(
-    context: Context | None, namespace: str
-) -> Iterator[tuple[Node, SingleThreadedExecutor]]:
+def _participant(context: Context | None, namespace: str) -> Iterator[Node]:
+    """A node that nobody spins: what comes in is taken from it by hand."""
     own = Context() if context is None else context
     try:
         if context is None:
             own.init()
-        node = Node("bt_actions_cleanup", context=own, namespace=namespace)
-    except (RuntimeError, NameValidationException) as error:  # of the first, rclpy's RCLError
+        node = Node(
+            "bt_actions_cleanup", context=own, namespace=namespace, start_parameter_services=False
+        )
+    except (RuntimeError, OSError, NameValidationException, NotInitializedException) as error:
         if context is None:
             own.try_shutdown()
         raise CannotStart(str(error).splitlines()[0]) from error
-    executor = SingleThreadedExecutor(context=own)
-    executor.add_node(node)
     try:
-        yield node, executor
+        yield node
     finally:
-        executor.shutdown()
         node.destroy_node()
         if context is None:
-            own.shutdown()
+            own.try_shutdown()
+
+
+def _full_name(name: str, node: Node) -> str:
+    """Return the name as a run means it, remapped. Raises ValueError where it is none."""
+    full = str(expand_topic_name(name, node.get_name(), node.get_namespace()))
+    try:
+        validate_full_topic_name(full)
+    except NameValidationException as error:
+        raise ValueError(str(error)) from error
+    return full
+
+
+class _Sight:
+    """One action, as one node sees it."""
+
+    def __init__(self, node: Node, action: str) -> None:
+        self._node = node
+        self._action = action
+        self._status = node.create_subscription(
+            GoalStatusArray,
+            action + STATUS,
+            lambda _: None,
+            QoSProfile(
+                depth=DEPTH,
+                reliability=ReliabilityPolicy.RELIABLE,
+                durability=DurabilityPolicy.TRANSIENT_LOCAL,
+            ),
+        )
+        self._client = node.create_client(
+            CancelGoal,
+            f"{action}/_action/cancel_goal",
+            qos_profile=QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE),
+        )
+
+    def servers(self) -> frozenset[bytes]:
+        """Return the GIDs of the servers that are shown."""
+        return servers(self._node, self._action)
+
+    def is_published(self) -> bool:
+        """Whether a status is; where it is not, there are mere clients."""
+        return bool(self._node.count_publishers(self._action + STATUS))
+
+    def statuses(self) -> Iterator[Any]:
+        """Take the statuses that have come in."""
+        handle = self._status.handle
+        with handle:
+            for _ in range(DEPTH):
+                taken = handle.take_message(GoalStatusArray, False)
+                if taken is None:
+                    return
+                yield taken[0]
+
+    def answers(self) -> Iterator[int]:
+        """Take the answers that have come in, as the numbers of their questions.
+
+        rclpy's futures hear the first answer alone, where each server gives one.
+        """
+        handle = self._client.handle
+        with handle:
+            for _ in range(DEPTH):
+                header, _response = handle.take_response(CancelGoal.Response)
+                if header is None:
+                    return
+                yield header.request_id.sequence_number
+
+    def cancel(self, goal_id: bytes) -> int | None:
+        """Ask all servers to cancel this goal; return the question's number, None: nobody hears."""
+        if not self._client.service_is_ready():
+            return None
+        request = CancelGoal.Request()
+        request.goal_info.goal_id = UUID(uuid=list(goal_id))
+        handle = self._client.handle
+        with handle:
+            return int(handle.send_request(request))
 
 
 class _Sweep:
@@ -143,170 +238,189 @@ class _Sweep:
 
     def __init__(
         self,
+        look: float,
+        patience: float,
         found: Callable[[LeftBehind], None],
         sighted: Callable[[str], None],
         elsewhere: Callable[[str, bytes], None],
         missing: Callable[[list[str], bool], None],
+        stopped: Callable[[], bool],
     ) -> None:
+        self._look = look
+        self._patience = patience
         self._found = found
         self._sighted = sighted
         self._elsewhere = elsewhere
         self._missing = missing
-        self._foreign: set[bytes] = set()
-        self._began = time.monotonic()
+        self._stopped = stopped
+        self._deadline = 0.0
         self.has_begun = False
         self._waits = False
-        self._answered: set[str] = set()
-        self._shown: set[str] = set()  # actions of which a server was shown, to any node
+        self._wanted: frozenset[str] | None = None
+        self._calls: dict[str, RollCall] = {}
+        self._foreign: set[bytes] = set()
         self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
-        self.left: dict[bytes, LeftBehind] = {}
+        self._left: dict[bytes, LeftBehind] = {}
 
     def begin(self, node: Node, wanted: Collection[str] | None) -> None:
-        """Go on with what this node sees; servers of `wanted` actions have to answer it.
-
-        Or those of all in sight: one that was stopped may never hear of us.
-        """
+        """Go on with what this node sees. Raises ValueError for a name that is none."""
+        names = [_full_name(name, node) for name in wanted or ()]
+        now = time.monotonic()
+        if not self.has_begun:
+            self._deadline = now + max(self._look, LOOK_LONGEST)
         self.has_begun = True
-        self._all = wanted is None
         self._node = node
-        self._subscriptions: dict[str, Any] = {}
-        self._clients: dict[str, Any] = {}
-        self._asked_at = float("-inf")
-        here = node.get_name(), node.get_namespace()  # remapped, as that of the run will be
-        wants = {expand_topic_name(name, *here) for name in wanted or ()}
-        self._unanswered = wants - self._answered
-        self._newest = float("-inf")  # when the last action came in sight, or a server answered
+        self._domain = int(node.context.get_domain_id())
+        self._wanted = None if wanted is None else frozenset(names)
+        self._sights: dict[str, _Sight] = {}
+        self._glanced_at = float("-inf")
+        for call in self._calls.values():
+            call.begin(now)
+        for name in names:
+            self._calls.setdefault(name, RollCall(now))
 
-    def goes_through(
-        self,
-        executor: SingleThreadedExecutor,
-        still: Standstill,
-        look: float,
-        patience: float,
-        *,
-        breaks_off: bool,
-    ) -> bool:
+    def goes_through(self, still: Standstill, *, breaks_off: bool) -> bool:
         """Look, cancel, and wait; return False where it `breaks_off`, for another participant.
 
         Because of a standstill, or of a server in sight that does not answer.
         """
-        looked = time.monotonic() + look
-        while True:
+        began = looked = last = time.monotonic()
+        until = began + self._look
+        while not self._stopped():
             now = time.monotonic()
-            looked = max(looked, self._newest + SETTLE)
             held = max(still.answers_take(now), still.servers_take(now))
             if still.long_times and breaks_off:
-                self._answered.clear()  # their status may be lost
-                return False
-            if held > 0.0 and still.times <= AT_MOST:  # what there is may not be in sight again
-                looked = max(looked, now + held)
-            lacks = sorted(self._unanswered)
-            if lacks and now >= looked:
-                if not self._waits:
-                    self._waits = True
-                    self._missing(lacks, False)
-                if breaks_off and not self._shown.isdisjoint(lacks):
-                    return False  # it may not hear this participant
-                if now < self._began + LOOK_LONGEST:
-                    looked = now + 1.0
-            if now < looked:
-                self._discover(now)
-            elif self._over or now >= looked + patience:
+                return False  # what was sent meanwhile may be lost
+            if still.times <= AT_MOST:
+                if held > 0.0:  # what there is may not be in sight again
+                    until = max(until, now + held)
+                if now - last > STOOD_STILL:
+                    self._deadline += now - last
+            last = now
+            self._turn(now)
+            lacks = self._lacks()
+            looking = now < self._deadline and (now < until or bool(lacks))
+            if not looking and (self._over or now >= looked + self._patience):
                 break
-            self._ask()
-            executor.spin_once(timeout_sec=0.05)
-        if lacks:
-            self._missing(lacks, True)
+            if looking:
+                looked = now
+                overdue = [name for name in lacks if self._calls[name].overdue(now)]
+                if now >= until:
+                    self._says_that_it_waits_for(overdue)
+                silent = any(self._calls[name].sighted for name in overdue)
+                if silent and breaks_off and now >= min(until, began + LOOK_AGAIN):
+                    return False  # it may not hear this participant
+            time.sleep(TURN)
         return True
 
-    def gives_up(self) -> None:
-        """There is no other participant: what has not answered never will."""
-        if lacks := sorted(self._unanswered | (self._shown - self._answered)):
+    def _says_that_it_waits_for(self, actions: list[str]) -> None:
+        if actions and not self._waits:
+            self._waits = True
+            self._missing(actions, False)
+
+    def ends(self) -> Swept:
+        """Return all that was seen; what is still looked for is missing, in vain."""
+        if (lacks := self._lacks()) and not self._stopped():
             self._missing(lacks, True)
+        calls = sorted(self._calls.items())
+        return Swept(
+            left=list(self._left.values()),
+            known=[name for name, call in calls if call.known],
+            unknown={
+                name: call.trouble
+                for name, call in calls
+                if not call.known and (call.sighted or self._requires(name))
+            },
+            domain=self._domain,
+        )
+
+    def _requires(self, action: str) -> bool:
+        if self._wanted is None:
+            return self._calls[action].sighted
+        return action in self._wanted or any(g.action == action for g in self._left.values())
+
+    def _lacks(self) -> list[str]:
+        """Return the actions that are looked for, and not known."""
+        unknown = [action for action, call in sorted(self._calls.items()) if not call.known]
+        return [action for action in unknown if self._requires(action)]
 
     @property
     def _over(self) -> bool:
         """Whether every goal that was found has ended."""
-        return all(goal.end is not End.UNKNOWN for goal in self.left.values())
+        return all(goal.end is not End.UNKNOWN for goal in self._left.values())
 
-    def _discover(self, now: float) -> None:
-        """Listen to every action's status that is in sight."""
+    def _turn(self, now: float) -> None:
+        """Take all that has come in, then look around, and ask."""
+        for action, sight in self._sights.items():
+            for message in sight.statuses():
+                self._read(action, message)
+            for number in sight.answers():
+                self._calls[action].answered(number, now)
+        if now - self._glanced_at >= GLANCE:
+            self._glanced_at = now
+            self._glance(now)
+            self._find()
+        for action, sight in self._sights.items():
+            call = self._calls[action]
+            if call.due(now):  # of a goal that is nobody's: any answer shows that a server lives
+                question = sight.cancel(uuid.uuid4().bytes)
+                if question is not None:
+                    call.asked(question, now)
+        self._cancel(now)
+
+    def _glance(self, now: float) -> None:
+        """See which actions are in sight, and how many servers each has."""
         for topic, _types in self._node.get_topic_names_and_types():
-            if topic.endswith(STATUS) and topic not in self._subscriptions:
-                action = topic.removesuffix(STATUS)
-                self._newest = now
-                self._subscriptions[topic] = self._node.create_subscription(
-                    GoalStatusArray,
-                    topic,
-                    lambda message, action=action: self._read(action, message),
-                    qos_profile_action_status_default,
-                )
-        for topic in self._subscriptions:
             action = topic.removesuffix(STATUS)
-            if action not in self._shown and self._node.count_publishers(topic):  # no mere client
-                self._shown.add(action)
-                self._newest = now
+            if topic.endswith(STATUS) and action not in self._sights:
+                self._sights[action] = _Sight(self._node, action)
+                self._calls.setdefault(action, RollCall(now))
+        for action, sight in self._sights.items():
+            call = self._calls[action]
+            first = not call.sighted
+            call.sees(sight.servers(), now, published=sight.is_published())
+            if first and call.sighted:
                 self._sighted(action)
 
     def _read(self, action: str, message: Any) -> None:
-        self._hears(action)
         for entry in message.status_list:
             goal_id = bytes(entry.goal_info.goal_id.uuid)
-            left = self.left.get(goal_id)
+            left = self._left.get(goal_id)
             if left is not None:
                 left.shown = ENDS.get(entry.status, End.UNKNOWN)
                 continue
             author = author_of(goal_id)
-            if entry.status in ENDS or author is None:
-                self._minded.pop(goal_id, None)
+            if author is None:
+                continue
+            if entry.status in ENDS:
+                if len(self._calls[action].servers) <= 1:  # or else another may run it
+                    self._minded.pop(goal_id, None)
             elif author.alive and not author.here:
                 if goal_id not in self._foreign:
                     self._foreign.add(goal_id)
                     self._elsewhere(action, goal_id)
             else:
                 self._minded[goal_id] = action, author
-        self._find()
 
     def _find(self) -> None:
         """See who of those that left goals is dead by now: a status comes at a change only."""
-        for goal_id, (action, author) in list(self._minded.items()):
-            if not author.alive:
+        dead = {author for author in {by for _, by in self._minded.values()} if not author.alive}
+        for goal_id, (action, author) in list(self._minded.items()) if dead else ():
+            if author in dead:
                 del self._minded[goal_id]
-                left = self.left[goal_id] = LeftBehind(action, goal_id, author.pid)
+                left = self._left[goal_id] = LeftBehind(action, goal_id, author.pid)
                 self._found(left)
+        for left in self._left.values():
+            left.servers = len(self._calls[left.action].servers)
 
-    def _ask(self) -> None:
+    def _cancel(self, now: float) -> None:
         """Ask the servers to cancel what has not ended, again every second."""
-        now = time.monotonic()
-        self._find()
-        for left in self.left.values():
-            left.servers = len(servers(self._node, left.action))
-            if left.end is not End.UNKNOWN or now - left.asked_at < ASK_AGAIN:
-                continue
-            if self._cancel(left.action, left.goal_id):
-                left.asked_at = now
-        if now - self._asked_at >= ASK_AGAIN:
-            self._asked_at = now
-            if self._all:
-                self._unanswered |= self._shown - self._answered
-            for action in sorted(self._unanswered):
-                self._cancel(action, uuid.uuid4().bytes)  # nobody's: any answer shows that it lives
-
-    def _cancel(self, action: str, goal_id: bytes) -> bool:
-        client = self._clients.get(action)
-        if client is None:
-            client = self._clients[action] = self._node.create_client(
-                CancelGoal, f"{action}/_action/cancel_goal"
-            )
-        if not client.service_is_ready():
-            return False
-        request = CancelGoal.Request()
-        request.goal_info.goal_id = UUID(uuid=list(goal_id))
-        client.call_async(request).add_done_callback(lambda _: self._hears(action))
-        return True
-
-    def _hears(self, action: str) -> None:
-        if action not in self._answered:
-            self._answered.add(action)
-            self._unanswered.discard(action)
-            self._newest = time.monotonic()  # its status may be under way
+        due: dict[str, list[LeftBehind]] = {}
+        for left in self._left.values():
+            if left.end is End.UNKNOWN and now - left.asked_at >= ASK_AGAIN:
+                due.setdefault(left.action, []).append(left)
+        for action, goals in due.items():
+            sight = self._sights.get(action)
+            for left in sorted(goals, key=lambda goal: goal.asked_at)[:CANCELS_A_TURN]:
+                if sight is not None and sight.cancel(left.goal_id) is not None:
+                    left.asked_at = now

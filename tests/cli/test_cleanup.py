@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import os
+import signal
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -10,10 +12,14 @@ from typing import Any
 import pytest
 
 from bt_actions.cli import main
-from bt_actions.cli.cleanup import sweep
+from bt_actions.cli.cleanup import _Stop, sweep
+from bt_actions.cli.common import SAME_WISH
 from bt_actions.policy import End
 from bt_actions.ros import cleanup as module
-from bt_actions.ros.cleanup import LeftBehind
+from bt_actions.ros.cleanup import LeftBehind, Swept
+from tests.cli.conftest import Start
+from tests.support.processes import Journal
+from tests.support.waiting import holds_for, until
 
 
 class Unwritable:
@@ -40,7 +46,7 @@ def test_a_goal_that_may_be_running_counts_more_than_an_output_that_is_lost(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: int, end: End
 ) -> None:
     left = LeftBehind("/move", bytes(16), 1, shown=end)
-    monkeypatch.setattr(module, "cleanup", lambda **_: [left])
+    monkeypatch.setattr(module, "cleanup", lambda **_: Swept([left], ["/move"], {}, 0))
     monkeypatch.setattr(sys, "stdout", Unwritable(error))
     lost = {errno.ENOSPC: 2, errno.EPIPE: 141}[error]
     assert main(["cleanup"]) == (3 if end is End.UNKNOWN else lost)
@@ -52,15 +58,8 @@ def test_where_no_server_is_in_sight_nobody_says_that_nothing_is_left(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """They may be stopped, or start later; or this is the wrong domain."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
     in_sight: list[str] = []
-
-    def cleanup(*, sighted: Callable[[str], None], **_: Any) -> list[LeftBehind]:
-        for action in in_sight:
-            sighted(action)
-        return []
-
-    monkeypatch.setattr(module, "cleanup", cleanup)
+    monkeypatch.setattr(module, "cleanup", lambda **_: Swept([], in_sight, {}, 7))
     assert main(["cleanup"]) == 3
     said = capsys.readouterr()
     assert "no action is in sight in ROS domain 7" in said.err
@@ -72,3 +71,68 @@ def test_where_no_server_is_in_sight_nobody_says_that_nothing_is_left(
     assert capsys.readouterr().out == (
         "nothing was left behind on the 1 action in sight in ROS domain 7\n"
     )
+
+
+@pytest.mark.parametrize("error", [errno.ENOSPC, errno.EPIPE], ids=["full", "closed"])
+def test_a_silent_server_counts_more_than_an_output_that_is_lost(
+    monkeypatch: pytest.MonkeyPatch, error: int
+) -> None:
+    goal = LeftBehind("/a", bytes(16), 1, shown=End.CANCELED)
+
+    def cleanup(*, missing: Callable[[list[str], bool], None], **_: Any) -> Swept:
+        missing(["/b"], True)
+        return Swept([goal], ["/a"], {"/b": "no server of {} answers"}, 0)
+
+    monkeypatch.setattr(module, "cleanup", cleanup)
+    monkeypatch.setattr(sys, "stdout", Unwritable(error))
+    assert main(["cleanup"]) == 3
+
+
+def test_what_nobody_wants_is_not_counted_where_it_is_silent(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    silent = {"/b": "no server of {} answers"}
+    monkeypatch.setattr(module, "cleanup", lambda **_: Swept([], ["/a"], silent, 7))
+    assert sweep(0.1, 0.1, wanted=["/a"]) == 0
+    said = capsys.readouterr()
+    assert said.err == "no server of /b answers: nobody can see what was left there\n"
+    assert said.out == ("nothing was left behind on the 1 action of 2 in sight in ROS domain 7\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_and_it_says_so(start: Start, node: Any, number: signal.Signals) -> None:
+    cleanup = start("cleanup", "--look", "60")
+    until(lambda: "bt_actions_cleanup" in node.get_node_names(), within=20.0)
+    cleanup.send(number)
+    assert cleanup.wait() == 128 + number, cleanup
+    assert cleanup.errors == [f"stopped by {number.name} before all was seen"]
+
+
+def test_a_signal_while_a_goal_runs_that_was_found(
+    start: Start, serve: Callable[..., Journal], name: str
+) -> None:
+    journal = serve("1:delay_cancel=60")
+    send = start("send", name, "MoveRobot", "distance=90")
+    goal = journal.wait_for("accepted", within=20.0).goal
+    send.send(signal.SIGKILL)
+    cleanup = start("cleanup", "--patience", "60")
+    until(lambda: any(goal in line for line in cleanup.errors), within=20.0)
+    cleanup.send(signal.SIGTERM)
+    assert cleanup.wait() == 3, cleanup
+    assert cleanup.lines == [f"{name}  {goal}  UNKNOWN"]
+
+
+@pytest.mark.parametrize(("leaves_a_goal", "code"), [(False, 130), (True, 3)])
+def test_a_second_signal_does_not_wait(
+    monkeypatch: pytest.MonkeyPatch, leaves_a_goal: bool, code: int
+) -> None:
+    ended: list[int] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    with _Stop() as stop:
+        stop.leaves_a_goal = leaves_a_goal
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        assert ended == [], "a wrapper has passed on the first"
+        assert holds_for(lambda: stop.signal is signal.SIGINT, 1.2 * SAME_WISH)
+        signal.raise_signal(signal.SIGINT)
+    assert ended == [code]

@@ -594,7 +594,8 @@ def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
     monkeypatch.setattr(cleanup, "LOOK_LONGEST", 0.2)
     context, told = Context(), list[tuple[list[str], bool]]()
     context.init(args=["--ros-args", "-r", "__ns:=/r1"], domain_id=domain)
-    cleanup.cleanup(
+    monkeypatch.setenv("ROS_DOMAIN_ID", "999")
+    swept = cleanup.cleanup(
         look=0.1,
         patience=0.1,
         wanted={"move", "/r2/move"},
@@ -603,6 +604,7 @@ def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
     )
     context.shutdown()
     assert told == [(["/r1/move", "/r2/move"], False), (["/r1/move", "/r2/move"], True)]
+    assert swept.domain == domain, "the one in force"
 
 
 def test_cleanup_that_was_stopped_looks_again(
@@ -643,7 +645,7 @@ def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
             host.send(signal.SIGSTOP)
             goes_on.start()
 
-    left = cleanup(look=3.0, sighted=sighted)
+    left = cleanup(look=3.0, sighted=sighted).left
     goes_on.join()
     assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
     assert journal.ends() == ["canceled"]
@@ -683,7 +685,7 @@ def test_cleanup_sees_no_server_where_there_is_a_client_only(
     sighted: list[str] = []
     leaf = MoveRobot("client", 1.0, action_name=name)
     leaf.setup(node=node)
-    assert cleanup(look=1.0, sighted=sighted.append) == []
+    assert cleanup(look=1.0, sighted=sighted.append).left == []
     assert name not in sighted
     leaf.shutdown()
 
@@ -705,13 +707,13 @@ def test_cleanup_that_cannot_look_again_says_who_has_not_answered(
     monkeypatch.setattr(cleanup, "Node", Once)
     host, told = new_host(short_lease=False), list[tuple[list[str], bool]]()
     host.open(name)
-    left = cleanup.cleanup(
+    swept = cleanup.cleanup(
         look=1.0,
         sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
         missing=lambda actions, in_vain: told.append((actions, in_vain)),
     )
     host.send(signal.SIGCONT)
-    assert left == []
+    assert swept.left == []
     assert told == [([name], False), ([name], True)]
     with pytest.raises(cleanup.CannotStart, match="no descriptors"):
         cleanup.cleanup()
@@ -733,7 +735,7 @@ def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(
             made.append(name)
 
     monkeypatch.setattr(cleanup, "Node", Slow)
-    assert cleanup.cleanup(look=0.1, patience=0.1) == []
+    assert cleanup.cleanup(look=0.1, patience=0.1).left == []
     assert len(made) == 2
 
 
@@ -748,7 +750,7 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     journal = serve("1:slow=10")
     run = launch("run", str(tree(name, distance=9.0)))
     run.line("executing on")
-    journal.wait_for("accepted")
+    goal = journal.wait_for("accepted").goal
     context, sighted, left = Context(), threading.Event(), list[LeftBehind]()
     context.init(domain_id=domain)
     sweeps = threading.Thread(
@@ -757,12 +759,15 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
                 look=8.0,
                 sighted=lambda action: sighted.set() if action == name else None,
                 context=context,
-            )
+            ).left
         )
     )
     sweeps.start()
     assert sighted.wait(6.0)
-    assert holds_for(lambda: journal.count("cancel_requested") == 0, 3.0), "its author is alive"
+    asked = ("cancel_requested", goal)  # nobody's goals, which show that a server lives, are too
+    assert holds_for(
+        lambda: asked not in [(str(e.event), e.goal) for e in journal.entries()], 3.0
+    ), "its author is alive"
     run.send(signal.SIGKILL)
     run.wait()
     sweeps.join()

@@ -1,0 +1,238 @@
+"""What cleanup takes for known; scenarios with killed orchestrators are in tests/scenarios."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import time
+from collections.abc import Callable, Collection
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus, GoalStatusArray
+from rclpy.context import Context
+from unique_identifier_msgs.msg import UUID
+
+from bt_actions.policy import End
+from bt_actions.roll_call import RollCall
+from bt_actions.ros import cleanup as module
+from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
+from tests.support.processes import HostFactory, Journal, Process
+
+SEND = (
+    "import sys, rclpy;"
+    "from rclpy.action import ActionClient;"
+    "from robot_control_interfaces.action import MoveRobot;"
+    "from unique_identifier_msgs.msg import UUID;"
+    "from bt_actions.goal_ids import new_goal_id;"
+    "rclpy.init(); node = rclpy.create_node('sender');"
+    "client = ActionClient(node, MoveRobot, sys.argv[1]); client.wait_for_server();"
+    "goal_id = UUID(uuid=list(new_goal_id()));"
+    "client.send_goal_async(MoveRobot.Goal(distance=90.0), goal_uuid=goal_id);"
+    "rclpy.spin(node)"
+)
+"""A program that sends one goal with an id of ours, and waits."""
+
+
+@pytest.fixture
+def left(start_program: Callable[..., Process], serve: Callable[..., Journal], name: str) -> str:
+    """Leave a goal of a killed process on `name`; return its id."""
+    journal = serve()
+    sender = start_program("-c", SEND, name)
+    goal = journal.wait_for("accepted", within=20.0).goal
+    sender.send(signal.SIGKILL)
+    sender.popen.wait()
+    return goal
+
+
+def sweep(wanted: Collection[str], **more: Any) -> tuple[Swept, list[str]]:
+    """Clean up; return what came of it, and what is missing in the end."""
+    told: list[str] = []
+    swept = cleanup(
+        look=1.0,
+        patience=1.0,
+        wanted=wanted,
+        missing=lambda names, in_vain: told.extend(names if in_vain else ()),
+        **more,
+    )
+    return swept, told
+
+
+def test_a_healthy_server_is_known_soon(
+    serve: Callable[..., Journal], name: str, domain: int
+) -> None:
+    serve()
+    began = time.monotonic()
+    swept, told = sweep([name])
+    assert time.monotonic() - began < 10.0
+    assert (swept.left, told) == ([], [])
+    assert name in swept.known
+
+
+def test_of_two_servers_each_has_to_answer(
+    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One is stopped when both are in sight, and before it has told what it runs."""
+    monkeypatch.setattr(module, "LOOK_LONGEST", 6.0)
+    hosts = [new_host(short_lease=False) for _ in range(2)]
+    for host in hosts:
+        host.open(name)
+    real = module.servers
+
+    def stopping(node: Any, action: str) -> frozenset[bytes]:
+        shown = real(node, action)
+        if action == name and len(shown) == 2:
+            hosts[0].send(signal.SIGSTOP)
+        return shown
+
+    monkeypatch.setattr(module, "servers", stopping)
+    swept, told = sweep([name])
+    hosts[0].send(signal.SIGCONT)
+    assert told == [name]
+    assert name not in swept.known
+
+
+def test_an_answer_does_not_show_that_the_status_has_come(
+    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The server is stopped after its first answer."""
+    monkeypatch.setattr(module, "LOOK_LONGEST", 6.0)
+    host = new_host(short_lease=False)
+    host.open(name)
+    real = RollCall.answered
+
+    def stopping(call: RollCall, number: int, now: float) -> None:
+        host.send(signal.SIGSTOP)
+        real(call, number, now)
+
+    monkeypatch.setattr(RollCall, "answered", stopping)
+    swept, told = sweep([name])
+    host.send(signal.SIGCONT)
+    assert told == [name]
+    assert swept.unknown[name] == "no server of {} answers"
+
+
+def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
+    left: str, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It went away meanwhile, frozen perhaps, and may run the goal."""
+    real, found = module.servers, list[LeftBehind]()
+
+    def one_goes(node: Any, action: str) -> frozenset[bytes]:
+        shown = real(node, action)
+        return shown | {b"another"} if action == name and shown and not found else shown
+
+    monkeypatch.setattr(module, "servers", one_goes)
+    swept, _told = sweep(
+        [name],
+        found=found.append,
+        stopped=lambda: any(goal.shown is End.CANCELED for goal in found),
+    )
+    assert [(goal.goal_id.hex(), goal.servers, goal.end) for goal in swept.left] == [
+        (left, 2, End.UNKNOWN)
+    ]
+    assert name in swept.unknown
+
+
+def test_an_action_that_nobody_wants_is_named_where_it_is_not_known(
+    new_host: HostFactory, name: str, domain: int
+) -> None:
+    host = new_host(short_lease=False)
+    host.open(name)
+    swept, told = sweep(
+        [], sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None
+    )
+    host.send(signal.SIGCONT)
+    assert told == [], "and in nobody's way"
+    assert name in swept.unknown
+    assert name not in swept.known
+
+
+def test_it_ends_though_new_actions_come_in_sight(
+    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LOOK_LONGEST", 1.0)
+    numbers = itertools.count()
+
+    class Crowded(module.Node):  # type: ignore[misc]  # rclpy is not typed
+        def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
+            number = next(numbers)
+            assert number < 200, "it does not end"
+            return [(f"/crowd_{number}/_action/status", [])]
+
+        def count_publishers(self, topic: str) -> int:
+            return int(topic.startswith("/crowd_"))
+
+    monkeypatch.setattr(module, "Node", Crowded)
+    told: list[str] = []
+    swept = cleanup(look=0.2, missing=lambda names, in_vain: told.extend(names if in_vain else ()))
+    assert {"/crowd_0", "/crowd_1"} <= set(swept.unknown) == set(told)
+
+
+def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
+    left: str, name: str, domain: int
+) -> None:
+    found: list[LeftBehind] = []
+    swept = cleanup(look=60.0, found=found.append, stopped=lambda: bool(found))
+    assert [goal.goal_id.hex() for goal in swept.left] == [left]
+
+
+def test_a_context_that_is_shut_down_meanwhile_hides_no_interrupt(
+    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As rclpy's handlers do at Ctrl-C, in a program that called rclpy.init()."""
+    contexts: list[Context] = []
+
+    class Kept(Context):  # type: ignore[misc]  # rclpy is not typed
+        def init(self, *args: Any, **more: Any) -> None:
+            super().init(*args, **more)
+            contexts.append(self)
+
+    def interrupted() -> bool:
+        contexts[0].shutdown()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "Context", Kept)
+    with pytest.raises(KeyboardInterrupt):
+        cleanup(stopped=interrupted)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"look": float("nan")},
+        {"look": -1.0},
+        {"patience": float("nan")},
+        {"patience": -1.0},
+        {"wanted": ["no name"]},
+        {"wanted": ["/a//b"]},
+    ],
+    ids=str,
+)
+def test_what_is_no_time_and_what_is_no_name_is_refused(
+    wrong: dict[str, Any], domain: int, no_leaks: None
+) -> None:
+    with pytest.raises(ValueError, match=r"seconds are|topic name"):
+        cleanup(**{"look": 0.0, "patience": 0.0, **wrong})
+
+
+def test_a_context_that_is_not_initialised_is_refused(domain: int, no_leaks: None) -> None:
+    with pytest.raises(CannotStart):
+        cleanup(context=Context())
+
+
+def test_a_goal_that_has_ended_at_one_server_of_two_is_kept_in_mind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found: list[LeftBehind] = []
+    told = module._Sweep(0.0, 0.0, found.append, print, print, print, lambda: False)
+    told._calls["/move"] = call = RollCall(0.0)
+    call.sees(frozenset({b"a", b"b"}), 0.0)
+    author = module.Author(here=True, pid=2**22 + 1, started=b"ab")
+    monkeypatch.setattr(module, "author_of", lambda _: author)
+    for status in (GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_ABORTED):
+        message = GoalStatusArray(status_list=[GoalStatus(status=status)])
+        message.status_list[0].goal_info.goal_id = UUID(uuid=[7] * 16)
+        told._read("/move", message)
+    told._find()
+    assert [(goal.servers, goal.end) for goal in found] == [(2, End.UNKNOWN)]

@@ -1,0 +1,140 @@
+"""When all servers of an action have had the time to tell what they run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from bt_actions.roll_call import ASK_AGAIN, LATE, SETTLE, RollCall
+
+A, B = b"a", b"b"
+
+
+class Roll(RollCall):
+    """One whose questions and answers come as a test says."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self._numbers: Iterator[int] = iter(range(1000))
+        super().__init__(self.now)
+
+    def shows(self, *shown: bytes) -> None:
+        self.sees(frozenset(shown), self.now)
+
+    def ask(self, answers: int, *, after: float = 0.02) -> None:
+        """Ask, and take so many answers after a while; then let it be time for the next."""
+        assert self.due(self.now)
+        number = next(self._numbers)
+        self.asked(number, self.now)
+        for _ in range(answers):
+            self.answered(number, self.now + after)
+        self.now += max(after, ASK_AGAIN)
+
+    def settle(self, answers: int = 1) -> None:
+        """Ask for as long as it takes."""
+        for _ in range(int(SETTLE / ASK_AGAIN) + 1):
+            assert not self.known
+            self.ask(answers)
+
+
+def test_it_is_known_when_all_questions_were_answered_for_long_enough() -> None:
+    roll = Roll()
+    roll.shows(A)
+    roll.settle()
+    assert roll.known
+    assert not roll.overdue(roll.now)
+
+
+def test_an_answer_alone_is_no_proof() -> None:
+    """It was stopped after the first, with a status that it had not delivered."""
+    roll = Roll()
+    roll.shows(A)
+    roll.ask(1)
+    for _ in range(10):
+        roll.ask(0)
+    assert not roll.known
+    assert roll.overdue(roll.now)
+    assert roll.trouble == "no server of {} answers"
+    roll.settle()
+    assert roll.known
+
+
+def test_each_server_has_to_answer() -> None:
+    roll = Roll()
+    roll.shows(A, B)
+    for _ in range(10):
+        roll.ask(1)
+    assert not roll.known
+    assert roll.trouble.startswith("not every server of {} ")
+    roll.settle(answers=2)
+    assert roll.known
+
+
+def test_one_that_went_away_untold_stays_unknown_in_every_participant() -> None:
+    """Closed, killed, or frozen beyond its lease: nobody can tell."""
+    roll = Roll()
+    roll.shows(A, B)
+    roll.ask(1)
+    roll.shows(A)
+    for _ in range(10):
+        roll.ask(1)
+    assert not roll.known
+    roll.begin(roll.now)
+    roll.shows(A)
+    for _ in range(10):
+        roll.ask(1)
+    assert not roll.known
+    assert roll.trouble == "a server of {} went away meanwhile"
+    assert roll.servers == {A, B}, "either may run what was found"
+    roll.shows(A, B)
+    roll.settle(answers=2)
+    assert roll.known, "it is back"
+
+
+def test_one_that_was_known_may_go() -> None:
+    roll = Roll()
+    roll.shows(A)
+    roll.settle()
+    roll.shows()
+    assert roll.known
+    roll.begin(roll.now)
+    assert roll.known
+
+
+def test_one_that_comes_newly_begins_anew() -> None:
+    roll = Roll()
+    roll.shows(A)
+    roll.settle()
+    roll.shows(A, B)
+    assert not roll.known
+    assert not roll.overdue(roll.now), "it is on the way"
+    roll.settle(answers=2)
+    assert roll.known
+
+
+@pytest.mark.parametrize("late", [LATE + 0.1, 60.0])
+def test_a_question_that_was_late_begins_anew(late: float) -> None:
+    """We stood still, or the server did: nobody can tell."""
+    roll = Roll()
+    roll.shows(A)
+    for _ in range(int(SETTLE / ASK_AGAIN)):
+        roll.ask(1)
+    roll.ask(1, after=late)
+    assert not roll.known
+    roll.settle()
+    assert roll.known
+
+
+def test_a_status_without_a_server_has_to_be_answered_for_too() -> None:
+    roll = Roll()
+    roll.sees(frozenset(), roll.now)
+    assert not roll.sighted
+    assert roll.overdue(roll.now), "there is nothing on the way"
+    roll.sees(frozenset(), roll.now, published=True)
+    assert roll.sighted
+    for _ in range(10):
+        roll.ask(0)
+    assert not roll.known
+    roll.settle()
+    assert roll.known
