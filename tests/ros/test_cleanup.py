@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import signal
-import time
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -58,13 +57,9 @@ def sweep(wanted: Collection[str], **more: Any) -> tuple[Swept, list[str]]:
     return swept, told
 
 
-def test_a_healthy_server_is_known_soon(
-    serve: Callable[..., Journal], name: str, domain: int
-) -> None:
+def test_a_healthy_server_is_known(serve: Callable[..., Journal], name: str, domain: int) -> None:
     serve()
-    began = time.monotonic()
     swept, told = sweep([name])
-    assert time.monotonic() - began < 10.0
     assert (swept.left, told) == ([], [])
     assert name in swept.known
 
