@@ -868,8 +868,7 @@ def test_a_drain_that_was_stopped_takes_in_what_came_meanwhile(
     journal.wait_for("canceled")
     holds_for(lambda: True, CANCEL + 2.0)
     run.send(signal.SIGCONT)
-    assert run.wait() == 128 + signal.SIGTERM, run
-    assert "not accounted for" not in str(run)
+    assert run.wait() == 128 + signal.SIGTERM, run  # and not 3
     record.outcome = "the goal's end is known; exit code 143"
 
 
