@@ -3,8 +3,8 @@
 One server's word does not speak for another's: where a second one opened, or woke up, when the
 request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
 other may run. So while more than one of the servers that the request went to may live, an ending
-is believed when a question was answered twice, or when it has turned out that one is a ghost. And
-of a goal that has ended and turns up at another server (a twin), what was told before is no news.
+is believed when a question was answered twice, or when it has turned out that one is a ghost. A
+goal that has ended, and turns up at another server, is a twin (twin.py).
 
 Told of answers and of looks at the server, it returns what the goal is to be told. What follows
 from that is the goal's (goal.py); who lives is known to the watch (server.py). No ROS, no thread,
@@ -18,8 +18,6 @@ from typing import Any
 
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import (
-    CANCEL_ACCEPTED,
-    CANCEL_REJECTED,
     CANCEL_UNKNOWN_GOAL,
     ENDS,
     STATUS_EXECUTING,
@@ -55,25 +53,27 @@ class Testimony:
         self._asked_at = NEVER
         self._crowd: frozenset[GID] = frozenset()  # when last looked at, and not known who lives
         self._told_of_two = False
-        self._told: tuple[End, ...] = ()  # of a twin: how it ended elsewhere before
+        self._ends_told: tuple[End, ...] = ()
         self._fresh_since = NEVER
         """What was asked before may have been answered by who is gone, or did not have it yet."""
+
+    @property
+    def servers(self) -> frozenset[GID]:
+        """All that may have told how the goal ended."""
+        return self.sent_to
+
+    @property
+    def ends_told(self) -> tuple[End, ...]:
+        """Return the ends that were told, one for each server that did."""
+        if self._ends_told or self._goal.end not in ENDS.values():
+            return self._ends_told
+        return (self._goal.end,)
 
     def sent(self, watch: ServerWatch) -> None:
         """Take note of who is shown when the request goes out, just before and just after."""
         self.sent_to |= watch.gids
         if _is_crowded(watch):
             self._crowd = watch.gids
-
-    def is_twin_of(self, ended: Testimony, sent_to: frozenset[GID]) -> None:
-        """The goal is a twin: what `ended` was about, as it may run at another of these servers."""
-        self.sent_to = sent_to
-        self._told = (*ended._told, ended._goal.end)
-
-    def is_at_another(self, watch: ServerWatch, now: float) -> None:
-        """The twin runs at one of the servers that are shown."""
-        self.sent(watch)
-        self._accepted_by, self._fresh_since = len(self._told) + 1, now
 
     def taken_over(self) -> None:
         """Another node minds the goal from now on, and has not seen its server yet."""
@@ -118,7 +118,6 @@ class Testimony:
         A denial by a newcomer counts at once: nothing is sent before it is known who lives, and
         should the goal turn up all the same, it is canceled.
         """
-        self._left_alone(watch, asked, answers)
         if answers[-1] == CANCEL_UNKNOWN_GOAL:
             if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
                 return []
@@ -127,24 +126,12 @@ class Testimony:
                 return []
         return [(Event.CANCEL_ANSWERED, answers[-1])]
 
-    def _left_alone(self, watch: ServerWatch, asked: float, answers: Sequence[int]) -> None:
-        """Note of a twin that it runs at the only server that is left: what that tells is its end.
-
-        Neither code is answered of a goal that has ended.
-        """
-        runs = CANCEL_ACCEPTED in answers or CANCEL_REJECTED in answers
-        left = self.sent_to & watch.gids
-        if self._told and runs and len(left) == 1 and asked >= self._fresh_since:
-            self.sent_to, self._told = left, ()
-
     def finished(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
         status = answers[-1][0]
         ended = [answer for answer in answers if answer[0] in ENDS]
-        if ended and self._told:
-            return self._finished_elsewhere(watch, asked, len(answers), ended)
         if ended:
             done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), ended[-1])
             if len(self.sent_to) > 1:
@@ -154,6 +141,7 @@ class Testimony:
                 if len(answers) < all_asked and self._may_be_at_two(watch):
                     self._ended = done
                     return []
+            self._ends_told = tuple(ENDS[each[0]] for each in ended)
             if len(ended) > 1 and self._accepted_by < 2 and not self._told_of_two:  # both ran it
                 watch.two_answered()
                 return [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, done)]
@@ -167,37 +155,9 @@ class Testimony:
         by_all = len(answers) > 1 or watch.state(now) is Server.READY
         return [(Event.RESULT_UNKNOWN, None)] if by_all and asked >= self._fresh_since else []
 
-    def _finished_elsewhere(
-        self, watch: ServerWatch, asked: float, answers: int, ended: list[tuple[int, Any]]
-    ) -> Told:
-        """Take the ends that servers tell of a twin: among them are those that were told before."""
-        if asked < self._fresh_since:
-            return []
-        news = ended[:]
-        for told in self._told:
-            for each in news:
-                if ENDS[each[0]] is told:
-                    news.remove(each)
-                    break
-        if not news and watch.gids == self.sent_to and len(self.sent_to) == 1:
-            news = ended  # whoever told it before has gone
-        wanted = self._accepted_by - len(self._told) if self._may_be_at_two(watch) else 1
-        if news:
-            return [(Event.RESULT, news[-1])] if len(news) >= wanted else []
-        gone = self.sent_to - watch.gids
-        if not gone or self._may_be_at_two(watch):
-            forgotten = answers >= max(2, len(watch.gids))  # by that which took it, too
-            return [(Event.RESULT_UNKNOWN, None)] if forgotten else []
-        if self._goal.lost:
-            return []
-        self.sent_to, self._was_gone = gone, True
-        return [(Event.SERVER_LOST, f"{self._goal.server} went away under the goal")]
-
     def shown(self, watch: ServerWatch, status: int) -> Told:
         """Take the status that one server publishes of the goal."""
         self.lives()
-        if status in ENDS and self._told:
-            return [] if ENDS[status] in self._told else [(Event.STATUS, status)]
         doubtful = self._may_be_at_two(watch) or self._fresh_since > NEVER
         if status in ENDS and len(self.sent_to) > 1 and doubtful:
             status = STATUS_EXECUTING  # it has ended at one; that it was accepted is sure

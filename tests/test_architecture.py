@@ -17,6 +17,7 @@ PARTS = [
     {"document", "runner", "simulation"},
     {"behaviours"},
     {"ros"},
+    {"twin"},
     {"attempts", "testimony"},
     {"goal", "resources", "server", "hearing", "standstill", "goal_ids", "roll_call"},
     {"deadlines"},

@@ -7,12 +7,12 @@ import pytest
 from bt_actions import testimony
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import Event, Now
-from bt_actions.policy import End, Timeouts
+from bt_actions.policy import Timeouts
 from bt_actions.server import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER = b"one", b"other"
 BOTH = frozenset({ONE, OTHER})
-DENIED, CANCELED, REFUSED = 2, 0, 1
+DENIED, CANCELED = 2, 0
 SUCCEEDED, ABORTED = (4, "done"), (6, "failed")
 CANCELED_END = (5, None)
 UNKNOWN = (0, None)
@@ -301,108 +301,3 @@ def test_an_acceptance_that_follows_a_status_may_be_the_others(
     said._goal.on(Event.STATUS, Now(0.0, 0.0), 2)
     assert events(said.answered(watch, 1.0, [True])) == [Event.SERVER_CHANGED]
     assert said.finished(watch, 1.1, 0.5, [UNKNOWN, ABORTED]) == [], "asked before it accepted"
-
-
-@pytest.fixture
-def twin(said: testimony.Testimony, watch: ServerWatch) -> testimony.Testimony:
-    """Of a goal that has succeeded at one, and has turned up at the other since."""
-    goal = said._goal.twin(Now(1.0, 1.0))
-    twin = testimony.Testimony(goal)
-    said._goal.end = End.SUCCEEDED
-    twin.is_twin_of(said, said.sent_to)
-    twin.is_at_another(watch, 1.0)
-    goal.on(Event.SERVER_RETURNED, Now(1.0, 1.0))
-    return twin
-
-
-@pytest.mark.parametrize("answers", [[SUCCEEDED, CANCELED_END], [CANCELED_END, SUCCEEDED]])
-def test_the_end_of_a_twin_is_not_that_which_was_told_before(
-    twin: testimony.Testimony, watch: ServerWatch, answers: list[tuple[int, object]]
-) -> None:
-    assert twin.finished(watch, 1.1, 0.9, answers) == [], "asked before the other accepted it"
-    assert twin.finished(watch, 1.1, 1.0, [SUCCEEDED]) == [], "the first once more"
-    assert twin.finished(watch, 1.2, 1.0, answers) == [(Event.RESULT, CANCELED_END)]
-    assert twin.finished(watch, 1.2, 1.0, [CANCELED_END]) == [(Event.RESULT, CANCELED_END)]
-    assert twin.finished(watch, 1.2, 1.0, [SUCCEEDED] * 2) == [(Event.RESULT, SUCCEEDED)]
-
-
-def test_the_status_that_a_goal_ended_with_is_none_of_its_twin(
-    twin: testimony.Testimony, watch: ServerWatch
-) -> None:
-    assert twin.shown(watch, 4) == []
-    assert twin.shown(watch, 3) == [(Event.STATUS, 3)]
-    assert twin.shown(watch, 5) == [(Event.STATUS, 5)], "only the other can have said so"
-
-
-def test_a_twin_is_lost_when_only_what_was_told_before_is_left(
-    twin: testimony.Testimony, watch: ServerWatch
-) -> None:
-    twin.looked(watch, 1.1)
-    watch.observe(1.5, True, frozenset({ONE}))
-    assert events(twin.looked(watch, 1.5)) == [Event.SERVER_CHANGED], "ask whoever is left"
-    told = twin.finished(watch, 1.6, 1.5, [SUCCEEDED])
-    assert events(told) == [Event.SERVER_LOST]
-    twin._goal.on(Event.SERVER_LOST, Now(1.6, 1.6), told[0][1])
-    assert twin._goal.end is End.SERVER_GONE
-    assert twin.finished(watch, 1.6, 1.5, [SUCCEEDED]) == []
-    assert twin.looked(watch, 1.7) == []
-    watch.observe(2.0, True, BOTH)
-    assert events(twin.looked(watch, 2.0)) == [Event.SERVER_RETURNED]
-    assert twin.finished(watch, 2.1, 2.0, [SUCCEEDED]) == []
-    assert twin.finished(watch, 2.1, 2.0, [CANCELED_END]) == [(Event.RESULT, CANCELED_END)]
-    watch.observe(3.0, True, frozenset({OTHER}))
-    told = twin.finished(watch, 3.1, 3.0, [SUCCEEDED])
-    assert told == [(Event.RESULT, SUCCEEDED)], "it is alone there, so it is its own end"
-
-
-def test_a_twin_of_a_ghost_waits_until_the_ghost_is_gone(
-    twin: testimony.Testimony, watch: ServerWatch
-) -> None:
-    now = alone(watch)
-    assert twin.finished(watch, now, now, [SUCCEEDED]) == [], "of which of the two?"
-    watch.observe(now + 20.0, True, frozenset({ONE}))
-    assert events(twin.finished(watch, now + 20.0, now, [SUCCEEDED])) == [Event.SERVER_LOST]
-
-
-def test_a_twin_that_its_server_has_forgotten_is_denied(
-    twin: testimony.Testimony, watch: ServerWatch
-) -> None:
-    told = twin.finished(watch, 1.2, 1.1, [SUCCEEDED, UNKNOWN])
-    assert events(told) == [Event.RESULT_UNKNOWN]
-    watch.observe(2.0, True, frozenset({ONE, b"newcomer"}))
-    told = twin.finished(watch, 2.2, 2.1, [SUCCEEDED, UNKNOWN])
-    assert events(told) == [Event.SERVER_LOST], "it was denied by the newcomer"
-
-
-def test_whoever_is_left_and_has_a_twin_to_cancel_tells_its_end(
-    twin: testimony.Testimony, watch: ServerWatch
-) -> None:
-    watch.observe(1.5, True, frozenset({OTHER, b"newcomer"}))
-    twin.looked(watch, 1.5)
-    twin.canceled(watch, 1.4, [REFUSED])
-    assert events(twin.finished(watch, 1.6, 1.5, [UNKNOWN])) == []
-    assert twin.canceled(watch, 1.5, [REFUSED, DENIED]) == [], "it is the newcomer's denial"
-    assert twin.finished(watch, 1.7, 1.6, [UNKNOWN, SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
-
-
-def test_the_twin_of_a_twin_has_a_third_end(twin: testimony.Testimony, watch: ServerWatch) -> None:
-    watch.observe(2.0, True, BOTH | {b"third"})
-    twin._goal.end = End.CANCELED
-    third = testimony.Testimony(twin._goal.twin(Now(2.0, 2.0)))
-    third.is_twin_of(twin, twin.sent_to)
-    third.is_at_another(watch, 2.0)
-    assert third.finished(watch, 2.1, 2.0, [SUCCEEDED, CANCELED_END]) == []
-    told = third.finished(watch, 2.1, 2.0, [CANCELED_END, ABORTED, SUCCEEDED])
-    assert told == [(Event.RESULT, ABORTED)]
-    assert third.shown(watch, 5) == [], "by the second"
-
-
-def test_two_more_that_take_a_twin_have_to_tell_two_ends(
-    twin: testimony.Testimony, watch: ServerWatch
-) -> None:
-    watch.observe(2.0, True, BOTH | {b"third"})
-    twin.sent(watch)
-    assert events(twin.answered(watch, 2.0, [True, True, True])) == [Event.SERVER_AMBIGUOUS]
-    assert twin.finished(watch, 2.1, 2.0, [SUCCEEDED, CANCELED_END]) == []
-    told = twin.finished(watch, 2.1, 2.0, [SUCCEEDED, CANCELED_END, ABORTED])
-    assert told == [(Event.RESULT, ABORTED)]

@@ -36,6 +36,7 @@ from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
+from bt_actions.twin import TwinTestimony
 
 if TYPE_CHECKING:
     from bt_actions.ros.traffic import Traffic
@@ -50,6 +51,8 @@ LATE = 0.5
 """Seconds by which a look is so late that answers may have come in between, unseen."""
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
+QUESTIONS = 5
+"""So many of these words, at most, are followed up."""
 SILENT_FOR = 40.0
 """Seconds without any answer until goals whose node is gone are left to whoever can see whether
 their server is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
@@ -61,7 +64,7 @@ FEEDBACK = "/_action/feedback"
 _probes = itertools.count(1)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Past:
     """A goal that is DONE, and may turn up at a second server."""
 
@@ -70,6 +73,9 @@ class _Past:
     accepted: bool
     since: float
     twin: Ticket
+    said: TwinTestimony
+    questions: int = 0
+    """Asked in doubt."""
 
 
 class Line:
@@ -132,7 +138,9 @@ class Line:
             if ticket is not None:
                 self._pass_on(ticket, ticket.testimony.canceled(self.watch, asked, answers))
             elif answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
-                self._found_twice(goal_id, (True,))
+                past = self._past.get(goal_id)
+                if past is not None and asked > past.since:
+                    self._found_twice(goal_id, (True,))
 
     def result_came(
         self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
@@ -163,27 +171,28 @@ class Line:
         del self._past[goal_id]
         twin.owner = past.owner()
         self.watch.two_answered()
-        twin.testimony.is_at_another(self.watch, time.monotonic())
+        past.said.is_at_another(self.watch, time.monotonic())
         self.goals[goal_id] = twin
         alarm.mind(self)
         self.tell(twin, Event.SERVER_RETURNED)
 
-    def _runs_on(self, goal_id: bytes) -> bool:
-        """A server runs a goal that has ended here; return False if it may be an older word."""
+    def _runs_on(self, goal_id: bytes) -> None:
+        """A server runs a goal that has ended here, unless this is older than the end."""
         past = self._past.get(goal_id)
-        if past is None or time.monotonic() - past.since <= STALE:
-            return False
-        self._found_twice(goal_id, (True,))
-        return True
+        if past is not None and time.monotonic() - past.since > STALE:
+            self._found_twice(goal_id, (True,))
+        elif past is not None:
+            self._doubt_end(goal_id, past)
 
-    def _doubts_end(self, goal_id: bytes) -> None:
-        """A status may be older than the goal's end, or be all that a second server ever says.
+    def _doubt_end(self, goal_id: bytes, past: _Past) -> None:
+        """What seems to be older than a goal's end may be all that a second server ever says.
 
-        To ask it to cancel tells which: who has ended a goal neither agrees nor refuses.
+        To ask it to cancel tells: who has ended a goal neither agrees nor refuses.
         """
-        past = self._past.get(goal_id)
-        if past is not None and self._may_be_several(past):
-            with contextlib.suppress(Exception):  # our node is gone; the next look tells
+        with contextlib.suppress(Exception):  # our node is gone; the next look tells
+            self._observe(time.monotonic())
+            if self._may_be_several(past) and past.questions < QUESTIONS and not self.is_parents:
+                past.questions += 1
                 self.client.cancel(goal_id)
 
     def _may_be_several(self, past: _Past) -> bool:
@@ -199,9 +208,8 @@ class Line:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
         with lock:
             for goal_id in self._past.keys() & statuses.keys() - self.goals.keys():
-                runs = 0 < statuses[goal_id] < STATUS_SUCCEEDED
-                if runs and not self._runs_on(goal_id):
-                    self._doubts_end(goal_id)
+                if 0 < statuses[goal_id] < STATUS_SUCCEEDED:
+                    self._runs_on(goal_id)
             for goal_id in self.goals.keys() & statuses.keys():
                 if statuses[goal_id] > 0:
                     ticket = self.goals[goal_id]
@@ -360,14 +368,15 @@ class Line:
         )
         elsewhere = ticket.testimony.may_run_at(self.watch)
         if elsewhere and not ticket.goal.lost:
-            twin.testimony.is_twin_of(ticket.testimony, elsewhere)
+            twin.testimony = TwinTestimony(twin.goal, ticket.testimony, elsewhere)
             twin.testimony.taken_over()
             self.goals[twin.goal.id] = twin
             return
         twin.owner = None
-        twin.testimony.is_twin_of(ticket.testimony, ticket.testimony.sent_to)
+        said = TwinTestimony(twin.goal, ticket.testimony, ticket.testimony.sent_to)
+        twin.testimony = said
         owner = weakref.ref(ticket.owner)
-        self._past[twin.goal.id] = _Past(owner, ticket.goal.accepted, time.monotonic(), twin)
+        self._past[twin.goal.id] = _Past(owner, ticket.goal.accepted, time.monotonic(), twin, said)
         if len(self._past) > GOALS_KEPT:
             oldest = next(iter(self._past))
             del self._past[oldest]

@@ -163,7 +163,10 @@ class _Watch:
 
     def insists(self) -> bool:
         """Whether the ear's thread, which calls this, has one more signal to hear."""
-        return self._ear is not None and self._ear.has_more()
+        return self._ear is not None and self._ear.has_more(self._minds)
+
+    def _minds(self, number: int) -> bool:
+        return bool(signal.getsignal(number) == self._note)
 
     def ends_process(self) -> bool:
         """Whether what was received ends the process on the spot."""
@@ -227,7 +230,7 @@ class _Watch:
         It may be in C for long; or it began to wait there just after the signal had come. Where it
         saw two as one, because the second came before it had seen the first, it is sent one more.
         """
-        if self._is_over or signal.getsignal(number) != self._note:
+        if self._is_over or not self._minds(number):
             return
         self._heard[number] += 1
         if self._heard[number] <= self._received.count(number):
@@ -254,6 +257,8 @@ class _Ear:
     def __init__(self, told: Callable[[int, float], None]) -> None:
         """Begin to listen, unless somebody else does; RuntimeError, OSError, ValueError: not."""
         self._told = told
+        self._heard: list[tuple[int, float]] = []  # and not told yet: signal, and when
+        self._is_closed = False
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
         self._thread = threading.Thread(target=self._listen, name="bt_actions-signals", daemon=True)
@@ -280,27 +285,32 @@ class _Ear:
         self.close()
         os.close(self._read)
 
-    def has_more(self) -> bool:
-        """Whether this is its thread, and a signal has come that it has not read."""
+    def has_more(self, minded: Callable[[int], bool]) -> bool:
+        """Whether this is its thread, and a signal has come that is `minded`, and not told yet."""
+        if threading.current_thread() is not self._thread:
+            return False
+        self._hear(0.0)
+        return any(minded(number) for number, _ in self._heard)
+
+    def _hear(self, seconds: float | None) -> None:
+        """Wait so long for signals, and take those that have come."""
         poll = select.poll()
         poll.register(self._read, select.POLLIN)
-        return threading.current_thread() is self._thread and bool(poll.poll(0))
+        if not self._is_closed and poll.poll(None if seconds is None else 1000.0 * seconds):
+            now = time.monotonic()
+            numbers = os.read(self._read, 4096)
+            self._is_closed = not numbers
+            self._heard += [(number, now) for number in numbers]
 
     def _listen(self) -> None:
-        heard: list[tuple[int, float]] = []
-        poll = select.poll()
-        poll.register(self._read, select.POLLIN)
         while True:
-            wait = max(0.0, heard[0][1] + TURN - time.monotonic()) if heard else None
-            ready = poll.poll(None if wait is None else 1000.0 * wait)
+            until_told = self._heard[0][1] + TURN - time.monotonic() if self._heard else None
+            self._hear(None if until_told is None else max(0.0, until_told))
+            if self._is_closed:
+                break
             now = time.monotonic()
-            if ready:
-                numbers = os.read(self._read, 4096)
-                if not numbers:
-                    break
-                heard += [(number, now) for number in numbers]
-            while heard and now - heard[0][1] >= TURN:
-                self._told(*heard.pop(0))
+            while self._heard and now - self._heard[0][1] >= TURN:
+                self._told(*self._heard.pop(0))
         os.close(self._read)
 
 
@@ -309,14 +319,15 @@ _watch: _Watch | None = None
 
 def insists() -> bool:
     """Whether one more signal has come since this thread, which hears them, says the last words."""
-    return _watch is not None and _watch.insists()
+    watch = _watch
+    return watch is not None and watch.insists()
 
 
 _EDGES = tuple(
     getattr(contextlib._GeneratorContextManager, name).__code__  # noqa: SLF001
     for name in ("__enter__", "__exit__")
 )
-_BLOCKS = tuple(inspect.unwrap(each).__code__ for each in (ended_by_signals, _Watch.telling))
+_BLOCK = inspect.unwrap(ended_by_signals).__code__
 
 
 def _is_at_an_edge(frame: FrameType | None) -> bool:
@@ -325,8 +336,10 @@ def _is_at_an_edge(frame: FrameType | None) -> bool:
     In contextlib, and not in the generator, where it would be in a `try`.
     """
     while frame is not None:
-        if frame.f_code in _EDGES and frame.f_locals["self"].gen.gi_code in _BLOCKS:
-            return True
+        if frame.f_code in _EDGES:
+            block = frame.f_locals["self"].gen
+            if getattr(block, "gi_code", None) is _BLOCK:
+                return True
         frame = frame.f_back
     return False
 

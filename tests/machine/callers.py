@@ -18,6 +18,7 @@ from bt_actions.policy import Busy, End, Outcome
 from bt_actions.resources import Answer, Resources
 from bt_actions.server import Server
 from bt_actions.testimony import Told
+from bt_actions.twin import TwinTestimony
 from tests.machine.judge import Judge
 from tests.machine.parts import Before, Leaf, LeafPlan, Ledger, Line, Ticket
 from tests.machine.world import NODES, Job, Message, World
@@ -356,9 +357,10 @@ class Caller:
             if len(past.testimony.sent_to | line.watch.gids) == 1 and past.goal.accepted:
                 return
             twin = self._twin(past)
-            twin.testimony.is_twin_of(past.testimony, past.testimony.sent_to)
             line.watch.two_answered()
-            twin.testimony.is_at_another(line.watch, self._moment())
+            said = TwinTestimony(twin.goal, past.testimony, past.testimony.sent_to)
+            said.is_at_another(line.watch, self._moment())
+            twin.testimony = said
             self.tell(twin, Event.SERVER_RETURNED)
 
     def _twin(self, past: Ticket) -> Ticket:
@@ -372,7 +374,7 @@ class Caller:
         elsewhere = ticket.testimony.may_run_at(ticket.line.watch)
         if elsewhere and ticket.goal.sent and not ticket.goal.lost:
             twin = self._twin(ticket)
-            twin.testimony.is_twin_of(ticket.testimony, elsewhere)
+            twin.testimony = TwinTestimony(twin.goal, ticket.testimony, elsewhere)
             twin.testimony.taken_over()
 
     def _pass_on(self, ticket: Ticket, told: Told) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bt_actions import testimony
+from bt_actions import testimony, twin
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.deadlines import Deadlines
 from bt_actions.goal import TABLE, Goal, Row
@@ -312,7 +312,7 @@ def believes_one_server_where_two_may_have_it(patch: Patch) -> None:
 
 @mutation
 def takes_the_first_end_of_a_goal_for_that_of_its_twin(patch: Patch) -> None:
-    patch.setattr(testimony.Testimony, "is_twin_of", lambda self, ended, sent_to: None)
+    patch.setattr(twin.TwinTestimony, "_news", lambda self, ended: ended)
 
 
 @mutation

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import queue
 import signal
 import subprocess
 import textwrap
@@ -9,6 +11,7 @@ from collections.abc import Callable
 
 import pytest
 
+from bt_actions.ros import signals, traffic
 from tests.support.processes import Process
 
 Start = Callable[..., Process]
@@ -176,6 +179,7 @@ mutex, c = ctypes.create_string_buffer(64), ctypes.CDLL(None)
 c.pthread_mutex_lock(mutex)
 
 def words():
+    signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
     say("insists" if signals.insists() else "waits")
     itself(signal.SIGTERM)
     while not signals.insists():
@@ -190,6 +194,7 @@ def signals_come():
         itself(signal.SIGTERM)
         heard.acquire()
 
+signal.signal(signal.SIGUSR1, lambda *_: say("the user's"))
 with ended_by_signals(lambda *_: True, words):
     threading.Thread(target=signals_come, daemon=True).start()
     c.pthread_mutex_lock(mutex)
@@ -233,6 +238,34 @@ def test_one_more_signal_is_noticed_by_who_says_the_last_words(start_program: St
     process = start_program("-c", HEAD + ONE_MORE_COMES_IN_THE_LAST_WORDS)
     assert process.wait(within=60.0) == 128 + signal.SIGTERM, process
     assert process.lines == ["waits", "insists"]
+
+
+def test_nobody_insists_where_nobody_listens_any_more() -> None:
+    said: queue.Queue[bool] = queue.Queue()
+
+    def told(_number: int, _heard_at: float) -> None:
+        ear.close()
+        said.put(ear.has_more(lambda _: True))
+
+    ear = signals._Ear(told)
+    try:
+        assert not ear.has_more(lambda _: True), "nor on another thread than its own"
+        os.write(ear._write, bytes([signal.SIGTERM]))
+        assert said.get(timeout=10.0) is False
+    finally:
+        signal.set_wakeup_fd(-1)
+
+
+def test_who_closes_the_process_does_not_wait_where_somebody_insists(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    hurries: list[Callable[[], bool]] = []
+    monkeypatch.setattr(traffic, "_closing", False)
+    monkeypatch.setattr(traffic, "drain", lambda _, hurry: hurries.append(hurry))
+    traffic.close_process()
+    assert not hurries[0]()
+    monkeypatch.setattr(traffic, "insists", lambda: True)
+    assert hurries[0]()
 
 
 def test_the_first_process_of_a_container_ends_by_a_signal(start_program: Start) -> None:

@@ -1,0 +1,108 @@
+"""What a line makes of words about a goal that has ended: is there a second server that runs it?
+
+With stand-ins for client, watch and node; tests/scenarios/test_server.py does it with real servers.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus
+
+from bt_actions.ros import line as module
+from bt_actions.ros.line import QUESTIONS, STALE, Line, _Past
+
+GOAL, ONE, OTHER = b"goal", b"one", b"other"
+AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3
+"""Answers to a request to cancel."""
+EXECUTING, SUCCEEDED = GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_SUCCEEDED
+
+
+class OfPast(Line):
+    """A line with a goal that ended at 10.0, and was sent to `sent_to`."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *sent_to: bytes) -> None:
+        said: Any = SimpleNamespace(sent_to=frozenset(sent_to))
+        twin: Any = SimpleNamespace(testimony=said)
+        self.goals = {}
+        self._past = {GOAL: _Past(lambda: None, True, 10.0, twin, said)}
+        self.watch: Any = SimpleNamespace(gids=frozenset({ONE}))
+        self.asked: list[bytes] = []
+        self.client: Any = SimpleNamespace(cancel=self.asked.append)
+        self._generation = module.shared.generation
+        self.comes_in_sight: frozenset[bytes] = frozenset()
+        self.found: list[bytes] = []
+        self.now = 10.1
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
+
+    def _observe(self, now: float) -> None:
+        self.watch.gids |= self.comes_in_sight
+
+    def _found_twice(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
+        self.found.append(goal_id)
+
+
+@pytest.fixture
+def line(monkeypatch: pytest.MonkeyPatch) -> OfPast:
+    return OfPast(monkeypatch, ONE, OTHER)
+
+
+def test_what_may_be_older_than_the_end_is_followed_up_where_there_are_two(line: OfPast) -> None:
+    line.statuses_came({GOAL: EXECUTING})
+    line.feedback_came(GOAL, None)
+    assert line.asked == [GOAL, GOAL]
+    assert not line.found
+    for _ in range(QUESTIONS):
+        line.statuses_came({GOAL: EXECUTING})
+    assert len(line.asked) == QUESTIONS, "of a server's ten"
+
+
+def test_one_server_is_not_asked_what_it_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = OfPast(monkeypatch, ONE)
+    line.statuses_came({GOAL: EXECUTING})
+    assert not line.asked
+    line.comes_in_sight = frozenset({OTHER})
+    line.statuses_came({GOAL: EXECUTING})
+    assert line.asked == [GOAL]
+
+
+@pytest.mark.parametrize("status", [GoalStatus.STATUS_UNKNOWN, SUCCEEDED])
+def test_what_has_ended_is_not_asked_for(line: OfPast, status: int) -> None:
+    line.statuses_came({GOAL: status})
+    line.now = 10.0 + 2 * STALE
+    line.statuses_came({GOAL: status})
+    assert not line.asked
+    assert not line.found
+
+
+def test_the_child_of_a_fork_asks_nothing(line: OfPast) -> None:
+    line._generation += 1
+    line.statuses_came({GOAL: EXECUTING})
+    assert not line.asked
+
+
+def test_a_word_long_after_the_end_is_no_older_one(line: OfPast) -> None:
+    line.now = 10.0 + STALE + 0.1
+    line.statuses_came({GOAL: EXECUTING})
+    line.feedback_came(GOAL, None)
+    assert line.found == [GOAL, GOAL]
+    assert not line.asked
+
+
+@pytest.mark.parametrize(
+    ("answer", "asked", "found"),
+    [
+        (AGREED, 10.5, True),
+        (REFUSED, 10.5, True),
+        (DENIED, 10.5, False),
+        (ENDED, 10.5, False),
+        (AGREED, 9.9, False),  # before it had ended: that is no news
+    ],
+)
+def test_who_agrees_to_cancel_it_or_refuses_runs_it(
+    line: OfPast, answer: int, asked: float, found: bool
+) -> None:
+    line.cancel_answered(GOAL, asked, (ENDED, answer))
+    assert bool(line.found) is found

@@ -1,0 +1,265 @@
+"""What is believed of a goal that has ended, and turns up at another server."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from bt_actions import testimony
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import Event, Now, State
+from bt_actions.policy import End, Timeouts
+from bt_actions.server import SETTLED_AFTER, SLOWEST_START, ServerWatch
+from bt_actions.twin import TwinTestimony
+
+ONE, OTHER, THIRD, NEW = b"one", b"other", b"third", b"new"
+AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3
+"""Answers to a request to cancel."""
+SUCCEEDED, CANCELED, ABORTED, UNKNOWN = (4, "done"), (5, None), (6, "failed"), (0, None)
+"""Answers to a question for the result."""
+
+
+def events(told: testimony.Told) -> list[Event]:
+    return [event for event, _ in told]
+
+
+class Case:
+    """A goal that was sent to some servers, and its twin."""
+
+    def __init__(self, *servers: bytes) -> None:
+        self.watch = ServerWatch()
+        self.sees(0.0, *servers)
+        self.goal = Goal(b"1", "move", Timeouts(), Now(0.0, 0.0))
+        for event in (Event.GRANTED, Event.SERVER_READY):
+            self.goal.on(event, Now(0.0, 0.0))
+        self.said = testimony.Testimony(self.goal)
+        self.said.sent(self.watch)
+
+    def sees(self, now: float, *servers: bytes) -> None:
+        self.watch.observe(now, True, frozenset(servers))
+
+    def twin(self) -> TwinTestimony:
+        """It has turned up at another of the servers in sight, at 1.0."""
+        goal = self.goal.twin(Now(1.0, 1.0))
+        twin = TwinTestimony(goal, self.said, self.said.sent_to)
+        self.watch.two_answered()
+        twin.is_at_another(self.watch, 1.0)
+        goal.on(Event.SERVER_RETURNED, Now(1.0, 1.0))
+        return twin
+
+    def twin_elsewhere(self) -> TwinTestimony:
+        """It may run at those that are out of sight."""
+        twin = TwinTestimony(
+            self.goal.twin(Now(1.0, 1.0)), self.said, self.said.may_run_at(self.watch)
+        )
+        twin.taken_over()
+        return twin
+
+    def looked(self, twin: TwinTestimony, now: float) -> list[Event]:
+        """Let the twin take what is in sight, and tell its goal."""
+        told = twin.looked(self.watch, now)
+        for event, detail in told:
+            twin._goal.on(event, Now(now, now), detail)
+        return events(told)
+
+    def taken_by_both(self, *ends: Any) -> None:
+        """Both have taken the goal, and these ends are told."""
+        self.takes(0.1, self.said.answered(self.watch, 0.1, [True]))
+        self.takes(0.1, self.said.answered(self.watch, 0.1, [True, True]))
+        self.takes(0.3, self.said.finished(self.watch, 0.3, 0.2, ends))
+        assert self.goal.state is State.DONE
+
+    def takes(self, now: float, told: testimony.Told) -> None:
+        """Tell the goal."""
+        for event, detail in told:
+            self.goal.on(event, Now(now, now), detail)
+
+
+@pytest.fixture
+def case() -> Case:
+    """Of a goal that has succeeded at one of two."""
+    case = Case(ONE, OTHER)
+    case.goal.end = End.SUCCEEDED
+    return case
+
+
+@pytest.mark.parametrize("answers", [[SUCCEEDED, CANCELED], [CANCELED, SUCCEEDED]])
+def test_its_end_is_not_that_which_was_told_before(case: Case, answers: list[Any]) -> None:
+    twin = case.twin()
+    assert twin.finished(case.watch, 1.1, 0.9, answers) == [], "asked before the other accepted it"
+    assert twin.finished(case.watch, 1.1, 1.0, [SUCCEEDED]) == [], "the first once more"
+    assert twin.finished(case.watch, 1.2, 1.0, answers) == [(Event.RESULT, CANCELED)]
+    assert twin.finished(case.watch, 1.2, 1.0, [CANCELED]) == [(Event.RESULT, CANCELED)]
+    assert twin.finished(case.watch, 1.2, 1.0, [SUCCEEDED] * 2) == [(Event.RESULT, SUCCEEDED)]
+
+
+def test_a_status_with_the_end_that_was_told_before_is_none_of_it(case: Case) -> None:
+    twin = case.twin()
+    assert twin.shown(case.watch, 4) == []
+    assert twin.shown(case.watch, 3) == [(Event.STATUS, 3)]
+    assert twin.shown(case.watch, 5) == [(Event.STATUS, 5)], "only the other can have said so"
+
+
+def test_it_is_lost_when_only_what_was_told_before_is_left(case: Case) -> None:
+    twin = case.twin()
+    case.looked(twin, 1.1)
+    case.sees(1.5, ONE)
+    assert case.looked(twin, 1.5) == [Event.SERVER_CHANGED], "ask whoever is left"
+    told = twin.finished(case.watch, 1.6, 1.5, [SUCCEEDED])
+    assert events(told) == [Event.SERVER_LOST]
+    twin._goal.on(Event.SERVER_LOST, Now(1.6, 1.6), told[0][1])
+    assert twin._goal.end is End.SERVER_GONE
+    assert twin.finished(case.watch, 1.6, 1.5, [SUCCEEDED]) == []
+    assert case.looked(twin, 1.7) == []
+    case.sees(2.0, ONE, OTHER)
+    assert case.looked(twin, 2.0) == [Event.SERVER_RETURNED]
+    assert twin.finished(case.watch, 2.1, 2.0, [SUCCEEDED]) == []
+    assert twin.finished(case.watch, 2.1, 2.0, [CANCELED]) == [(Event.RESULT, CANCELED)]
+
+
+def test_where_one_is_a_ghost_it_waits_until_that_is_gone(case: Case) -> None:
+    twin = case.twin()
+    case.watch = ServerWatch()
+    case.sees(1.0, ONE, OTHER)
+    case.watch.probe_sent(1.0, 1)
+    case.watch.probe_answered(1.0, 1)
+    now = 1.0 + SLOWEST_START + SETTLED_AFTER
+    case.sees(now, ONE, OTHER)
+    assert case.watch.alone
+    assert twin.finished(case.watch, now, now, [SUCCEEDED]) == [], "of which of the two?"
+    case.sees(now + 20.0, ONE)
+    assert events(twin.finished(case.watch, now + 20.0, now, [SUCCEEDED])) == [Event.SERVER_LOST]
+
+
+def test_what_its_server_has_forgotten_is_denied_but_not_by_a_newcomer(case: Case) -> None:
+    twin = case.twin()
+    told = twin.finished(case.watch, 1.2, 1.1, [SUCCEEDED, UNKNOWN])
+    assert events(told) == [Event.RESULT_UNKNOWN]
+    case.sees(1.3, ONE, OTHER, NEW)
+    assert twin.finished(case.watch, 1.4, 1.3, [SUCCEEDED, UNKNOWN]) == []
+    case.sees(2.0, ONE, NEW)
+    told = twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED, UNKNOWN])
+    assert events(told) == [Event.SERVER_LOST], "it was denied by the newcomer"
+
+
+@pytest.mark.parametrize("said", [AGREED, REFUSED])
+@pytest.mark.parametrize("newcomer", [(), (NEW,)])
+def test_whoever_is_left_and_has_it_to_cancel_tells_its_end(
+    case: Case, said: int, newcomer: tuple[bytes, ...]
+) -> None:
+    twin = case.twin()
+    case.looked(twin, 1.1)
+    case.sees(1.5, OTHER, *newcomer)
+    case.looked(twin, 1.5)
+    twin.canceled(case.watch, 1.5, [said, *([DENIED] if newcomer else [])])
+    case.looked(twin, 1.6)
+    assert twin.finished(case.watch, 1.7, 1.6, [SUCCEEDED]) == []
+    assert case.looked(twin, 1.8) == [Event.RESULT]
+    assert twin._goal.end is End.SUCCEEDED
+
+
+@pytest.mark.parametrize("asked", [1.4, 1.5])
+def test_whoever_has_ended_it_does_not_show_that_it_runs(case: Case, asked: float) -> None:
+    """Nor who was asked to cancel it before the other had gone."""
+    twin = case.twin()
+    case.looked(twin, 1.1)
+    case.sees(1.5, ONE)
+    case.looked(twin, 1.5)
+    twin.canceled(case.watch, asked, [REFUSED if asked < 1.5 else ENDED])
+    case.looked(twin, 1.6)
+    assert events(twin.finished(case.watch, 1.7, 1.6, [SUCCEEDED])) == [Event.SERVER_LOST]
+
+
+def test_who_told_before_and_is_back_is_not_taken_for_who_runs_it(case: Case) -> None:
+    twin = case.twin()
+    case.looked(twin, 1.1)
+    case.sees(2.0, OTHER)
+    case.looked(twin, 2.0)
+    twin.canceled(case.watch, 2.1, [REFUSED])
+    case.looked(twin, 2.2)
+    assert twin.finished(case.watch, 2.3, 2.2, [SUCCEEDED]) == [], "told before it is seen again?"
+    case.sees(2.4, ONE, OTHER)
+    assert Event.RESULT not in case.looked(twin, 2.4)
+    assert twin.finished(case.watch, 2.5, 2.4, [SUCCEEDED]) == []
+    assert Event.RESULT not in case.looked(twin, 2.6)
+    assert twin.finished(case.watch, 2.7, 2.4, [SUCCEEDED, SUCCEEDED]) == [
+        (Event.RESULT, SUCCEEDED)
+    ]
+
+
+def test_who_refuses_just_before_it_is_seen_again_is_not_taken_for_who_is_shown(case: Case) -> None:
+    twin = case.twin()
+    case.looked(twin, 1.1)
+    case.sees(2.0, ONE)
+    case.looked(twin, 2.0)
+    twin.canceled(case.watch, 2.1, [REFUSED])
+    case.sees(2.2, ONE, OTHER)
+    case.looked(twin, 2.2)
+    case.sees(3.0, ONE)
+    case.looked(twin, 3.0)
+    assert events(twin.finished(case.watch, 3.1, 3.0, [SUCCEEDED])) == [Event.SERVER_LOST]
+
+
+@pytest.mark.parametrize("end", [CANCELED, SUCCEEDED])
+def test_the_end_that_was_told_while_the_other_was_out_of_sight_is_not_the_others(end: Any) -> None:
+    case = Case(ONE, OTHER)
+    case.takes(0.1, case.said.answered(case.watch, 0.1, [True]))
+    case.takes(0.1, case.said.answered(case.watch, 0.1, [True, True]))
+    case.sees(0.5, ONE)
+    case.takes(0.5, case.said.looked(case.watch, 0.5))
+    case.takes(0.7, case.said.finished(case.watch, 0.7, 0.6, [end]))
+    twin = case.twin_elsewhere()
+    assert twin.sent_to == {OTHER}
+    case.looked(twin, 1.5)
+    case.sees(2.0, ONE, OTHER)
+    assert case.looked(twin, 2.0) == [Event.SERVER_RETURNED]
+    twin.canceled(case.watch, 2.0, [ENDED, REFUSED])
+    assert twin.finished(case.watch, 2.1, 2.0, [end]) == [], "once more"
+    assert Event.RESULT not in case.looked(twin, 2.2)
+    case.sees(3.0, NEW, OTHER)
+    case.looked(twin, 3.0)
+    assert twin.finished(case.watch, 3.1, 3.0, [UNKNOWN, end]) == []
+    assert case.looked(twin, 3.2) == [Event.RESULT], "whoever told it before has gone"
+
+
+def test_two_ends_that_were_told_are_told_once_more() -> None:
+    case = Case(ONE, OTHER, THIRD)
+    case.taken_by_both(CANCELED, CANCELED, UNKNOWN)
+    twin = case.twin()
+    assert twin.finished(case.watch, 1.1, 1.0, [CANCELED]) == []
+    assert twin.finished(case.watch, 1.1, 1.0, [CANCELED, CANCELED]) == [], "the third runs it"
+    assert twin.finished(case.watch, 1.1, 1.0, [CANCELED] * 3) == [(Event.RESULT, CANCELED)]
+
+
+def test_the_twin_of_a_twin_has_a_third_end(case: Case) -> None:
+    twin = case.twin()
+    case.sees(2.0, ONE, OTHER, THIRD)
+    twin.finished(case.watch, 1.9, 1.8, [CANCELED])
+    third = TwinTestimony(twin._goal.twin(Now(2.0, 2.0)), twin, twin.sent_to)
+    third.is_at_another(case.watch, 2.0)
+    assert third.finished(case.watch, 2.1, 2.0, [SUCCEEDED, CANCELED]) == []
+    told = third.finished(case.watch, 2.1, 2.0, [CANCELED, ABORTED, SUCCEEDED])
+    assert told == [(Event.RESULT, ABORTED)]
+    assert third.shown(case.watch, 5) == [], "by the second"
+
+
+def test_two_more_that_take_it_have_to_tell_two_ends() -> None:
+    case = Case(ONE, OTHER, THIRD)
+    case.goal.end = End.SUCCEEDED
+    twin = case.twin()
+    told = twin.answered(case.watch, 2.0, [True, True, True])
+    assert events(told) == [Event.SERVER_AMBIGUOUS]
+    assert twin.finished(case.watch, 2.1, 2.0, [SUCCEEDED, CANCELED]) == []
+    assert twin.shown(case.watch, 5) == [], "of one of the two"
+    told = twin.finished(case.watch, 2.1, 2.0, [SUCCEEDED, CANCELED, ABORTED])
+    assert told == [(Event.RESULT, ABORTED)]
+
+
+def test_who_has_refused_it_tells_no_end() -> None:
+    case = Case(ONE, OTHER, THIRD)
+    twin = case.twin()
+    twin.answered(case.watch, 1.1, [False, True, True])
+    assert twin.finished(case.watch, 1.3, 1.2, [UNKNOWN, CANCELED]) == [], "the third runs it"
+    told = twin.finished(case.watch, 1.3, 1.2, [UNKNOWN, CANCELED, ABORTED])
+    assert told == [(Event.RESULT, ABORTED)]
