@@ -22,6 +22,7 @@ from bt_actions.cli.common import (
     seconds,
     write,
 )
+from bt_actions.cli.signals import settle
 from bt_actions.suggest import listing
 
 if TYPE_CHECKING:
@@ -79,6 +80,35 @@ def sweep(
     Where not every server of one of the `wanted` actions answers, or none of any action is in
     sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread only.
     """
+    with _Stop() as stop:
+        swept, foreign, unseen = _sweep(stop, look, patience, wanted, namespace)
+        stop.is_told = stop.signal is not None
+        if foreign:
+            note(
+                f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in "
+                "another container, where it cannot be seen whether it is alive (see "
+                "BT_ACTIONS_MACHINE)"
+            )
+        hint = "; start it, or run without --cleanup-first" if wanted else ""
+        code = _tell_what_is_open(swept, unseen, stop.signal, hint, any_will_do=wanted is not None)
+        try:
+            for goal in swept.left:
+                write(_line(goal))
+            if code is Exit.SUCCESS and not swept.left:
+                write(_nothing(swept, "nothing of this machine" if foreign else "nothing"))
+        except (OutputLost, BrokenPipeError):
+            if code is not Exit.UNKNOWN:
+                raise
+            discard_stdout()
+        if wanted is None or code is not Exit.SUCCESS:
+            stop.settle(code)
+    return code
+
+
+def _sweep(
+    stop: _Stop, look: float, patience: float, wanted: Collection[str] | None, namespace: str
+) -> tuple[Swept, list[str], list[str]]:
+    """Look, and cancel; return what was seen, goals of others, and actions that are missing."""
     try:
         from bt_actions.ros.cleanup import CannotStart, cleanup
     except ImportError as error:
@@ -98,37 +128,20 @@ def sweep(
         else:
             note(f"waiting for {listing(names)}, where something may have been left")
 
-    with _Stop() as stop:
-        try:
-            swept = cleanup(
-                look=look,
-                patience=patience,
-                found=found,
-                elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
-                wanted=wanted,
-                namespace=namespace,
-                missing=missing,
-                stopped=lambda: stop.signal is not None,
-            )
-        except CannotStart as error:
-            raise BadInput(f"ROS 2 cannot start: {error}") from error
-    if foreign:
-        note(
-            f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in another "
-            "container, where it cannot be seen whether it is alive (see BT_ACTIONS_MACHINE)"
-        )
-    hint = "; start it, or run without --cleanup-first" if wanted else ""
-    code = _tell_what_is_open(swept, unseen, stop.signal, hint, any_will_do=wanted is not None)
     try:
-        for goal in swept.left:
-            write(_line(goal))
-        if code is Exit.SUCCESS and not swept.left:
-            write(_nothing(swept, "nothing of this machine" if foreign else "nothing"))
-    except (OutputLost, BrokenPipeError):
-        if code is not Exit.UNKNOWN:
-            raise
-        discard_stdout()
-    return code
+        swept = cleanup(
+            look=look,
+            patience=patience,
+            found=found,
+            elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
+            wanted=wanted,
+            namespace=namespace,
+            missing=missing,
+            stopped=lambda: stop.signal is not None,
+        )
+    except CannotStart as error:
+        raise BadInput(f"ROS 2 cannot start: {error}") from error
+    return swept, foreign, unseen
 
 
 def _tell_what_is_open(
@@ -182,8 +195,12 @@ class _Stop:
 
     def __init__(self) -> None:
         self.signal: signal.Signals | None = None
+        self.is_told = False
+        """Whether the user is told of it; one that came too late for that takes effect at the end,
+        unless that is settled."""
         self.leaves_a_goal = False
         self._at = 0.0
+        self._settled = False
         self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
 
     def __enter__(self) -> Self:
@@ -193,8 +210,17 @@ class _Stop:
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self._settled:
+            return
         for number, handler in self._before.items():
             signal.signal(number, handler)
+        if self.signal is not None and not self.is_told:
+            signal.raise_signal(self.signal)
+
+    def settle(self, code: Exit) -> None:
+        """The program ends with this code, whatever comes."""
+        self._settled = True
+        settle(self._before, code)
 
     def _came(self, number: int, _frame: FrameType | None) -> None:
         if self.signal is None:

@@ -12,6 +12,7 @@ import os
 import select
 import signal
 import threading
+from collections.abc import Iterable
 from types import FrameType
 from typing import Any, Self
 
@@ -27,6 +28,13 @@ def _ignore() -> None:
     """What is settled holds while Python takes itself down, too, where it has no handlers."""
     for number in _to_ignore:
         signal.signal(number, signal.SIG_IGN)
+
+
+def settle(numbers: Iterable[signal.Signals], code: int) -> None:
+    """From here on each of these signals ends the program at once, with this exit code."""
+    for number in numbers:
+        signal.signal(number, lambda _number, _frame: os._exit(code))
+    _to_ignore.update(numbers)
 
 
 class Signals:
@@ -65,9 +73,7 @@ class Signals:
     def settle(self, code: int) -> None:
         """It is told how this program ends: from here on a signal ends it at once, and as told."""
         self._settled = True
-        for number in self._before:
-            signal.signal(number, lambda _number, _frame: os._exit(code))
-        _to_ignore.update(self._before)
+        settle(self._before, code)
 
     def poke(self) -> None:
         """Wake the thread that waits; callable from any thread."""

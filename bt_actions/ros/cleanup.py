@@ -175,6 +175,12 @@ class _Sight:
     def __init__(self, node: Node, action: str) -> None:
         self._node = node
         self._action = action
+        # In this order: a server that drops us half-way answers nothing, rather than tell nothing.
+        self._client = node.create_client(
+            CancelGoal,
+            f"{action}/_action/cancel_goal",
+            qos_profile=QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE),
+        )
         self._status = node.create_subscription(
             GoalStatusArray,
             action + STATUS,
@@ -184,11 +190,6 @@ class _Sight:
                 reliability=ReliabilityPolicy.RELIABLE,
                 durability=DurabilityPolicy.TRANSIENT_LOCAL,
             ),
-        )
-        self._client = node.create_client(
-            CancelGoal,
-            f"{action}/_action/cancel_goal",
-            qos_profile=QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE),
         )
 
     def servers(self) -> frozenset[bytes]:
@@ -296,8 +297,8 @@ class _Sweep:
                     until = max(until, now + held)
                 if now - last > STOOD_STILL:
                     self._deadline += now - last
-            last = now
-            self._turn(now)
+            self._turn(still)
+            last = time.monotonic()  # its own work is no standstill
             lacks = self._lacks()
             looking = now < self._deadline and (now < until or bool(lacks))
             if not looking and (self._over or now >= looked + self._patience):
@@ -349,13 +350,17 @@ class _Sweep:
         """Whether every goal that was found has ended."""
         return all(goal.end is not End.UNKNOWN for goal in self._left.values())
 
-    def _turn(self, now: float) -> None:
+    def _turn(self, still: Standstill) -> None:
         """Take all that has come in, then look around, and ask."""
         for action, sight in self._sights.items():
-            for message in sight.statuses():
+            self._hear(action, sight)
+            for message in sight.statuses():  # there may be many, each of thousands of goals
                 self._read(action, message)
-            for number in sight.answers():
-                self._calls[action].answered(number, now)
+                self._hear(action, sight)
+                still.lives(time.monotonic())
+                if self._stopped():
+                    return
+        now = time.monotonic()
         if now - self._glanced_at >= GLANCE:
             self._glanced_at = now
             self._glance(now)
@@ -367,6 +372,10 @@ class _Sweep:
                 if question is not None:
                     call.asked(question, now)
         self._cancel(now)
+
+    def _hear(self, action: str, sight: _Sight) -> None:
+        for number in sight.answers():
+            self._calls[action].answered(number, time.monotonic())
 
     def _glance(self, now: float) -> None:
         """See which actions are in sight, and how many servers each has."""
@@ -383,24 +392,27 @@ class _Sweep:
                 self._sighted(action)
 
     def _read(self, action: str, message: Any) -> None:
+        one_server = len(self._calls[action].servers) <= 1  # or else another may run what has ended
         for entry in message.status_list:
-            goal_id = bytes(entry.goal_info.goal_id.uuid)
+            goal_id, ended = bytes(entry.goal_info.goal_id.uuid), entry.status in ENDS
             left = self._left.get(goal_id)
             if left is not None:
                 left.shown = ENDS.get(entry.status, End.UNKNOWN)
-                continue
-            author = author_of(goal_id)
-            if author is None:
-                continue
-            if entry.status in ENDS:
-                if len(self._calls[action].servers) <= 1:  # or else another may run it
-                    self._minded.pop(goal_id, None)
-            elif author.alive and not author.here:
-                if goal_id not in self._foreign:
-                    self._foreign.add(goal_id)
-                    self._elsewhere(action, goal_id)
-            else:
-                self._minded[goal_id] = action, author
+            elif not ended:
+                self._meet(action, goal_id)
+            elif one_server:
+                self._minded.pop(goal_id, None)
+
+    def _meet(self, action: str, goal_id: bytes) -> None:
+        """See whose goal it is that runs there."""
+        author = author_of(goal_id)
+        if author is None or goal_id in self._foreign:
+            return
+        if author.here:
+            self._minded[goal_id] = action, author
+        else:
+            self._foreign.add(goal_id)
+            self._elsewhere(action, goal_id)
 
     def _find(self) -> None:
         """See who of those that left goals is dead by now: a status comes at a change only."""

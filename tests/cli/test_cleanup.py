@@ -18,7 +18,7 @@ from bt_actions.policy import End
 from bt_actions.ros import cleanup as module
 from bt_actions.ros.cleanup import LeftBehind, Swept
 from tests.cli.conftest import Start
-from tests.support.processes import Journal
+from tests.support.processes import Journal, Process
 from tests.support.waiting import holds_for, until
 
 
@@ -135,4 +135,28 @@ def test_a_second_signal_does_not_wait(
         assert ended == [], "a wrapper has passed on the first"
         assert holds_for(lambda: stop.signal is signal.SIGINT, 1.2 * SAME_WISH)
         signal.raise_signal(signal.SIGINT)
+        stop.is_told = True
     assert ended == [code]
+
+
+def test_a_signal_that_comes_too_late_to_be_told_takes_effect_in_the_end() -> None:
+    """Before a run, say, which is to begin when all is cleaned up."""
+    with pytest.raises(KeyboardInterrupt), _Stop():
+        signal.raise_signal(signal.SIGINT)
+
+
+TOO_LATE = """
+import os, signal, sys
+from bt_actions.cli import main
+from bt_actions.ros import cleanup
+cleanup.cleanup = lambda **_: cleanup.Swept([], [], {}, 7)
+main(["cleanup"])
+os.kill(os.getpid(), signal.SIGTERM)
+signal.pause()
+"""
+
+
+def test_what_was_told_is_the_exit_code_whatever_comes(
+    start_program: Callable[..., Process],
+) -> None:
+    assert start_program("-c", TOO_LATE).wait() == 3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import signal
+import time
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -16,6 +17,7 @@ from bt_actions.policy import End
 from bt_actions.roll_call import RollCall
 from bt_actions.ros import cleanup as module
 from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
+from bt_actions.standstill import Standstill
 from tests.support.processes import HostFactory, Journal, Process
 
 SEND = (
@@ -162,6 +164,25 @@ def test_it_ends_though_new_actions_come_in_sight(
     told: list[str] = []
     swept = cleanup(look=0.2, missing=lambda names, in_vain: told.extend(names if in_vain else ()))
     assert {"/crowd_0", "/crowd_1"} <= set(swept.unknown) == set(told)
+
+
+def test_its_own_work_is_no_standstill_that_gives_it_more_time(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A server publishes thousands of goals at every change of one."""
+    monkeypatch.setattr(module, "LOOK_LONGEST", 2.0)
+    turns: list[None] = []
+
+    def slow_turn(self: Any, still: Standstill) -> None:
+        time.sleep(0.2)
+        still.lives(time.monotonic())
+        time.sleep(0.2)
+        turns.append(None)
+
+    monkeypatch.setattr(module._Sweep, "_turn", slow_turn)
+    _swept, told = sweep(["/nobody"])
+    assert told == ["/nobody"]
+    assert len(turns) < 15
 
 
 def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
