@@ -27,6 +27,7 @@ class TwinTestimony(Testimony):
         self.sent_to = sent_to
         self._told_before = ended.ends_told
         self._tellers = ended.servers
+        self._silent = sent_to  # these have told no end before, unless it turns up
         self._runs_at: frozenset[GID] = frozenset()  # one of these, unless others come in sight
 
     @property
@@ -42,11 +43,16 @@ class TwinTestimony(Testimony):
     def is_at_another(self, watch: ServerWatch, now: float) -> None:
         """It runs at one of the servers that are shown."""
         self.sent(watch)
+        self._silent = frozenset()
         self._accepted_by, self._fresh_since = len(self._told_before) + 1, now
+
+    def may_run_at(self, watch: ServerWatch) -> frozenset[GID]:
+        """Return who may run it though it has ended here; not who may have told its end before."""
+        return super().may_run_at(watch) & self._silent
 
     def canceled(self, watch: ServerWatch, asked: float, answers: Sequence[int]) -> Told:
         """Take an answer to a cancel request: whoever agrees, or refuses, runs it."""
-        if asked >= self._fresh_since and {CANCEL_ACCEPTED, CANCEL_REJECTED}.intersection(answers):
+        if asked >= self._fresh_since and answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
             self._runs_at = self.servers & watch.gids
         return super().canceled(watch, asked, answers)
 

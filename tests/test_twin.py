@@ -152,6 +152,7 @@ def test_whoever_is_left_and_has_it_to_cancel_tells_its_end(
     case.looked(twin, 1.1)
     case.sees(1.5, OTHER, *newcomer)
     case.looked(twin, 1.5)
+    twin.canceled(case.watch, 1.5, [said])
     twin.canceled(case.watch, 1.5, [said, *([DENIED] if newcomer else [])])
     case.looked(twin, 1.6)
     assert twin.finished(case.watch, 1.7, 1.6, [SUCCEEDED]) == []
@@ -221,6 +222,37 @@ def test_the_end_that_was_told_while_the_other_was_out_of_sight_is_not_the_other
     case.looked(twin, 3.0)
     assert twin.finished(case.watch, 3.1, 3.0, [UNKNOWN, end]) == []
     assert case.looked(twin, 3.2) == [Event.RESULT], "whoever told it before has gone"
+
+
+def test_who_refused_before_another_answered_is_not_taken_for_that_one(case: Case) -> None:
+    twin = case.twin()
+    case.looked(twin, 1.1)
+    twin.canceled(case.watch, 1.0, [REFUSED])
+    case.sees(2.0, ONE)
+    twin.canceled(case.watch, 1.0, [REFUSED, ENDED])
+    case.looked(twin, 2.0)
+    assert events(twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED])) == [Event.SERVER_LOST]
+
+
+def test_who_has_told_an_end_does_not_run_it_when_it_is_out_of_sight(case: Case) -> None:
+    """The other has taken it, and canceled it, meanwhile."""
+    twin = case.twin()
+    twin.finished(case.watch, 1.9, 1.8, [CANCELED])
+    case.sees(2.0, OTHER)
+    assert not twin.may_run_at(case.watch)
+
+
+def test_what_all_in_sight_deny_is_denied(case: Case) -> None:
+    """Also by the one that was out of sight when the goal ended."""
+    case.sees(0.5, ONE)
+    case.said.looked(case.watch, 0.5)
+    twin = case.twin_elsewhere()
+    assert twin.sent_to == {OTHER}
+    case.sees(2.0, ONE, OTHER)
+    case.looked(twin, 2.0)
+    assert events(twin.finished(case.watch, 2.1, 2.0, [UNKNOWN])) == []
+    told = twin.finished(case.watch, 2.1, 2.0, [UNKNOWN, UNKNOWN])
+    assert events(told) == [Event.RESULT_UNKNOWN]
 
 
 def test_two_ends_that_were_told_are_told_once_more() -> None:

@@ -111,7 +111,7 @@ class Line:
     def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
         """Pass on an answer to a goal request; see to one that has ended and is accepted again."""
         with lock:
-            ticket = self.goals.get(goal_id)
+            ticket = self._heard_of(goal_id)
             if ticket is not None:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.answered(self.watch, now, answers))
@@ -134,7 +134,7 @@ class Line:
     def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         """Pass on an answer to a cancel request."""
         with lock:
-            ticket = self.goals.get(goal_id)
+            ticket = self._heard_of(goal_id)
             if ticket is not None:
                 self._pass_on(ticket, ticket.testimony.canceled(self.watch, asked, answers))
             elif answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
@@ -147,10 +147,22 @@ class Line:
     ) -> None:
         """Pass on a result."""
         with lock:
-            ticket = self.goals.get(goal_id)
+            ticket = self._heard_of(goal_id)
             if ticket is not None:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.finished(self.watch, now, asked, answers))
+
+    def _heard_of(self, goal_id: bytes) -> Ticket | None:
+        """Return the goal that an answer is about; for a twin it counts who is in sight now."""
+        ticket = self.goals.get(goal_id)
+        if ticket is not None and isinstance(ticket.testimony, TwinTestimony):
+            self._see()
+        return ticket
+
+    def _see(self) -> None:
+        """Observe the server now, and not at the next look; where our node is gone, that tells."""
+        with contextlib.suppress(Exception):
+            self._observe(time.monotonic())
 
     def _pass_on(self, ticket: Ticket, told: Told) -> None:
         for event, detail in told:
@@ -164,8 +176,7 @@ class Line:
         if past is None:
             return
         twin = past.twin
-        with contextlib.suppress(Exception):  # our node is gone; the next look tells
-            self._observe(time.monotonic())
+        self._see()
         if not self._may_be_several(past) and (past.accepted or sum(answers) > 1):
             return  # the acceptance was overtaken by the result, or came twice
         del self._past[goal_id]
@@ -189,8 +200,8 @@ class Line:
 
         To ask it to cancel tells: who has ended a goal neither agrees nor refuses.
         """
+        self._see()
         with contextlib.suppress(Exception):  # our node is gone; the next look tells
-            self._observe(time.monotonic())
             if self._may_be_several(past) and past.questions < QUESTIONS and not self.is_parents:
                 past.questions += 1
                 self.client.cancel(goal_id)
@@ -211,8 +222,8 @@ class Line:
                 if 0 < statuses[goal_id] < STATUS_SUCCEEDED:
                     self._runs_on(goal_id)
             for goal_id in self.goals.keys() & statuses.keys():
-                if statuses[goal_id] > 0:
-                    ticket = self.goals[goal_id]
+                ticket = self._heard_of(goal_id) if statuses[goal_id] > 0 else None
+                if ticket is not None:
                     self._pass_on(ticket, ticket.testimony.shown(self.watch, statuses[goal_id]))
 
     def probe_answered(self, probe: int) -> None:
@@ -366,6 +377,7 @@ class Line:
             keeps_feedback=False,
             feedback=deque(maxlen=1),
         )
+        self._see()
         elsewhere = ticket.testimony.may_run_at(self.watch)
         if elsewhere and not ticket.goal.lost:
             twin.testimony = TwinTestimony(twin.goal, ticket.testimony, elsewhere)

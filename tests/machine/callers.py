@@ -331,6 +331,8 @@ class Caller:
 
     def _answered(self, ticket: Ticket, message: Message) -> None:
         """Pass on an answer with those before it; one that comes twice is the same answer."""
+        if ticket.twin:
+            self._observe(ticket.line)
         testimony, watch, now = ticket.testimony, ticket.line.watch, self._moment()
         by_server = self._answers.setdefault(message.number, {})
         by_server.pop(message.server.gid, None)
@@ -371,6 +373,7 @@ class Caller:
 
     def _keep_in_mind(self, ticket: Ticket) -> None:
         """A second server may have taken it, and has gone."""
+        self._observe(ticket.line)
         elsewhere = ticket.testimony.may_run_at(ticket.line.watch)
         if elsewhere and ticket.goal.sent and not ticket.goal.lost:
             twin = self._twin(ticket)
