@@ -786,16 +786,18 @@ class TestTwice:
         other.freeze()
         runner = TreeRunner(leaf, node=node)
         assert runner.run(30.0) is Status.SUCCESS
-        told = list[Change]()
-        Traffic.of(node).observe(lambda change: told.append(change) if change else None)
+        told = list[Change | None]()
+        Traffic.of(node).observe(told.append)
         other.thaw()
         until(lambda: not leaf.drained, 10.0)
         if loop == "our runner":
             runner.shutdown()
         else:
             runner.tree.shutdown()
+        Traffic.of(node).unobserve(told.append)
         assert "canceled" in of_process(journal, other.pid)
-        assert (told[-1].outcome, told[-1].end) == (Outcome.SERVER_AMBIGUOUS, End.CANCELED)
+        ends = [(change.outcome, change.end) for change in told if change is not None]
+        assert ends[-1] == (Outcome.SERVER_AMBIGUOUS, End.CANCELED)
         assert leaf.drained
         assert runner.unaccounted == []
         runner.shutdown()
