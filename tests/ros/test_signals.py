@@ -143,7 +143,7 @@ with ended_by_signals(lambda *_: None):
         itself(signal.SIGTERM)
     say("something")
 """
-TWO_COME_WHILE_IT_IS_IN_C = """
+IN_C = """
 import ctypes
 heard = threading.Semaphore(0)
 was_heard = signals._Watch._was_heard
@@ -151,10 +151,14 @@ signals._Watch._was_heard = lambda *args: (was_heard(*args), heard.release())
 mutex, c = ctypes.create_string_buffer(64), ctypes.CDLL(None)
 c.pthread_mutex_lock(mutex)
 
-def signals_come():
+def until_it_is_in_c():
     address, syscall = hex(ctypes.addressof(mutex)), f"/proc/self/task/{os.getpid()}/syscall"
     while address not in open(syscall).read():
-        time.sleep(0.01)  # until it is in C
+        time.sleep(0.01)
+"""
+TWO_COME_WHILE_IT_IS_IN_C = f"""{IN_C}
+def signals_come():
+    until_it_is_in_c()
     itself(signal.SIGTERM)
     heard.acquire()
     itself(signal.SIGTERM)
@@ -169,15 +173,7 @@ with ended_by_signals(lambda again, ends_process: True):
     except KeyboardInterrupt:
         say("does not wait")
 """
-
-ONE_MORE_COMES_IN_THE_LAST_WORDS = """
-import ctypes
-heard = threading.Semaphore(0)
-was_heard = signals._Watch._was_heard
-signals._Watch._was_heard = lambda *args: (was_heard(*args), heard.release())
-mutex, c = ctypes.create_string_buffer(64), ctypes.CDLL(None)
-c.pthread_mutex_lock(mutex)
-
+ONE_MORE_COMES_IN_THE_LAST_WORDS = f"""{IN_C}
 def words():
     signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
     say("insists" if signals.insists() else "waits")
@@ -187,9 +183,7 @@ def words():
     say("insists")
 
 def signals_come():
-    address, syscall = hex(ctypes.addressof(mutex)), f"/proc/self/task/{os.getpid()}/syscall"
-    while address not in open(syscall).read():
-        time.sleep(0.01)  # until it is in C
+    until_it_is_in_c()
     for _ in range(3):
         itself(signal.SIGTERM)
         heard.acquire()
