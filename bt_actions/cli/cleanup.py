@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 from bt_actions.cli.common import (
     NO_ROS,
-    SAME_WISH,
     BadInput,
     Exit,
     OutputLost,
@@ -22,7 +21,7 @@ from bt_actions.cli.common import (
     seconds,
     write,
 )
-from bt_actions.cli.signals import settle
+from bt_actions.cli.signals import SAME_WISH, settle
 from bt_actions.suggest import listing
 
 if TYPE_CHECKING:

@@ -39,10 +39,6 @@ class Exit(IntEnum):
     SIGTERM = 143
 
 
-SAME_WISH = 0.25
-"""A second signal within so many seconds is the first one, passed on by a wrapper (uv, a shell)."""
-
-
 class BadInput(Exception):
     """What the user gave cannot be used; the text says what, where and what to do. Exit code 2."""
 

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, NoReturn, Protocol
 
 from py_trees.common import Status
 
-from bt_actions.cli.common import SAME_WISH, Exit, discard_stdout, note
+from bt_actions.cli.common import Exit, discard_stdout, note
 from bt_actions.cli.patient_output import PatientOutput
 from bt_actions.cli.report import Report
-from bt_actions.cli.signals import Signals
+from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import QuietView, View
 from bt_actions.cli.words import Closing
 

@@ -1,7 +1,7 @@
 """SIGINT, SIGTERM, SIGHUP and SIGQUIT as bytes in a pipe, which the main thread reads in its time.
 
 A handler that did more than write a byte could run in the middle of anything, with any lock held.
-Nothing here decides what a signal means.
+Nothing here decides what a signal means, only when a second one is the first.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ from typing import Any, Self
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _MAY_BE_IGNORED = (signal.SIGHUP, signal.SIGQUIT)
+
+SAME_WISH = 0.25
+"""A second signal within so many seconds is the first one, passed on by a wrapper (uv, a shell)."""
 
 
 _to_ignore: set[signal.Signals] = set()

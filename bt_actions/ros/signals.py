@@ -8,7 +8,6 @@ which are set beneath Python's, and of which Python knows nothing.
 from __future__ import annotations
 
 import contextlib
-import inspect
 import os
 import select
 import signal
@@ -16,7 +15,6 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
@@ -48,10 +46,9 @@ TURN = 0.5
 Interrupt = Callable[[bool, bool], bool | None]
 
 
-@contextmanager
 def ended_by_signals(
     interrupt: Interrupt, last_words: Callable[[], object] = lambda: None
-) -> Iterator[None]:
+) -> contextlib.AbstractContextManager[None]:
     """Call `interrupt(again, ends_process)` at a signal; its usual effect comes after the block.
 
     `again` is True from the second signal on: who sends it does not want to wait. `interrupt`
@@ -66,21 +63,51 @@ def ended_by_signals(
     outermost lets the signals take effect. Elsewhere than on the main thread nothing is done,
     because Python handles signals there only.
     """
+    return _Block(_watched(interrupt, last_words))
+
+
+class _Block:
+    """Enters and leaves by the two steps of a generator; its own frames tell who is at an edge.
+
+    A generator, because a handler of the user's may raise before `__exit__` has begun: then ours
+    are taken off when it is collected.
+    """
+
+    def __init__(self, steps: Iterator[None]) -> None:
+        self._steps = steps
+
+    def __enter__(self) -> None:
+        next(self._steps)
+
+    def __exit__(self, *_: object) -> None:
+        next(self._steps, None)
+
+
+_EDGES = (_Block.__enter__.__code__, _Block.__exit__.__code__)
+
+
+def _is_at_an_edge(frame: FrameType | None) -> bool:
+    """Whether a block is being entered or left: what is raised there keeps it from its end."""
+    while frame is not None and frame.f_code not in _EDGES:
+        frame = frame.f_back
+    return frame is not None
+
+
+def _watched(interrupt: Interrupt, last_words: Callable[[], object]) -> Iterator[None]:
+    """Watch for signals from the first step to the second, on the main thread."""
     global _watch
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     if _watch is not None:
-        with _watch.telling(interrupt):
-            yield
+        yield from _watch.telling(interrupt)
         return
     watch = _Watch(last_words)
     spoken = False
     try:
         _watch = watch
         watch.put_on()
-        with watch.telling(interrupt):
-            yield
+        yield from watch.telling(interrupt)
     finally:
         try:
             if spoken := watch.ends_process():
@@ -150,7 +177,6 @@ class _Watch:
         if self._rclpys:
             install_signal_handlers(_OPTIONS[self._rclpys])
 
-    @contextmanager
     def telling(self, interrupt: Interrupt) -> Iterator[None]:
         """Tell `interrupt` of signals meanwhile, and of those that came before."""
         self._interrupts.append(interrupt)
@@ -321,27 +347,6 @@ def insists() -> bool:
     """Whether one more signal has come since this thread, which hears them, says the last words."""
     watch = _watch
     return watch is not None and watch.insists()
-
-
-_EDGES = tuple(
-    getattr(contextlib._GeneratorContextManager, name).__code__  # noqa: SLF001
-    for name in ("__enter__", "__exit__")
-)
-_BLOCK = inspect.unwrap(ended_by_signals).__code__
-
-
-def _is_at_an_edge(frame: FrameType | None) -> bool:
-    """Whether a block of ours is being entered or left: what is raised there keeps it from its end.
-
-    In contextlib, and not in the generator, where it would be in a `try`.
-    """
-    while frame is not None:
-        if frame.f_code in _EDGES:
-            block = frame.f_locals["self"].gen
-            if getattr(block, "gi_code", None) is _BLOCK:
-                return True
-        frame = frame.f_back
-    return False
 
 
 def _nothing(_again: bool, _ends_process: bool) -> bool:

@@ -15,9 +15,9 @@ import pytest
 from py_trees.common import Status
 
 from bt_actions.cli.common import Exit
-from bt_actions.cli.drive import SAME_WISH, Drive, Ended
+from bt_actions.cli.drive import Drive, Ended
 from bt_actions.cli.report import Report
-from bt_actions.cli.signals import Signals
+from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import LineView
 from bt_actions.cli.words import Closing
 from bt_actions.events import Event

@@ -24,9 +24,9 @@ from pathlib import Path
 import pytest
 
 from bt_actions.cli import patient_file
-from bt_actions.cli.drive import SAME_WISH
 from bt_actions.cli.patient_file import PatientFile, gap_text
 from bt_actions.cli.patient_output import PatientOutput
+from bt_actions.cli.signals import SAME_WISH
 from tests.support.processes import PATIENCE, ROOT, Journal
 from tests.support.waiting import holds_for, until
 

@@ -107,6 +107,19 @@ signal.signal(signal.SIGTERM, ours)
 itself(signal.SIGTERM)
 say("goes on")
 """
+ANOTHER_RAISES_BEFORE_ITS_END_BEGINS = """
+def users(frame, *_):
+    if frame.f_code is signals._Block.__exit__.__code__:
+        raise TimeoutError  # as a handler of SIGALRM does
+
+try:
+    with ended_by_signals(lambda *_: False):
+        sys.settrace(users)
+except TimeoutError:
+    say("too late")
+itself(signal.SIGTERM)
+say("goes on")
+"""
 A_SHUTDOWN_THAT_BLOCKS = """
 class Blocks(py_trees.behaviours.Success):
     def shutdown(self):
@@ -203,6 +216,7 @@ with ended_by_signals(lambda *_: True, words):
         (ITS_HANDLER_IS_BUSY, ["the user's"] * 3 + ["goes on"]),
         (ITS_HANDLER_CALLS_OURS, ["the user's"] * 2),
         (ONE_OF_OURS_IS_LEFT, []),
+        (ANOTHER_RAISES_BEFORE_ITS_END_BEGINS, ["too late"]),
         (A_SHUTDOWN_THAT_BLOCKS, ["goes on"]),
         (WORDS_ARE_SAID_TO_THE_END, ["last words"]),
         (IT_HAS_SOMETHING_TO_SAY, ["something"]),
@@ -215,6 +229,7 @@ with ended_by_signals(lambda *_: True, words):
         "busy",
         "chained",
         "left",
+        "raises",
         "blocks",
         "words",
         "said",

@@ -1,7 +1,5 @@
 """Have SIGINT arrive at each opcode of ros/signals.py in turn, and look what it leaves behind.
 
-And of contextlib, which enters its blocks and leaves them.
-
 A program of its own: where a trace function raises, CPython 3.11 loses count of its recursion.
 It is told for which signals rclpy's handlers are in force, how many come in the block before, and
 how many at the opcode; it says how many opcodes there were.
@@ -9,7 +7,6 @@ how many at the opcode; it says how many opcodes there were.
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import sys
 from types import FrameType
@@ -37,11 +34,10 @@ def interrupted_at(opcode: int, before: int, times: int) -> tuple[bool, bool, ob
     While it is raised: whatever its traceback holds is closed later.
     """
     passed, armed = 0, before == 0
-    files = (signals.__file__, contextlib.__file__)
 
     def trace(frame: FrameType, event: str, _: object) -> Any:
         nonlocal passed
-        if frame.f_code.co_filename not in files or frame.f_code.co_name == "_note":
+        if frame.f_code.co_filename != signals.__file__ or frame.f_code.co_name == "_note":
             return None
         frame.f_trace_opcodes = True
         if event == "opcode" and armed:
