@@ -74,7 +74,7 @@ class ServerWatch:
         if since is None or self._both_answered or now < self._not_alone_before:
             return
         if now - since >= SLOWEST_START:
-            self.alone = self._answered_once(now, float("-inf"))
+            self.alone = self._answered_once(now, since)
 
     def stood_still(self, now: float) -> None:
         """Take note that nobody listened for a while: answers of that time are yet to come in."""

@@ -51,7 +51,9 @@ class Testimony:
         self._ended: tuple[int, Any] | None = None
         self._denied_at: float | None = None  # by one that it was not sent to, maybe
         self._asked_at = NEVER
-        self._crowd: frozenset[GID] = frozenset()  # when last looked at, and not known who lives
+        self._in_sight: frozenset[GID] = frozenset()  # just now
+        self._crowd: frozenset[GID] = frozenset()  # the same, where it is not known who lives
+        self._one_left = self._one_came = False  # since the last look
         self._told_of_two = False
         self._ends_told: tuple[End, ...] = ()
         self._fresh_since = NEVER
@@ -72,29 +74,34 @@ class Testimony:
     def sent(self, watch: ServerWatch) -> None:
         """Take note of who is shown when the request goes out, just before and just after."""
         self.sent_to |= watch.gids
+        self._in_sight = watch.gids
         if _is_crowded(watch):
             self._crowd = watch.gids
 
     def taken_over(self) -> None:
         """Another node minds the goal from now on, and has not seen its server yet."""
         self._was_gone = True
-        self._crowd = frozenset()
+        self._one_left = self._one_came = False
+        self._crowd = self._in_sight = frozenset()
 
     def may_run_at(self, watch: ServerWatch) -> frozenset[GID]:
         """Return who may run it though it has ended here: who took it, perhaps, and has gone."""
-        doubtful = len(self.sent_to) > 1 and self._fresh_since > NEVER
-        return self.sent_to - watch.gids if doubtful else frozenset()
+        all_told = len(self.ends_told) >= len(self.servers)
+        doubtful = len(self.servers) > 1 and self._fresh_since > NEVER
+        return self.servers - watch.gids if doubtful and not all_told else frozenset()
 
     # Told by the servers
 
     def answered(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
         """Take an answer to the goal request: accepted or not."""
-        if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:
+        self._note_changes(watch, now)
+        if sum(answers) > 1 and len(self.servers | watch.gids) == 1:
             return []  # by one, twice
-        self._accepted_by = sum(answers)
-        if self._accepted_by:
+        accepted = sum(answers)
+        self._accepted_by = max(self._accepted_by, accepted)
+        if accepted:
             self._refused = False
-        if self._accepted_by > 1:
+        if accepted > 1:
             watch.two_answered()
             self._fresh_since = now
             return [(Event.SERVER_AMBIGUOUS, None)]
@@ -105,24 +112,28 @@ class Testimony:
             return [(Event.SERVER_CHANGED, None)]
         if any(answers):
             return []  # it is refused here, and runs there
-        if len(answers) == 1 and self._may_be_at_two(watch):
+        by_some = len(answers) < len(self.sent_to)
+        if by_some and self._may_be_at_two(watch):
             self._refused = True
             return []
-        if len(answers) == 1 and self._fresh_since > NEVER and len(self.sent_to) > 1:
+        if by_some and self._fresh_since > NEVER:
             return [(Event.SERVER_AMBIGUOUS, None)]  # by the one that is gone?
         return [(Event.REJECTED, None)]
 
-    def canceled(self, watch: ServerWatch, asked: float, answers: Sequence[int]) -> Told:
+    def canceled(
+        self, watch: ServerWatch, now: float, asked: float, answers: Sequence[int]
+    ) -> Told:
         """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal.
 
         A denial by a newcomer counts at once: nothing is sent before it is known who lives, and
         should the goal turn up all the same, it is canceled.
         """
+        self._note_changes(watch, now)
         if answers[-1] == CANCEL_UNKNOWN_GOAL:
             if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
                 return []
-            by_one = len(answers) == 1 and len(self.sent_to) > 1
-            if by_one and (self._may_be_at_two(watch) or asked < self._fresh_since):
+            by_some = len(answers) < _all_in_sight(watch) and len(self.sent_to) > 1
+            if by_some and (self._may_be_at_two(watch) or asked < self._fresh_since):
                 return []
         return [(Event.CANCEL_ANSWERED, answers[-1])]
 
@@ -130,6 +141,7 @@ class Testimony:
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
+        self._note_changes(watch, now)
         status = answers[-1][0]
         ended = [answer for answer in answers if answer[0] in ENDS]
         if ended:
@@ -137,8 +149,7 @@ class Testimony:
             if len(self.sent_to) > 1:
                 if asked < self._fresh_since:
                     return []
-                all_asked = max(2, self._accepted_by, len(watch.gids))  # also newcomers answer
-                if len(answers) < all_asked and self._may_be_at_two(watch):
+                if len(answers) < _all_in_sight(watch) and self._may_be_at_two(watch):
                     self._ended = done
                     return []
             self._ends_told = tuple(ENDS[each[0]] for each in ended)
@@ -148,26 +159,28 @@ class Testimony:
             return [(Event.RESULT, done)]
         if status != 0:  # answered too soon, by a server that is none of rclpy's or rclcpp's
             return [(Event.STATUS, status)]
-        by_each = len(answers) >= max(2, len(watch.gids)) and asked >= self._fresh_since
-        if watch.changed(self.sent_to) and not by_each:
+        by_each = len(answers) >= _all_in_sight(watch)
+        if watch.changed(self.sent_to) and not (by_each and asked >= self._fresh_since):
             if self._denied_at is None:  # by one of several; `looked` finds out what that means
                 self._denied_at = now
             return []
-        by_all = len(answers) > 1 or watch.state(now) is Server.READY
+        by_all = by_each or watch.state(now) is Server.READY
         return [(Event.RESULT_UNKNOWN, None)] if by_all and asked >= self._fresh_since else []
 
-    def shown(self, watch: ServerWatch, status: int) -> Told:
+    def shown(self, watch: ServerWatch, now: float, status: int) -> Told:
         """Take the status that one server publishes of the goal."""
-        self.lives()
+        self.lives(watch, now)
+        self._note_changes(watch, now)
         doubtful = self._may_be_at_two(watch) or self._fresh_since > NEVER
         if status in ENDS and len(self.sent_to) > 1 and doubtful:
             status = STATUS_EXECUTING  # it has ended at one; that it was accepted is sure
         return [(Event.STATUS, status)]
 
-    def lives(self) -> None:
+    def lives(self, watch: ServerWatch, now: float) -> Told:
         """Take feedback, or a status: who has the goal lives, whoever else denies it."""
         if len(self.sent_to) == 1:
             self._denied_at = None
+        return []
 
     # Told by discovery
 
@@ -177,8 +190,9 @@ class Testimony:
         gone = watch.gone(now, self.sent_to)
         returned = self._was_gone and not gone and watch.state(now) is not Server.ABSENT
         self._was_gone = gone or (self._was_gone and not returned)
-        one_left = bool(self._crowd - watch.gids)
-        self._crowd = watch.gids if _is_crowded(watch) else frozenset()
+        self._note_changes(watch, now)
+        one_left, one_came = self._one_left, self._one_came
+        self._one_left = self._one_came = False
         if goal.lost:
             no_ghost = watch.all_live(now) or not watch.changed(self.sent_to)
             is_there = not gone and no_ghost and watch.state(now) is not Server.ABSENT
@@ -195,6 +209,9 @@ class Testimony:
             refused = self._refused
             self._forget(now)
             return [(Event.SERVER_AMBIGUOUS if refused else Event.SERVER_CHANGED, None)]
+        if one_came:
+            self._ended = None
+            return [(Event.SERVER_CHANGED, None)]
         if self._may_be_at_two(watch):
             if not watch.both_live or self._told_of_two:
                 return []
@@ -215,6 +232,16 @@ class Testimony:
             return [(Event.SERVER_CHANGED, None)]
         return []
 
+    def _note_changes(self, watch: ServerWatch, now: float) -> None:
+        """Who has left may have answered what was asked before; who is back was not asked."""
+        crowd = watch.gids if _is_crowded(watch) else frozenset[GID]()
+        left, came = self._crowd - watch.gids, (crowd - self._in_sight) & self.servers
+        if left or came:
+            self._fresh_since = now
+            self._one_left |= bool(left)
+            self._one_came |= bool(came)
+        self._crowd, self._in_sight = crowd, watch.gids
+
     def _forget(self, now: float) -> None:
         self._fresh_since = now
         self._ended = self._denied_at = None
@@ -223,6 +250,11 @@ class Testimony:
     def _may_be_at_two(self, watch: ServerWatch) -> bool:
         """Whether two of the servers that it was sent to are there, as far as is known."""
         return _is_crowded(watch) and len(self.sent_to & watch.gids) > 1
+
+
+def _all_in_sight(watch: ServerWatch) -> int:
+    """Return how many answers one question has when each has answered: newcomers do, too."""
+    return max(2, len(watch.gids))
 
 
 def _is_crowded(watch: ServerWatch) -> bool:

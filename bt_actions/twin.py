@@ -27,7 +27,6 @@ class TwinTestimony(Testimony):
         self.sent_to = sent_to
         self._told_before = ended.ends_told
         self._tellers = ended.servers
-        self._silent = sent_to  # these have told no end before, unless it turns up
         self._runs_at: frozenset[GID] = frozenset()  # one of these, unless others come in sight
 
     @property
@@ -41,53 +40,66 @@ class TwinTestimony(Testimony):
         return (*self._told_before, *super().ends_told)
 
     def is_at_another(self, watch: ServerWatch, now: float) -> None:
-        """It runs at one of the servers that are shown."""
+        """It runs at one of the servers, which may be shown only later."""
         self.sent(watch)
-        self._silent = frozenset()
+        self.sent_to |= self._tellers
         self._accepted_by, self._fresh_since = len(self._told_before) + 1, now
 
-    def may_run_at(self, watch: ServerWatch) -> frozenset[GID]:
-        """Return who may run it though it has ended here; not who may have told its end before."""
-        return super().may_run_at(watch) & self._silent
+    def answered(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
+        """Take an answer to the goal request: a server that is in sight has accepted it, too."""
+        if self._goal.lost and answers[-1]:
+            told = self._turns_up(watch, now)
+            self._accepted_by = max(self._accepted_by, sum(answers))
+            return told
+        return super().answered(watch, now, answers)
 
-    def canceled(self, watch: ServerWatch, asked: float, answers: Sequence[int]) -> Told:
+    def canceled(
+        self, watch: ServerWatch, now: float, asked: float, answers: Sequence[int]
+    ) -> Told:
         """Take an answer to a cancel request: whoever agrees, or refuses, runs it."""
+        self._note_changes(watch, now)
         if asked >= self._fresh_since and answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
+            if self._goal.lost:
+                return self._turns_up(watch, now)
             self._runs_at = self.servers & watch.gids
-        return super().canceled(watch, asked, answers)
+        return super().canceled(watch, now, asked, answers)
 
     def finished(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result; of an end that is no news, nothing."""
-        ended = [answer for answer in answers if answer[0] in ENDS]
-        if not ended:
+        self._note_changes(watch, now)
+        if answers[-1][0] not in (0, *ENDS):
             return super().finished(watch, now, asked, answers)
         if asked < self._fresh_since:
             return []
+        by_each = len(answers) >= len(watch.gids)
+        ended = [answer for answer in answers if answer[0] in ENDS]
         if news := self._news(ended):
-            if len(news) < self._ends_wanted(watch):
+            if len(news) < self._ends_wanted(watch) and not by_each:
                 return []
             self._ends_told = tuple(ENDS[each[0]] for each in news)
             return [(Event.RESULT, news[-1])]
-        if self._is_alone(watch):
+        if ended and self._is_alone(watch):
             self._ended = ended[-1]  # until the next look: another may just have come back
             return []
-        gone = self.sent_to - watch.gids
-        if not gone or self._may_be_at_two(watch):
-            forgotten = len(answers) >= max(2, len(watch.gids))  # by the one that took it, too
-            return [(Event.RESULT_UNKNOWN, None)] if forgotten else []
-        if self._goal.lost:
+        if not by_each or self._goal.lost:
             return []
-        self.sent_to, self._was_gone = gone, True
-        return [(Event.SERVER_LOST, f"{self._goal.server} went away under the goal")]
+        if gone := self.servers - watch.gids:
+            self.sent_to, self._was_gone = gone, True
+            return [(Event.SERVER_LOST, f"{self._goal.server} went away under the goal")]
+        return [(Event.RESULT_UNKNOWN, None)]  # denied, also by the one that took it
 
-    def shown(self, watch: ServerWatch, status: int) -> Told:
+    def shown(self, watch: ServerWatch, now: float, status: int) -> Told:
         """Take the status that one server publishes of the goal; not that of who told it before."""
         if status not in ENDS:
-            return super().shown(watch, status)
+            return [*self.lives(watch, now), (Event.STATUS, status)]
         is_news = ENDS[status] not in self._told_before and self._ends_wanted(watch) == 1
         return [(Event.STATUS, status)] if is_news else []
+
+    def lives(self, watch: ServerWatch, now: float) -> Told:
+        """Take feedback, or a status: if it was out of sight, another one has it, too."""
+        return self._turns_up(watch, now) if self._goal.lost else []
 
     def looked(self, watch: ServerWatch, now: float) -> Told:
         """Take what discovery shows now: it may show that one is the only one left."""
@@ -98,6 +110,10 @@ class TwinTestimony(Testimony):
         if not self._is_alone(watch):
             self._ended = None
         return super().looked(watch, now)
+
+    def _turns_up(self, watch: ServerWatch, now: float) -> Told:
+        self.is_at_another(watch, now)
+        return [(Event.SERVER_RETURNED, None)]
 
     def _news(self, ended: list[tuple[int, Any]]) -> list[tuple[int, Any]]:
         """Return the answers that tell an end once more than it was told before."""
@@ -117,4 +133,5 @@ class TwinTestimony(Testimony):
 
     def _is_alone(self, watch: ServerWatch) -> bool:
         """Whether only that server is in sight that runs it: nobody who has told its end before."""
-        return len(self.sent_to) == 1 and self.servers & watch.gids == self.sent_to
+        alone = len(self.sent_to) == 1 and self.servers & watch.gids == self.sent_to
+        return alone and self.servers != self.sent_to

@@ -22,6 +22,7 @@ def watch() -> ServerWatch:
 
 def crowd(watch: ServerWatch, at: float = 1.0) -> ServerWatch:
     watch.observe(at, True, gids(OLD, NEW))
+    watch.probe_sent(at, 1)
     return watch
 
 
@@ -109,6 +110,14 @@ def test_who_answers_is_alone_only_where_a_later_probe_shows_it(watch: ServerWat
     assert watch.alone_since(9.6 + SETTLED_AFTER, denied_at)
     watch.probe_answered(9.7 + SETTLED_AFTER, 3)
     assert not watch.alone_since(9.9 + SETTLED_AFTER, denied_at)
+
+
+def test_who_was_asked_before_another_came_is_not_alone_by_that(watch: ServerWatch) -> None:
+    watch.probe_sent(0.9, 2)
+    crowd(watch).probe_answered(1.1, 2)
+    for moment in (1.2, 1.2 + SLOWEST_START):
+        watch.observe(moment, True, gids(OLD, NEW))
+    assert watch.state(1.2 + SLOWEST_START) is Server.SETTLING
 
 
 def test_what_is_shown_beyond_the_lease_is_a_server(watch: ServerWatch) -> None:

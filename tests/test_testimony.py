@@ -29,16 +29,21 @@ def watch() -> ServerWatch:
     return seen
 
 
-@pytest.fixture
-def said(watch: ServerWatch) -> testimony.Testimony:
-    """Of a goal that was sent while a second server opened."""
+def sent(watch: ServerWatch) -> testimony.Testimony:
+    """Return what is believed of a goal that is sent to who is in sight."""
     goal = Goal(b"1", "move", Timeouts(), Now(0.0, 0.0))
     for event in (Event.GRANTED, Event.SERVER_READY):
         goal.on(event, Now(0.0, 0.0))
     said = testimony.Testimony(goal)
-    watch.observe(0.0, True, BOTH)
     said.sent(watch)
     return said
+
+
+@pytest.fixture
+def said(watch: ServerWatch) -> testimony.Testimony:
+    """Of a goal that was sent while a second server opened."""
+    watch.observe(0.0, True, BOTH)
+    return sent(watch)
 
 
 def alone(watch: ServerWatch) -> float:
@@ -51,14 +56,23 @@ def alone(watch: ServerWatch) -> float:
     return now
 
 
-def test_one_server_is_believed_at_once(said: testimony.Testimony, watch: ServerWatch) -> None:
-    watch.observe(0.0, True, frozenset({ONE}))
+def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
+    said = sent(watch)
     assert said.answered(watch, 0.0, [True]) == [(Event.ACCEPTED, None)]
     assert said.answered(watch, 0.0, [False]) == [(Event.REJECTED, None)]
-    assert said.canceled(watch, 0.0, [DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
+    assert said.canceled(watch, 0.0, 0.0, [DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
     assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
     assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == [(Event.RESULT_UNKNOWN, None)]
     assert said.finished(watch, 0.0, 0.0, [(2, None)]) == [(Event.STATUS, 2)]
+
+
+def test_what_was_asked_before_one_has_left_may_be_its_word(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(1.0, True, frozenset({ONE}))
+    assert said.finished(watch, 1.1, 0.9, [SUCCEEDED]) == []
+    assert events(said.looked(watch, 1.2)) == [Event.SERVER_CHANGED], "ask who is left"
+    assert said.finished(watch, 1.3, 1.2, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
 
 
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
@@ -159,10 +173,10 @@ def test_what_was_asked_before_both_had_it_does_not_count(
 
 
 def test_what_one_denies_the_other_may_have(said: testimony.Testimony, watch: ServerWatch) -> None:
-    assert said.canceled(watch, 0.0, [DENIED]) == []
-    assert said.canceled(watch, 0.0, [DENIED, CANCELED]) == [(Event.CANCEL_ANSWERED, CANCELED)]
-    assert said.canceled(watch, 0.0, [CANCELED, DENIED]) == []
-    assert said.canceled(watch, 0.0, [DENIED, DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
+    assert said.canceled(watch, 0.0, 0.0, [DENIED]) == []
+    assert said.canceled(watch, 0.0, 0.0, [DENIED, CANCELED]) == [(Event.CANCEL_ANSWERED, CANCELED)]
+    assert said.canceled(watch, 0.0, 0.0, [CANCELED, DENIED]) == []
+    assert said.canceled(watch, 0.0, 0.0, [DENIED, DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
     assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == []
     assert events(said.finished(watch, 0.0, 0.0, [UNKNOWN, UNKNOWN])) == [Event.RESULT_UNKNOWN]
 
@@ -245,13 +259,15 @@ def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
 def test_the_status_of_one_of_two_shows_no_end(
     said: testimony.Testimony, watch: ServerWatch
 ) -> None:
-    assert said.shown(watch, 5) == [(Event.STATUS, 2)]
+    assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 2)]
     said.looked(watch, 0.0)
     watch.observe(1.0, True, frozenset({ONE}))
     said.looked(watch, 1.0)
-    assert said.shown(watch, 5) == [(Event.STATUS, 2)], "it may be that of the one that has gone"
+    assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 2)], (
+        "it may be that of the one that has gone"
+    )
     said.sent_to = frozenset({ONE})
-    assert said.shown(watch, 5) == [(Event.STATUS, 5)]
+    assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 5)]
 
 
 def test_who_gives_feedback_lives_whoever_denies_the_goal(
@@ -261,7 +277,7 @@ def test_who_gives_feedback_lives_whoever_denies_the_goal(
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
     said.looked(watch, 0.0)
     said.finished(watch, 0.0, 0.0, [UNKNOWN])
-    said.lives()
+    said.lives(watch, 0.2)
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_CHANGED]
 
 
@@ -275,12 +291,42 @@ def test_what_ended_at_one_may_run_at_the_other_that_has_gone(
     assert said.may_run_at(watch) == {OTHER}
 
 
-def test_three_that_accept_it_have_to_tell_three_ends(
-    said: testimony.Testimony, watch: ServerWatch
-) -> None:
+def test_all_three_in_sight_have_to_tell(said: testimony.Testimony, watch: ServerWatch) -> None:
+    watch.observe(0.0, True, BOTH | {b"third"})
+    said.sent(watch)
     said.answered(watch, 0.1, [True, True, True])
     assert said.finished(watch, 0.3, 0.2, [ABORTED, ABORTED]) == []
     assert said.finished(watch, 0.3, 0.2, [ABORTED, ABORTED, ABORTED]) == [(Event.RESULT, ABORTED)]
+    assert said.canceled(watch, 0.2, 0.2, [DENIED, DENIED]) == [], "the third runs it"
+    assert said.finished(watch, 0.3, 0.2, [UNKNOWN, UNKNOWN]) == []
+    watch.observe(1.0, True, BOTH)
+    assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED]
+    assert said.finished(watch, 1.2, 1.1, [ABORTED, ABORTED]) == [(Event.RESULT, ABORTED)]
+
+
+def test_it_is_refused_when_all_that_it_was_sent_to_have_refused_it(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(0.0, True, BOTH | {b"third"})
+    said.sent(watch)
+    assert said.answered(watch, 0.1, [False]) == []
+    assert said.answered(watch, 0.1, [False, False]) == []
+    assert said.answered(watch, 0.1, [False] * 3) == [(Event.REJECTED, None)]
+    assert said.answered(watch, 0.1, [False, False]) == []
+    watch.observe(1.0, True, BOTH)
+    assert events(said.looked(watch, 1.0)) == [Event.SERVER_AMBIGUOUS], "who has gone may have it"
+
+
+def test_who_is_back_is_asked_and_what_was_asked_before_is_not_all(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(1.0, True, frozenset({ONE}))
+    said.looked(watch, 1.0)
+    watch.observe(2.0, True, BOTH)
+    assert said.finished(watch, 2.1, 1.5, [ABORTED]) == []
+    assert events(said.looked(watch, 2.2)) == [Event.SERVER_CHANGED]
+    assert said.finished(watch, 2.4, 2.3, [ABORTED]) == []
+    assert said.finished(watch, 2.4, 2.3, [ABORTED, ABORTED])[-1] == (Event.RESULT, ABORTED)
 
 
 def test_what_was_said_before_a_loss_is_of_no_account_after_it(

@@ -96,9 +96,9 @@ def test_its_end_is_not_that_which_was_told_before(case: Case, answers: list[Any
 
 def test_a_status_with_the_end_that_was_told_before_is_none_of_it(case: Case) -> None:
     twin = case.twin()
-    assert twin.shown(case.watch, 4) == []
-    assert twin.shown(case.watch, 3) == [(Event.STATUS, 3)]
-    assert twin.shown(case.watch, 5) == [(Event.STATUS, 5)], "only the other can have said so"
+    assert twin.shown(case.watch, 1.2, 4) == []
+    assert twin.shown(case.watch, 1.2, 3) == [(Event.STATUS, 3)]
+    assert twin.shown(case.watch, 1.2, 5) == [(Event.STATUS, 5)], "only the other can have said so"
 
 
 def test_it_is_lost_when_only_what_was_told_before_is_left(case: Case) -> None:
@@ -139,6 +139,7 @@ def test_what_its_server_has_forgotten_is_denied_but_not_by_a_newcomer(case: Cas
     case.sees(1.3, ONE, OTHER, NEW)
     assert twin.finished(case.watch, 1.4, 1.3, [SUCCEEDED, UNKNOWN]) == []
     case.sees(2.0, ONE, NEW)
+    assert case.looked(twin, 2.0) == [Event.SERVER_CHANGED]
     told = twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED, UNKNOWN])
     assert events(told) == [Event.SERVER_LOST], "it was denied by the newcomer"
 
@@ -152,8 +153,8 @@ def test_whoever_is_left_and_has_it_to_cancel_tells_its_end(
     case.looked(twin, 1.1)
     case.sees(1.5, OTHER, *newcomer)
     case.looked(twin, 1.5)
-    twin.canceled(case.watch, 1.5, [said])
-    twin.canceled(case.watch, 1.5, [said, *([DENIED] if newcomer else [])])
+    twin.canceled(case.watch, 1.5, 1.5, [said])
+    twin.canceled(case.watch, 1.5, 1.5, [said, *([DENIED] if newcomer else [])])
     case.looked(twin, 1.6)
     assert twin.finished(case.watch, 1.7, 1.6, [SUCCEEDED]) == []
     assert case.looked(twin, 1.8) == [Event.RESULT]
@@ -167,7 +168,7 @@ def test_whoever_has_ended_it_does_not_show_that_it_runs(case: Case, asked: floa
     case.looked(twin, 1.1)
     case.sees(1.5, ONE)
     case.looked(twin, 1.5)
-    twin.canceled(case.watch, asked, [REFUSED if asked < 1.5 else ENDED])
+    twin.canceled(case.watch, 1.5, asked, [REFUSED if asked < 1.5 else ENDED])
     case.looked(twin, 1.6)
     assert events(twin.finished(case.watch, 1.7, 1.6, [SUCCEEDED])) == [Event.SERVER_LOST]
 
@@ -177,7 +178,7 @@ def test_who_told_before_and_is_back_is_not_taken_for_who_runs_it(case: Case) ->
     case.looked(twin, 1.1)
     case.sees(2.0, OTHER)
     case.looked(twin, 2.0)
-    twin.canceled(case.watch, 2.1, [REFUSED])
+    twin.canceled(case.watch, 2.1, 2.1, [REFUSED])
     case.looked(twin, 2.2)
     assert twin.finished(case.watch, 2.3, 2.2, [SUCCEEDED]) == [], "told before it is seen again?"
     case.sees(2.4, ONE, OTHER)
@@ -194,7 +195,7 @@ def test_who_refuses_just_before_it_is_seen_again_is_not_taken_for_who_is_shown(
     case.looked(twin, 1.1)
     case.sees(2.0, ONE)
     case.looked(twin, 2.0)
-    twin.canceled(case.watch, 2.1, [REFUSED])
+    twin.canceled(case.watch, 2.1, 2.1, [REFUSED])
     case.sees(2.2, ONE, OTHER)
     case.looked(twin, 2.2)
     case.sees(3.0, ONE)
@@ -215,7 +216,7 @@ def test_the_end_that_was_told_while_the_other_was_out_of_sight_is_not_the_other
     case.looked(twin, 1.5)
     case.sees(2.0, ONE, OTHER)
     assert case.looked(twin, 2.0) == [Event.SERVER_RETURNED]
-    twin.canceled(case.watch, 2.0, [ENDED, REFUSED])
+    twin.canceled(case.watch, 2.0, 2.0, [ENDED, REFUSED])
     assert twin.finished(case.watch, 2.1, 2.0, [end]) == [], "once more"
     assert Event.RESULT not in case.looked(twin, 2.2)
     case.sees(3.0, NEW, OTHER)
@@ -227,9 +228,9 @@ def test_the_end_that_was_told_while_the_other_was_out_of_sight_is_not_the_other
 def test_who_refused_before_another_answered_is_not_taken_for_that_one(case: Case) -> None:
     twin = case.twin()
     case.looked(twin, 1.1)
-    twin.canceled(case.watch, 1.0, [REFUSED])
+    twin.canceled(case.watch, 1.0, 1.0, [REFUSED])
     case.sees(2.0, ONE)
-    twin.canceled(case.watch, 1.0, [REFUSED, ENDED])
+    twin.canceled(case.watch, 1.0, 1.0, [REFUSED, ENDED])
     case.looked(twin, 2.0)
     assert events(twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED])) == [Event.SERVER_LOST]
 
@@ -273,7 +274,7 @@ def test_the_twin_of_a_twin_has_a_third_end(case: Case) -> None:
     assert third.finished(case.watch, 2.1, 2.0, [SUCCEEDED, CANCELED]) == []
     told = third.finished(case.watch, 2.1, 2.0, [CANCELED, ABORTED, SUCCEEDED])
     assert told == [(Event.RESULT, ABORTED)]
-    assert third.shown(case.watch, 5) == [], "by the second"
+    assert third.shown(case.watch, 1.2, 5) == [], "by the second"
 
 
 def test_two_more_that_take_it_have_to_tell_two_ends() -> None:
@@ -283,7 +284,7 @@ def test_two_more_that_take_it_have_to_tell_two_ends() -> None:
     told = twin.answered(case.watch, 2.0, [True, True, True])
     assert events(told) == [Event.SERVER_AMBIGUOUS]
     assert twin.finished(case.watch, 2.1, 2.0, [SUCCEEDED, CANCELED]) == []
-    assert twin.shown(case.watch, 5) == [], "of one of the two"
+    assert twin.shown(case.watch, 1.2, 5) == [], "of one of the two"
     told = twin.finished(case.watch, 2.1, 2.0, [SUCCEEDED, CANCELED, ABORTED])
     assert told == [(Event.RESULT, ABORTED)]
 
@@ -295,3 +296,52 @@ def test_who_has_refused_it_tells_no_end() -> None:
     assert twin.finished(case.watch, 1.3, 1.2, [UNKNOWN, CANCELED]) == [], "the third runs it"
     told = twin.finished(case.watch, 1.3, 1.2, [UNKNOWN, CANCELED, ABORTED])
     assert told == [(Event.RESULT, ABORTED)]
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        lambda twin, watch: twin.answered(watch, 2.1, [True, True]),
+        lambda twin, watch: twin.canceled(watch, 2.1, 2.0, [DENIED, REFUSED]),
+        lambda twin, watch: twin.shown(watch, 2.1, 2)[:1],
+        lambda twin, watch: twin.lives(watch, 2.1),
+    ],
+    ids=["accepts", "refuses to cancel", "status", "feedback"],
+)
+def test_another_has_it_too_while_the_one_that_may_run_it_is_out_of_sight(word: Any) -> None:
+    case = Case(ONE, OTHER, THIRD)
+    case.goal.end = End.SUCCEEDED
+    case.sees(0.5, ONE, THIRD)
+    case.said.looked(case.watch, 0.5)
+    twin = case.twin_elsewhere()
+    assert twin.sent_to == {OTHER}
+    case.looked(twin, 1.5)
+    assert events(word(twin, case.watch)) == [Event.SERVER_RETURNED]
+    assert twin.sent_to == {ONE, OTHER, THIRD}
+    twin._goal.on(Event.SERVER_RETURNED, Now(2.1, 2.1))
+    told = twin.finished(case.watch, 2.3, 2.2, [SUCCEEDED, CANCELED])
+    assert told == [(Event.RESULT, CANCELED)]
+    assert twin.may_run_at(case.watch) == {OTHER}, "whose end has not been told yet"
+
+
+def test_what_is_gone_may_have_it_though_all_in_sight_deny_it() -> None:
+    case = Case(ONE, OTHER, THIRD)
+    case.goal.end = End.SUCCEEDED
+    twin = case.twin()
+    case.sees(2.0, ONE, OTHER)
+    assert case.looked(twin, 2.0) == [Event.SERVER_CHANGED]
+    assert twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED]) == []
+    assert events(twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED, UNKNOWN])) == [Event.SERVER_LOST]
+    assert twin.sent_to == {THIRD}
+
+
+def test_the_end_of_the_one_server_there_is_told_once() -> None:
+    """Its acceptance came after the result, and when another server had opened."""
+    case = Case(ONE)
+    case.goal.end = End.SUCCEEDED
+    case.sees(1.0, ONE, NEW)
+    twin = case.twin()
+    case.sees(2.0, ONE)
+    case.looked(twin, 2.0)
+    twin.sent_to = frozenset({ONE})
+    assert events(twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED])) == [Event.RESULT_UNKNOWN]

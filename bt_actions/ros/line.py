@@ -1,25 +1,20 @@
 """One action server as one node sees it: the shared client, the watch, and the goals on it.
 
 Takes what the server says and what discovery shows, tells the goals, and does what they say. It
-decides nothing about a goal (goal.py), about who is alive (server.py), or about what is believed
-(testimony.py). All under the one lock.
+decides nothing about a goal (goal.py), about who is alive (server.py), about what is believed
+(testimony.py), or about goals that have ended (past.py). All under the one lock.
 """
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 import time
-import weakref
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goal_terms import (
-    CANCEL_ACCEPTED,
-    CANCEL_REJECTED,
     STATUS_SUCCEEDED,
     Command,
     Event,
@@ -27,16 +22,16 @@ from bt_actions.goal_terms import (
 )
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
-from bt_actions.ros.action_client import GOALS_KEPT, ActionClient
+from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
+from bt_actions.ros.past import Past
 from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
-from bt_actions.twin import TwinTestimony
 
 if TYPE_CHECKING:
     from bt_actions.ros.traffic import Traffic
@@ -49,10 +44,6 @@ PUMP_EVERY = 0.01
 its return would matter. The last: between two takes of answers by the alarm, where nobody spins."""
 LATE = 0.5
 """Seconds by which a look is so late that answers may have come in between, unseen."""
-STALE = 2.0
-"""Seconds after a goal's end within which an older word of its server may still arrive."""
-QUESTIONS = 5
-"""So many of these words, at most, are followed up."""
 SILENT_FOR = 40.0
 """Seconds without any answer until goals whose node is gone are left to whoever can see whether
 their server is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
@@ -62,20 +53,6 @@ that came back with it; 0.5 measured."""
 FEEDBACK = "/_action/feedback"
 
 _probes = itertools.count(1)
-
-
-@dataclass(slots=True)
-class _Past:
-    """A goal that is DONE, and may turn up at a second server."""
-
-    owner: Callable[[], Any]
-    """A weak reference to the leaf."""
-    accepted: bool
-    since: float
-    twin: Ticket
-    said: TwinTestimony
-    questions: int = 0
-    """Asked in doubt."""
 
 
 class Line:
@@ -98,7 +75,7 @@ class Line:
         """Since when a server of this name has been shown without a break that was seen."""
         self._just_came = True
         self._last_probes: deque[int] = deque()
-        self._past: dict[bytes, _Past] = {}
+        self.past = Past(self)
         self._warned_crowd = False
         self._warned_of: set[str] = set()
         self._adopt()
@@ -116,16 +93,16 @@ class Line:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.answered(self.watch, now, answers))
             elif answers[-1]:
-                self._found_twice(goal_id, answers)
+                self.past.accepted(goal_id, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
         with lock:
             ticket = self.goals.get(goal_id)
             if ticket is None:
-                self._runs_on(goal_id)
+                self.past.runs(goal_id)
                 return
-            ticket.testimony.lives()
+            self._pass_on(ticket, ticket.testimony.lives(self.watch, time.monotonic()))
             self.tell(ticket, Event.FEEDBACK, feedback)
             if ticket.keeps_feedback:
                 ticket.feedback.append(feedback)
@@ -136,11 +113,10 @@ class Line:
         with lock:
             ticket = self._heard_of(goal_id)
             if ticket is not None:
-                self._pass_on(ticket, ticket.testimony.canceled(self.watch, asked, answers))
-            elif answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
-                past = self._past.get(goal_id)
-                if past is not None and asked > past.since:
-                    self._found_twice(goal_id, (True,))
+                now, said = time.monotonic(), ticket.testimony
+                self._pass_on(ticket, said.canceled(self.watch, now, asked, answers))
+            else:
+                self.past.cancel_answered(goal_id, asked, answers[-1])
 
     def result_came(
         self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
@@ -153,13 +129,13 @@ class Line:
                 self._pass_on(ticket, said.finished(self.watch, now, asked, answers))
 
     def _heard_of(self, goal_id: bytes) -> Ticket | None:
-        """Return the goal that an answer is about; for a twin it counts who is in sight now."""
+        """Return the goal that an answer is about; of one of several it counts who is in sight."""
         ticket = self.goals.get(goal_id)
-        if ticket is not None and isinstance(ticket.testimony, TwinTestimony):
-            self._see()
+        if ticket is not None and len(ticket.testimony.servers) > 1:
+            self.see()
         return ticket
 
-    def _see(self) -> None:
+    def see(self) -> None:
         """Observe the server now, and not at the next look; where our node is gone, that tells."""
         with contextlib.suppress(Exception):
             self._observe(time.monotonic())
@@ -170,45 +146,6 @@ class Line:
                 self.tell(ticket, Event.REPLACED)  # this has overtaken the rival's acceptance
             self.tell(ticket, event, detail)
 
-    def _found_twice(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        """A second server has accepted a goal that has ended here: it is to cancel it."""
-        past = self._past.get(goal_id)
-        if past is None:
-            return
-        twin = past.twin
-        self._see()
-        if not self._may_be_several(past) and (past.accepted or sum(answers) > 1):
-            return  # the acceptance was overtaken by the result, or came twice
-        del self._past[goal_id]
-        twin.owner = past.owner()
-        self.watch.two_answered()
-        past.said.is_at_another(self.watch, time.monotonic())
-        self.goals[goal_id] = twin
-        alarm.mind(self)
-        self.tell(twin, Event.SERVER_RETURNED)
-
-    def _runs_on(self, goal_id: bytes) -> None:
-        """A server runs a goal that has ended here, unless this is older than the end."""
-        past = self._past.get(goal_id)
-        if past is not None and time.monotonic() - past.since > STALE:
-            self._found_twice(goal_id, (True,))
-        elif past is not None:
-            self._doubt_end(goal_id, past)
-
-    def _doubt_end(self, goal_id: bytes, past: _Past) -> None:
-        """What seems to be older than a goal's end may be all that a second server ever says.
-
-        To ask it to cancel tells: who has ended a goal neither agrees nor refuses.
-        """
-        self._see()
-        with contextlib.suppress(Exception):  # our node is gone; the next look tells
-            if self._may_be_several(past) and past.questions < QUESTIONS and not self.is_parents:
-                past.questions += 1
-                self.client.cancel(goal_id)
-
-    def _may_be_several(self, past: _Past) -> bool:
-        return len(past.twin.testimony.sent_to | self.watch.gids) > 1
-
     def _rival_sent(self, ticket: Ticket) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
         holders = self.traffic.domain.resources.holders(ticket.goal.resources)
@@ -218,13 +155,15 @@ class Line:
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
         with lock:
-            for goal_id in self._past.keys() & statuses.keys() - self.goals.keys():
+            for goal_id in statuses.keys() - self.goals.keys():
                 if 0 < statuses[goal_id] < STATUS_SUCCEEDED:
-                    self._runs_on(goal_id)
+                    self.past.runs(goal_id)
             for goal_id in self.goals.keys() & statuses.keys():
-                ticket = self._heard_of(goal_id) if statuses[goal_id] > 0 else None
+                status = statuses[goal_id]
+                ticket = self._heard_of(goal_id) if status > 0 else None
                 if ticket is not None:
-                    self._pass_on(ticket, ticket.testimony.shown(self.watch, statuses[goal_id]))
+                    now, said = time.monotonic(), ticket.testimony
+                    self._pass_on(ticket, said.shown(self.watch, now, status))
 
     def probe_answered(self, probe: int) -> None:
         """Pass on the answer to a probe."""
@@ -362,37 +301,12 @@ class Line:
         if self.goals.get(goal.id) is ticket:  # and not its twin
             del self.goals[goal.id]
             self.client.forget(goal.id)
-            if goal.sent and goal.state is State.DONE and ticket.owner is not None:
-                self._keep_in_mind(ticket)
+            if goal.sent and goal.state is State.DONE:
+                self.past.keep(ticket)
         if not self.goals:
             alarm.forget(self)
             self._look_at = 0.0  # no look is due any more, and none will be late
             self.traffic.drop_if_unused(self)
-
-    def _keep_in_mind(self, ticket: Ticket) -> None:
-        """A goal is DONE, but a second server may have taken it: it may turn up there."""
-        twin = dataclasses.replace(
-            ticket,
-            goal=ticket.goal.twin(self.traffic.clocks.now()),
-            keeps_feedback=False,
-            feedback=deque(maxlen=1),
-        )
-        self._see()
-        elsewhere = ticket.testimony.may_run_at(self.watch)
-        if elsewhere and not ticket.goal.lost:
-            twin.testimony = TwinTestimony(twin.goal, ticket.testimony, elsewhere)
-            twin.testimony.taken_over()
-            self.goals[twin.goal.id] = twin
-            return
-        twin.owner = None
-        said = TwinTestimony(twin.goal, ticket.testimony, ticket.testimony.sent_to)
-        twin.testimony = said
-        owner = weakref.ref(ticket.owner)
-        self._past[twin.goal.id] = _Past(owner, ticket.goal.accepted, time.monotonic(), twin, said)
-        if len(self._past) > GOALS_KEPT:
-            oldest = next(iter(self._past))
-            del self._past[oldest]
-            self.client.forget(oldest)
 
     def _in_use(self, ticket: Ticket) -> str:
         """Say who has what the goal waited for, where that is a goal that was given up."""

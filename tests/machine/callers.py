@@ -322,10 +322,11 @@ class Caller:
 
     def _take(self, ticket: Ticket, message: Message) -> None:
         if message.kind == "feedback":
-            ticket.testimony.lives()
+            self._pass_on(ticket, ticket.testimony.lives(ticket.line.watch, self._moment()))
             self.tell(ticket, Event.FEEDBACK, message.detail)
         elif message.kind == "status":
-            self._pass_on(ticket, ticket.testimony.shown(ticket.line.watch, message.detail))
+            said, now = ticket.testimony, self._moment()
+            self._pass_on(ticket, said.shown(ticket.line.watch, now, message.detail))
         else:
             self._answered(ticket, message)
 
@@ -342,7 +343,7 @@ class Caller:
         if message.kind == "answer":
             self._pass_on(ticket, testimony.answered(watch, now, answers))
         elif message.kind == "cancel answer":
-            self._pass_on(ticket, testimony.canceled(watch, asked, answers))
+            self._pass_on(ticket, testimony.canceled(watch, now, asked, answers))
         else:
             results = [(status, None) for status in answers]
             self._pass_on(ticket, testimony.finished(watch, now, asked, results))

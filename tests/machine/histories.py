@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import random
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from bt_actions.goal_terms import STATUS_CANCELED, STATUS_SUCCEEDED
@@ -260,9 +260,13 @@ def tell(history: History, kind: type[Play] = Play) -> str:
     return "\n".join([*(done.told or ()), "nothing goes wrong"])
 
 
-def first_broken(seeds: Iterable[int], kind: type[Play] = Play) -> int | None:
+def first_broken(
+    seeds: Iterable[int],
+    kind: type[Play] = Play,
+    made: Callable[[int], History] = random_history,
+) -> int | None:
     """Return the first seed whose history goes wrong, or None."""
     for seed in seeds:
-        if broken(random_history(seed), kind) is not None:
+        if broken(made(seed), kind) is not None:
             return seed
     return None

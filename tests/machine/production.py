@@ -18,7 +18,7 @@ from bt_actions.goal import Goal
 from bt_actions.goal_terms import Event, Now, State
 from bt_actions.hearing import Hearing
 from bt_actions.policy import End, Outcome
-from bt_actions.ros import alarm, line, shared, traffic, way
+from bt_actions.ros import alarm, line, past, shared, traffic, way
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Ticket
@@ -68,8 +68,9 @@ class ModelClient:
             raise RuntimeError("no space left")
         if caller.takes("restarts_meanwhile"):
             caller.world.restart(self.name)
-        if caller.takes("opens_meanwhile"):
-            caller.world.start(self.name)
+        for newcomer in ("opens_meanwhile", "another_opens_meanwhile"):
+            if caller.takes(newcomer):
+                caller.world.start(self.name)
         caller.judge.sent(caller.seen[goal_id], self._ask("goal", goal_id, goal_id))
 
     def cancel(self, goal_id: bytes) -> None:
@@ -220,7 +221,8 @@ class Caller:
         world.client = self  # type: ignore[assignment]
         judge.caller = self  # type: ignore[assignment]
         kinds = (
-            "fails_to_send builds_nonsense unexpected restarts_meanwhile opens_meanwhile freezes"
+            "fails_to_send builds_nonsense unexpected restarts_meanwhile freezes "
+            "opens_meanwhile another_opens_meanwhile"
         )
         world.kinds.update(
             {
@@ -564,6 +566,7 @@ def installed() -> Iterator[None]:
 
     patches: list[tuple[Any, str, Any]] = [
         (line, "time", ModelTime),
+        (past, "time", ModelTime),
         (way, "time", ModelTime),
         (traffic, "time", ModelTime),
         (line, "ActionClient", ModelClient),

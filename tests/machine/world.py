@@ -49,6 +49,8 @@ class Job:
     status: int = UNANSWERED
     canceled: bool = False
     """A cancel request was granted."""
+    unwanted: bool = False
+    """A cancel request has come."""
     asked: list[int] = field(default_factory=list)
     """Result requests that wait for the end, by number."""
 
@@ -261,6 +263,7 @@ class World:
             return CANCEL_UNKNOWN_GOAL
         if job.status in TERMINAL:
             return CANCEL_TERMINATED
+        job.unwanted = True
         if server.mood is Mood.REFUSES:
             return CANCEL_REJECTED
         job.status, job.canceled = CANCELING, True

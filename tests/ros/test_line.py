@@ -31,6 +31,7 @@ def watch(*shown: bytes, answers: int = 0, ready: bool = True) -> ServerWatch:
         seen.observe(now, ready, frozenset(shown))
     if answers > 1:
         seen.two_answered(answers)
+    seen.probe_sent(0.0, 1)
     return seen
 
 

@@ -11,8 +11,11 @@ from typing import Any
 import pytest
 from action_msgs.msg import GoalStatus
 
-from bt_actions.ros import line as module
-from bt_actions.ros.line import QUESTIONS, STALE, Line, _Past
+from bt_actions.goal_terms import Event
+from bt_actions.ros import past as module
+from bt_actions.ros import shared
+from bt_actions.ros.line import Line
+from bt_actions.ros.past import QUESTIONS, STALE, Ended, Past
 
 GOAL, ONE, OTHER = b"goal", b"one", b"other"
 AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3
@@ -24,24 +27,27 @@ class OfPast(Line):
     """A line with a goal that ended at 10.0, and was sent to `sent_to`."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, *sent_to: bytes) -> None:
-        said: Any = SimpleNamespace(sent_to=frozenset(sent_to))
-        twin: Any = SimpleNamespace(testimony=said)
+        said: Any = SimpleNamespace(servers=frozenset(sent_to), is_at_another=lambda *_: None)
+        shown: Any = SimpleNamespace(servers=frozenset({ONE}), shown=lambda *_: [])
+        twin: Any = SimpleNamespace(goal=SimpleNamespace(id=GOAL), testimony=shown)
         self.goals = {}
-        self._past = {GOAL: _Past(lambda: None, True, 10.0, twin, said)}
-        self.watch: Any = SimpleNamespace(gids=frozenset({ONE}))
+        self.past = Past(self)
+        self.past._ended[GOAL] = Ended(lambda: None, True, 10.0, twin, said)
+        self.watch: Any = SimpleNamespace(gids=frozenset({ONE}), two_answered=lambda: None)
         self.asked: list[bytes] = []
         self.client: Any = SimpleNamespace(cancel=self.asked.append)
-        self._generation = module.shared.generation
+        self._generation = shared.generation
         self.comes_in_sight: frozenset[bytes] = frozenset()
-        self.found: list[bytes] = []
+        self.found: list[Event] = []
         self.now = 10.1
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
+        monkeypatch.setattr(module, "alarm", SimpleNamespace(mind=lambda _: None))
 
     def _observe(self, now: float) -> None:
         self.watch.gids |= self.comes_in_sight
 
-    def _found_twice(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        self.found.append(goal_id)
+    def tell(self, ticket: Any, event: Event, detail: Any = None, message: Any = None) -> None:
+        self.found.append(event)
 
 
 @pytest.fixture
@@ -86,8 +92,8 @@ def test_the_child_of_a_fork_asks_nothing(line: OfPast) -> None:
 def test_a_word_long_after_the_end_is_no_older_one(line: OfPast) -> None:
     line.now = 10.0 + STALE + 0.1
     line.statuses_came({GOAL: EXECUTING})
-    line.feedback_came(GOAL, None)
-    assert line.found == [GOAL, GOAL]
+    assert line.found == [Event.SERVER_RETURNED]
+    assert line.goals[GOAL] is not None
     assert not line.asked
 
 

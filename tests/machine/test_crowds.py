@@ -1,0 +1,56 @@
+"""Histories of several servers of one name (crowds.py) break no rule.
+
+BT_SEED and BT_CROWDED_HISTORIES as in test_histories.py.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from bt_actions import testimony
+from bt_actions.ros.past import Past
+from bt_actions.twin import TwinTestimony
+from tests.machine.conftest import THOROUGH
+from tests.machine.crowds import CrowdPlay, crowded_history
+from tests.machine.histories import first_broken, shrink, tell
+from tests.machine.production import installed
+
+FIRST = int(os.environ.get("BT_SEED", "1"))
+COUNT = int(os.environ.get("BT_CROWDED_HISTORIES", "20000" if THOROUGH else "2000"))
+ENOUGH = 2_000
+"""Histories in which each mistake must be found."""
+
+
+@pytest.fixture(autouse=True)
+def model_world() -> Iterator[None]:
+    with installed():
+        yield
+
+
+@pytest.mark.timeout(600)
+def test_no_history_breaks_a_rule() -> None:
+    seed = first_broken(range(FIRST, FIRST + COUNT), CrowdPlay, crowded_history)
+    if seed is not None:
+        shortest = tell(shrink(crowded_history(seed), CrowdPlay), CrowdPlay)
+        pytest.fail(f"BT_SEED={seed} shows it again; the shortest history found:\n{shortest}")
+
+
+MISTAKES: dict[str, tuple[Any, str, Callable[..., Any]]] = {
+    "believes two of three": (testimony, "_all_in_sight", lambda watch: 2),
+    "waits for who is not there": (testimony, "_all_in_sight", lambda watch: 3),
+    "takes what was told before for news": (TwinTestimony, "_news", lambda self, ended: ended),
+    "takes any answer for all": (testimony.Testimony, "_may_be_at_two", lambda self, watch: False),
+    "is alone with whom it does not know": (TwinTestimony, "_is_alone", lambda self, watch: True),
+    "forgets what has ended": (Past, "keep", lambda self, ticket: None),
+}
+
+
+@pytest.mark.parametrize("mistake", list(MISTAKES))
+def test_every_mistake_is_found(monkeypatch: pytest.MonkeyPatch, mistake: str) -> None:
+    where, name, instead = MISTAKES[mistake]
+    monkeypatch.setattr(where, name, instead)
+    assert first_broken(range(ENOUGH), CrowdPlay, crowded_history) is not None
