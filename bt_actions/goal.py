@@ -105,6 +105,7 @@ class Goal:
         self._judged = False  # the tree went on because of them
         self._never_came = False  # denied for good
         self._judged_before = False  # and its server was lost since
+        self._was_left = False  # by our node: its server is the same still
         self._doubts = 0
         self._seen_status: int | None = None  # terminal, from the status topic
         self._asked_since = 0  # questions for the result since then, in vain,
@@ -583,7 +584,7 @@ class Goal:
         self._settle(Outcome.SERVER_LOST, str(detail))
         if self._seen_status is not None:
             return self._finished_by_status()
-        self.lost = True
+        self.lost, self._was_left = True, False
         if not self._never_came:  # else it was denied for good; for less, it may have come
             self.end = End.SERVER_GONE
         self._deadlines.clear()
@@ -595,7 +596,9 @@ class Goal:
         if not self.lost:
             return self._drop(now, detail)
         self.lost = False
-        self._denied_since, self._never_came, self._asked = None, False, 0
+        if not (self._was_left and self._denied_lately(now)):
+            self._denied_since = None
+        self._was_left, self._never_came, self._asked = False, False, 0
         self._cancel_code = None
         if self.end is End.NEVER_STARTED:  # and this is the question whether that still holds
             self._ask(now)
@@ -713,7 +716,7 @@ class Goal:
             return self._finished_by_status()
         if self.suspect:
             self.end = End.UNKNOWN
-        self.lost = True
+        self.lost = self._was_left = True
         self._deadlines.clear()
         self._release()
         return State.CANCELING

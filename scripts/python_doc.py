@@ -41,6 +41,12 @@ What holds everywhere:
 - **`shutdown()` cancels and waits** until each goal is accounted for, at most as long as its
   `timeout.cancel` (and `timeout.accept`, where it was not answered yet). A loop that never
   calls it is covered by an exit hook.
+- **After a tick that raised**, call `shutdown()` where the loop is your own: `stop(INVALID)` at the
+  root does not reach what runs below a composite of py_trees whose first tick this was.
+  `TreeRunner` drains by itself.
+- **With rclpy's EventsExecutor**, set up and tick on the thread that spins: to make a client on its
+  node from another one hangs in rclpy 7.1.5, without this project, too. `TreeRunner` does not
+  take it.
 - **Callables of yours** (`goal`, `expect`, `retry.when`, `on_feedback`, observers) run on the
   ticking thread.
 """

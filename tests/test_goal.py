@@ -1157,6 +1157,22 @@ def test_a_suspect_that_was_given_up_as_unknown_is_accounted_for_once_it_is_deni
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
 
 
+@pytest.mark.parametrize(("away", "counts"), [(0.5, True), (5.0, False)])
+def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> None:
+    """Each run of a program has a node of its own; the server is the same."""
+    life = denied_suspect()
+    for _ in range(int(DENIED_FOR_GOOD / (away + 1.5)) + 1):
+        life.pass_time(1.5)
+        denied(life)
+        life.on(Event.LEFT)
+        life.pass_time(away)
+        life.on(Event.SERVER_RETURNED)
+    denied(life)
+    life.pass_time(2 * (life.goal.timeouts.accept or 0.0))
+    denied(life)
+    assert life.goal.suspect is not counts
+
+
 def test_a_process_that_ends_does_not_say_never_started_of_a_request_without_answer() -> None:
     life = suspect()
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)

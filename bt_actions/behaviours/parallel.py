@@ -35,6 +35,7 @@ class Parallel(PyTreesParallel):
                     child.stop(Status.INVALID)
             self.current_child = None
             self.initialise()
+            self.status = Status.RUNNING  # should a child raise, `stop` is to reach the others
         for child in self.children:
             if child.status not in (Status.SUCCESS, Status.FAILURE):
                 yield from child.tick()
