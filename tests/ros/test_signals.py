@@ -70,9 +70,16 @@ def say(*words):
     print(*words, flush=True)
 """
 RCLPY_COMES_WITHIN = """
-with ended_by_signals(lambda again, ends_process: say(ends_process), lambda: say("last words")):
+told = threading.Event()
+
+def interrupt(again, ends_process):
+    say(ends_process)
+    told.set()
+
+with ended_by_signals(interrupt, lambda: say("last words")):
     rclpy.init()
     itself(signal.SIGTERM)
+    told.wait()  # another thread may have got it
 say("goes on")
 """
 A_HANDLER_COMES_WITHIN = """
