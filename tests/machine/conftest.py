@@ -1,10 +1,17 @@
-"""How long the search goes on: a while on a desk; thoroughly where CI or BT_THOROUGH is set."""
+"""What all searches share: the model world, and how long they go on.
+
+That is a while on a desk, and thoroughly where CI or BT_THOROUGH is set.
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import HealthCheck, settings
+
+from tests.machine.production import installed
 
 THOROUGH = bool(os.environ.get("CI") or os.environ.get("BT_THOROUGH"))
 
@@ -17,3 +24,9 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 settings.register_profile("machine", settings.get_profile("machine-ci"), max_examples=150)
+
+
+@pytest.fixture(autouse=True)
+def model_world() -> Iterator[None]:
+    with installed():
+        yield

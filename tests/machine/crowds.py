@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable
-from typing import Any
 
 from bt_actions.goal_terms import STATUS_CANCELED, STATUS_SUCCEEDED
-from tests.machine.histories import ACTIONS, History
-from tests.machine.production import ProductionJudge, ProductionPlay
+from tests.machine.histories import ACTIONS, History, Play
+from tests.machine.judge import Judge
 from tests.machine.world import CANCELING, NODES, UNANSWERED, Job, Mood
 
 ACTION = ACTIONS[0]
@@ -57,7 +56,7 @@ def crowded_history(seed: int) -> History:
     return History((leaf, chance.randrange(1000)), (*begin, *moves))
 
 
-class CrowdJudge(ProductionJudge):
+class CrowdJudge(Judge):
     """The judge, who here excuses no crowd."""
 
     def at_the_end(self) -> None:
@@ -65,13 +64,12 @@ class CrowdJudge(ProductionJudge):
         for job in self.caller.world.jobs:
             rule = f"what runs is asked to cancel, by whomever it runs: {job}"
             self._hold(job.unwanted or not job.live or self._ticket(job).ledger.closed, rule)
-        for line in self.caller.lines.values():
-            for ticket in line.tickets.values():
-                known: Any = ticket
-                self._hold(known.real.accounted_for, f"all have answered: {known} {known.goal!r}")
+        for line in self.caller.lines:
+            for ticket in line.goals.values():
+                self._hold(ticket.accounted_for, f"all have answered: {ticket.goal!r}")
 
 
-class CrowdPlay(ProductionPlay):
+class CrowdPlay(Play):
     """A play of one leaf whose goals come to two servers, or to three."""
 
     def __init__(self, plans: Iterable[int], *, aloud: bool = False) -> None:

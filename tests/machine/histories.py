@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 from bt_actions.goal_terms import STATUS_CANCELED, STATUS_SUCCEEDED
 from bt_actions.policy import RETRYABLE, Busy, Retry, Timeouts
-from tests.machine.callers import Caller
 from tests.machine.judge import Judge, Violation
 from tests.machine.parts import LeafPlan
+from tests.machine.production import Caller
 from tests.machine.world import CANCELING, NODES, UNANSWERED, Mood, World
 
 ACTIONS = ("move", "lift")
@@ -115,20 +115,20 @@ def plan(number: int) -> LeafPlan:
 
 
 class Play:
-    """One world with its caller and its judge, and what happened so far, in words."""
+    """One world with its caller and its judge, and what happened so far, in words.
+
+    Only within `production.installed`.
+    """
 
     def __init__(self, plans: Iterable[int], *, aloud: bool = False) -> None:
-        self.world = World(ACTIONS)
-        self.judge = Judge()
+        self.world, self.judge = World(ACTIONS), Judge()
         numbers = list(plans)
         self.world.preempts = sum(numbers) % 2 == 0
         self.caller = Caller(self.world, [plan(number) for number in numbers], self.judge)
         self.told: list[str] | None = [] if aloud else None
         self._last: dict[str, str] = {}
-        if aloud:
-            self.say(*self.caller.leaves)
-            for leaf in self.caller.leaves:
-                self.say(leaf, leaf.plan)
+        for leaf in self.caller.leaves:
+            self.say(leaf, leaf.plan)
         for action in ACTIONS:
             self.world.start(action)
 
@@ -145,6 +145,7 @@ class Play:
             if self.told is not None:
                 self.say(f"{self.world.now.steady - 100:6.2f} s", kind, choice)
             self.world.make(kind, choice)
+            self.judge.insist()
             if self.told is not None:
                 self._show()
 
@@ -165,6 +166,9 @@ class Play:
     def settle(self, *, heals: bool, drains: bool) -> None:
         """Let the faults end and every server answer; then compare report and truth."""
         world, caller = self.world, self.caller
+        for action in ACTIONS:
+            for node in NODES:
+                caller.come(action, node)  # what was left there is only remembered until then
         self.say("the faults end;", "links heal" if heals else "what is cut off is gone")
         world.set_clock("runs")
         world.room = 10_000
@@ -212,8 +216,8 @@ def play(history: History, kind: type[Play] = Play, *, aloud: bool = False) -> P
     """Play a history to its end; raises Violation, or whatever the code under test raises."""
     played = kind(history.plans, aloud=aloud)
     try:
-        for kind, number in history.moves:
-            played.move(kind, number)
+        for move, number in history.moves:
+            played.move(move, number)
         played.finish(history.plans[0])
     except Exception as error:
         if played.told is not None:

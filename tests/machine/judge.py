@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goal import PATIENCE
+from bt_actions.goal import PATIENCE, Goal
 from bt_actions.goal_terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from tests.machine.parts import Before, Leaf, Ledger, Ticket
 
 if TYPE_CHECKING:
     from bt_actions.attempts import AttemptRecord
-    from tests.machine.callers import Caller
+    from tests.machine.production import Caller
     from tests.machine.world import Job, ModelServer
 
 JUST = 1e-6
@@ -36,16 +36,23 @@ class Judge:
 
     caller: Caller
 
+    def __init__(self) -> None:
+        self._violation: Violation | None = None
+
     def begins(self, ticket: Ticket) -> None:
         now = self.caller.world.now
         ticket.ledger = Ledger(now.steady, now.ros, polled_at=now.steady)
 
-    def before(self, ticket: Ticket) -> Before:
-        goal, now = ticket.goal, self.caller.world.now
-        ledger = ticket.ledger
+    def sees_clock(self, ticket: Ticket) -> None:
+        """The goal looks at its node's clock."""
+        now, ledger = self.caller.world.now, ticket.ledger
         if now.ros > ledger.ros:
             ledger.forward += now.ros - ledger.ros
         ledger.ros = now.ros
+
+    def before(self, ticket: Ticket) -> Before:
+        goal = ticket.goal
+        self.sees_clock(ticket)
         return Before(goal.state, goal.outcome, goal.reason, goal.accepted, goal.end, goal.lost)
 
     def after(
@@ -67,10 +74,13 @@ class Judge:
         if goal.accepted and not before.accepted:
             ledger.begun_at = ledger.forward
             ledger.heard_at = None if event is Event.STATUS and detail in ENDS else ledger.forward
-        if event is Event.FEEDBACK and ledger.heard_at is not None:
+        if event is Event.FEEDBACK and (ledger.heard_at is not None or ledger.doubted):
             ledger.heard_at = ledger.forward
         if event is Event.STATUS and detail in ENDS:
+            ledger.doubted &= ledger.heard_at is None
             ledger.heard_at = None  # a goal that has ended is silent
+        elif event is Event.STATUS or (event is None and Command.ASK_RESULT in commands):
+            ledger.doubted = True
         if before.outcome is None:
             if event is Event.INTERRUPTED and before.state is not State.DONE:
                 ledger.unwanted = True
@@ -78,6 +88,7 @@ class Judge:
                 ledger.unwanted = ledger.replaced = True
         if event is Event.REJECTED:
             ledger.refused = True
+        ledger.left |= event is Event.LEFT
         if event is Event.CLOSED and before.state is not State.DONE:
             ledger.closed = True
             ledger.excuse = ledger.excuse or "its run, or the process, ended"
@@ -108,7 +119,7 @@ class Judge:
             elif command is Command.RELEASE:
                 ledger.releases += 1
                 known = goal.end is not End.UNKNOWN or goal.state is State.DONE
-                self._hold(known, "the resource is kept until the end is known")
+                self._hold(known or ledger.left, "the resource is kept until the end is known")
             else:
                 self._hold(ledger.sends == 1, "only a goal that was sent is asked about")
                 ledger.cancels += command is Command.CANCEL
@@ -140,7 +151,7 @@ class Judge:
                 job
                 for job in ledger.jobs
                 if job.live and job.server.matched and not job.server.cut
-                if self.caller.world.in_sight(job.server, ticket.line.node)
+                if self.caller.world.in_sight(job.server, ticket.node)
             ]
             self._hold(ledger.crowded or not in_reach, "SERVER_LOST: the server is out of reach")
         if goal.outcome is Outcome.CANCELED_BY_OTHER:
@@ -164,6 +175,8 @@ class Judge:
         goal, limits, ledger = ticket.goal, ticket.goal.timeouts, ticket.ledger
         if goal.state is State.DONE or goal.due_in(self.caller.world.now) is not None:
             return
+        if goal.lost and ledger.left:
+            return  # it waits for nothing, also where it is UNKNOWN
         state = goal.state
         if state is State.QUEUED:
             excused = limits.queue is None
@@ -233,21 +246,19 @@ class Judge:
         """Check that nobody is overtaken in the queue."""
         if ticket.goal.busy is not Busy.WAIT:
             return
-        for line in self.caller.lines.values():
-            for other in line.tickets.values():
-                earlier = int(other.goal.id) < int(ticket.goal.id)
-                if earlier and other.goal.state is State.QUEUED and other is not ticket:
-                    overlap = other.goal.resources & ticket.goal.resources
-                    self._hold(not overlap, "first come, first served")
+        for other in self.caller.tickets:
+            if other is ticket:
+                return
+            if other.goal.state is State.QUEUED:
+                overlap = other.goal.resources & ticket.goal.resources
+                self._hold(not overlap, "first come, first served")
 
     def nobody_waits_in_vain(self) -> None:
         """Check that who queues has somebody who holds, or waits longer, for the same."""
-        waiting: list[Ticket] = []
-        for line in self.caller.lines.values():
-            waiting += (t for t in line.tickets.values() if t.goal.state is State.QUEUED)
-        waiting.sort(key=lambda ticket: int(ticket.goal.id))
         wanted: set[str] = set()
-        for ticket in waiting:
+        for ticket in self.caller.tickets:
+            if ticket.goal.state is not State.QUEUED:
+                continue
             names = ticket.goal.resources
             why = names & wanted or self.caller.resources.holders(names)
             self._hold(why, f"what is free goes to who waits longest: {ticket}")
@@ -284,12 +295,12 @@ class Judge:
         for other in self.caller.tickets:
             if other.goal.lost and self.caller.out_of_sight(other, ticket):
                 ticket.ledger.beside += (other,)
-            elif other.line.action == ticket.line.action and other.goal.outcome is not None:
+            elif other.line.name == ticket.line.name and other.goal.outcome is not None:
                 runs = not other.goal.holding and any(
-                    job.live and self.caller.world.in_sight(job.server, ticket.line.node)
+                    job.live and self.caller.world.in_sight(job.server, ticket.node)
                     for job in other.ledger.jobs
                 )
-                excused = other.ledger.excuse
+                excused: str | bool = other.ledger.excuse
                 excused = excused or (other.ledger.crowded and len(other.ledger.heard) < 2)
                 excused = excused or (other.goal.waited_for and not other.goal.accepted)
                 rule = f"{other} was given up, and is canceled before {ticket} is sent there"
@@ -297,24 +308,24 @@ class Judge:
         if reached > 1:
             ticket.ledger.crowded = True
 
-    def is_done(self, ticket: Ticket, event: Event | None) -> None:
+    def is_done(self, ticket: Ticket) -> None:
         """A goal is DONE, and its line has put it away."""
-        if event is Event.CLOSED or len(ticket.ledger.heard) < 2:
+        if ticket.ledger.closed or len(ticket.ledger.heard) < 2:
             return
-        world, line = self.caller.world, ticket.line
+        world = self.caller.world
         known = [job for job in ticket.ledger.jobs if job.server.gid in ticket.ledger.heard]
-        runs = any(job.live and world.in_sight(job.server, line.node) for job in known)
+        runs = any(job.live and world.in_sight(job.server, ticket.node) for job in known)
         rule = "an end is known when it has ended everywhere, or a twin is kept in mind"
-        self._hold(not runs or ticket.goal.id in line.tickets, rule)
+        self._hold(not runs or ticket.goal.id in ticket.line.goals, rule)
 
-    def twin_is_done(self, twin: Ticket) -> None:
+    def twin_is_done(self, twin: Goal) -> None:
         """What a second server took has ended there."""
-        ticket = self.caller.tickets[int(twin.goal.id)]
+        ticket = self.caller.seen[twin.id]
         ends = [ENDS[job.status] for job in ticket.ledger.jobs if job.status in ENDS]
         if ticket.goal.end in ends:
             ends.remove(ticket.goal.end)
-        true = twin.goal.end in ends or twin.goal.end not in ENDS.values()
-        self._hold(true, f"the end of a twin is none that was told before: {twin.goal!r}, {ends}")
+        true = twin.end in ends or twin.end not in ENDS.values()
+        self._hold(true, f"the end of a twin is none that was told before: {twin!r}, {ends}")
 
     def hears_acceptance(self, ticket: Ticket, server: ModelServer) -> None:
         """A server's acceptance has been taken in, the first or one more."""
@@ -323,7 +334,7 @@ class Judge:
         runs = any(job.live and job.server is server for job in ledger.jobs)
         several = len(ticket.testimony.sent_to | ticket.line.watch.gids) > 1
         if news and runs and ticket.goal.state is State.DONE and several:
-            minded = ledger.closed or ticket.goal.id in ticket.line.tickets
+            minded = ledger.closed or ticket.goal.id in ticket.line.goals
             self._hold(minded, "what a second server accepts of a goal that has ended is minded")
 
     def accepted_on_server(self, job: Job) -> None:
@@ -344,7 +355,7 @@ class Judge:
                 self._hold(asked_for or excused, f"{rival} and {ticket} are never live together")
 
     def _ticket(self, job: Job) -> Ticket:
-        return self.caller.tickets[int(job.goal_id)]
+        return self.caller.seen[job.goal_id]
 
     # The end
 
@@ -359,6 +370,7 @@ class Judge:
 
     def at_the_end(self) -> None:
         """Compare what is reported with what is true, after every server had its chance."""
+        self.insist()
         caller = self.caller
         for ticket in caller.tickets:
             goal = ticket.goal
@@ -395,7 +407,12 @@ class Judge:
             cause = closed or ledger.crowded or forgot or dead or asked
             self._hold(cause, f"UNKNOWN with a cause: {said}")
 
-    @staticmethod
-    def _hold(kept: Any, rule: str) -> None:
+    def insist(self) -> None:
+        """Raise what was raised before: ros/line.py may have caught it, as it does any error."""
+        if self._violation is not None:
+            raise self._violation
+
+    def _hold(self, kept: Any, rule: str) -> None:
         if not kept:
-            raise Violation(rule)
+            self._violation = self._violation or Violation(rule)
+            raise self._violation

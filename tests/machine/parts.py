@@ -1,4 +1,4 @@
-"""What caller and judge keep: goals on their way, lines, leaves, and the notes on each goal.
+"""What caller and judge keep: leaves, and the notes on each goal.
 
 Values only; nothing here acts or judges.
 """
@@ -12,10 +12,11 @@ from bt_actions.attempts import Attempts
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import State
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.server import ServerWatch
 from bt_actions.testimony import Testimony
 
 if TYPE_CHECKING:
+    from bt_actions.ros import shared
+    from bt_actions.ros.line import Line
     from tests.machine.world import Job
 
 
@@ -41,7 +42,9 @@ class Ledger:
     """How far the node's clock has gone forward, as the goal saw it."""
     begun_at: float = 0.0
     heard_at: float | None = 0.0
-    """Values of `forward`: at acceptance, and at the last feedback."""
+    """Values of `forward`: at acceptance, and at the last feedback; None where it has ended."""
+    doubted: bool = False
+    """It seems to have ended, and owes a result, or has said since that it runs."""
     polled_at: float = 0.0
     slow: float = 0.0
     """The longest time between two polls: a caller that is slow makes deadlines late."""
@@ -61,6 +64,8 @@ class Ledger:
     heard: frozenset[bytes] = frozenset()
     """Servers whose acceptance has been heard."""
     closed: bool = False
+    left: bool = False
+    """Its node has gone, and somebody else is to see to it."""
     beside: tuple[Ticket, ...] = ()
     """Lost goals whose server was out of sight when this one was sent: they may turn up again."""
     jobs: tuple[Job, ...] = ()
@@ -68,31 +73,32 @@ class Ledger:
 
 @dataclass(eq=False, slots=True)
 class Ticket:
-    """A goal on its way, with what the caller and the judge keep of it."""
+    """A goal on its way (shared.Ticket), with its name and what the judge keeps of it."""
 
-    goal: Goal
+    real: shared.Ticket
     name: str
-    line: Line
-    twin: bool = False
-    """A goal that has ended, as a second server runs it."""
     ledger: Ledger = field(init=False)
-    testimony: Testimony = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.testimony = Testimony(self.goal)
+    @property
+    def goal(self) -> Goal:
+        return self.real.goal
+
+    @property
+    def line(self) -> Line:
+        return self.real.line
+
+    @property
+    def node(self) -> int:
+        """The number of the node that sees to it."""
+        number: int = self.line.traffic.node.number
+        return number
+
+    @property
+    def testimony(self) -> Testimony:
+        return self.real.testimony
 
     def __repr__(self) -> str:
         return self.name
-
-
-@dataclass(eq=False, slots=True)
-class Line:
-    """One action as one node sees it: its watch, and the goals on it."""
-
-    action: str
-    node: int
-    watch: ServerWatch = field(default_factory=ServerWatch)
-    tickets: dict[bytes, Ticket] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,18 +117,17 @@ class LeafPlan:
         named = "everything" if Outcome.SERVER_LOST in self.retry.outcomes else "the default"
         tries = f"{self.retry.attempts} tries, on {named}"
         where = f"{self.action} on node {self.node}"
-        return f"{where}, {self.busy.value}, {set(self.resources)}; {limits}; {tries}"
+        return f"{where}, {self.busy.value}, {sorted(self.resources)}; {limits}; {tries}"
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, slots=True, weakref_slot=True)
 class Leaf:
     """One leaf of a tree: visited, ticked, interrupted, visited again."""
 
     name: str
     plan: LeafPlan
-    line: Line
     attempts: Attempts | None = None
-    ticket: Ticket | None = None
+    ticket: shared.Ticket | None = None
     visits: int = 0
 
     def __repr__(self) -> str:

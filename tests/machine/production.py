@@ -1,7 +1,7 @@
-"""The production ros/line.py and ros/traffic.py in a model world, with the rules of the judge.
+"""Leaves, and the production ros/line.py and ros/traffic.py beneath them, in a model world.
 
 A model is what lies around them: the client, the node, the graph, the clocks and the alarm's
-thread. Of the two files themselves nothing is copied.
+thread. Of the two files themselves nothing is copied. Each step of a goal is shown to the judge.
 """
 
 from __future__ import annotations
@@ -11,23 +11,21 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.goal import Goal
-from bt_actions.goal_terms import Event, Now, State
+from bt_actions.goal_terms import Command, Event, Now, State
 from bt_actions.hearing import Hearing
 from bt_actions.policy import End, Outcome
+from bt_actions.resources import Resources
 from bt_actions.ros import alarm, line, past, shared, traffic, way
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line
-from bt_actions.ros.shared import Ticket
 from bt_actions.ros.traffic import Traffic
 from bt_actions.standstill import Standstill
-from tests.machine.histories import ACTIONS, Play, plan
 from tests.machine.judge import Judge, Violation
-from tests.machine.parts import LeafPlan, Ledger
-from tests.machine.world import NODES, Message, World
+from tests.machine.parts import Leaf, LeafPlan, Ticket
+from tests.machine.world import NODES, Job, Message, World
 
 DOMAIN = 1
 LEASE = 3.0
@@ -90,11 +88,10 @@ class ModelClient:
         self._asked[number] = (kind, about, caller.moment(), {})
         if kind != "result":
             self.hearing.asked(caller.moment())
-        view = caller.seen.get(goal_id)
+        ticket = caller.seen.get(goal_id)
+        name = "" if ticket is None else ticket.name
         nobody = caller.world.servers[0]
-        message = Message(
-            kind, nobody, goal_id, view.name if view else "", number=number, to_server=True
-        )
+        message = Message(kind, nobody, goal_id, name, number=number, to_server=True)
         return caller.world.send(message, self.name, self.node.number)
 
     def forget(self, about: Any) -> None:
@@ -135,13 +132,27 @@ class ModelClient:
             self._listener.result_came(about, asked, results)
 
 
+class Silence:
+    """The log, to which nobody listens."""
+
+    def error(self, line: str) -> None: ...
+
+    info = warning = error
+
+
+class Context:
+    """What Traffic asks of a context."""
+
+    def get_domain_id(self) -> int:
+        return DOMAIN
+
+
 class Node:
     """What Line and Traffic ask of a node."""
 
     def __init__(self, number: int) -> None:
         self.number = number
-        self.context = mock.Mock()
-        self.context.get_domain_id = lambda: DOMAIN
+        self.context = Context()
 
     def get_clock(self) -> Any:
         return SimpleNamespace(ros_time_is_active=False)
@@ -153,61 +164,17 @@ class Node:
         return "node"
 
 
-class LineView:
-    """A production line, as the judge sees one (parts.Line)."""
-
-    def __init__(self, real: Line) -> None:
-        self.real = real
-        self.action, self.node = real.name, real.traffic.node.number
-        self.watch = real.watch
-
-    @property
-    def tickets(self) -> dict[bytes, TicketView]:
-        return {goal: now().view(ticket) for goal, ticket in self.real.goals.items()}
-
-
-class TicketView:
-    """A production ticket, as the judge sees one (parts.Ticket)."""
-
-    def __init__(self, real: Ticket, name: str, *, twin: bool) -> None:
-        self.real, self.goal, self.name, self.twin = real, real.goal, name, twin
-        self.ledger = Ledger(0.0, 0.0)
-
-    def __repr__(self) -> str:
-        return self.name
-
-    @property
-    def line(self) -> LineView:
-        return LineView(self.real.line)
-
-    @property
-    def testimony(self) -> Any:
-        return self.real.testimony
-
-
-class Leaf:
-    """One leaf of a tree: visited, ticked, interrupted, visited again."""
-
-    def __init__(self, name: str, leaf_plan: LeafPlan) -> None:
-        self.name, self.plan = name, leaf_plan
-        self.attempts: Attempts | None = None
-        self.ticket: Ticket | None = None
-        self.visits = 0
-
-    def __repr__(self) -> str:
-        return self.name
-
-
 class Caller:
     """Leaves, and beneath them the production traffic of two nodes."""
 
     def __init__(self, world: World, plans: Iterable[LeafPlan], judge: Judge) -> None:
         self.world, self.judge = world, judge
         self.leaves = [Leaf(f"leaf{number}", each) for number, each in enumerate(plans)]
-        self.seen: dict[bytes, TicketView] = {}
+        self.seen: dict[bytes, Ticket] = {}
+        """Every goal that was ever begun, the oldest first."""
         self.closed = False
+        self.froze = False
         self.misfortunes: set[str] = set()
-        self._by_goal: dict[Goal, TicketView] = {}
         self._clients: list[ModelClient] = []
         self._moments = 0
         self._next_name = ""
@@ -218,8 +185,8 @@ class Caller:
         alarm.standstill = Standstill()
         self._traffics = {number: self._traffic(number) for number in NODES}
         self._lines: dict[tuple[str, int], Line] = {}  # made when a leaf first wants them
-        world.client = self  # type: ignore[assignment]
-        judge.caller = self  # type: ignore[assignment]
+        world.client = self
+        judge.caller = self
         kinds = (
             "fails_to_send builds_nonsense unexpected restarts_meanwhile freezes "
             "opens_meanwhile another_opens_meanwhile"
@@ -235,7 +202,7 @@ class Caller:
                 "look": (lambda: (None,), lambda _: self.attend()),
                 "drained": (
                     self._left_behind,
-                    lambda view: view.real.line.tell(view.real, Event.DRAINED),
+                    lambda ticket: ticket.line.tell(ticket.real, Event.DRAINED),
                 ),
                 "rerun": (lambda: () if self.closed else NODES, self.run_again),
             }
@@ -260,8 +227,10 @@ class Caller:
     # What is beneath the leaves
 
     def _traffic(self, number: int) -> Traffic:
-        made = Traffic(Node(number))  # type: ignore[arg-type]
-        made.clocks = SimpleNamespace(now=lambda: self.world.now)  # type: ignore[assignment]
+        node: Any = Node(number)
+        clocks: Any = SimpleNamespace(now=lambda: self.world.now)
+        made = Traffic(node)
+        made.clocks = clocks
         return made
 
     def come(self, action: str, node: int) -> Line:
@@ -279,45 +248,39 @@ class Caller:
     def new_goal_id(self) -> bytes:
         return b"%d" % len(self.seen)
 
-    def begun(self, ticket: Ticket) -> None:
-        """Take note of a ticket that is made, but for a twin's."""
-        if ticket.goal.state is State.QUEUED and ticket.goal not in self._by_goal:
-            view = TicketView(ticket, self._next_name, twin=False)
-            self.seen[ticket.goal.id] = self._by_goal[ticket.goal] = view
-            self.judge.begins(view)  # type: ignore[arg-type]
+    def begun(self, real: shared.Ticket) -> None:
+        """Take note of a ticket that is made, but for a twin's, which has its goal's id."""
+        if real.goal.id not in self.seen:
+            ticket = self.seen[real.goal.id] = Ticket(real, self._next_name)
+            self.judge.begins(ticket)
 
-    def view(self, ticket: Ticket) -> TicketView:
-        """Return how the judge sees a ticket, a twin's included."""
-        found = self._by_goal.get(ticket.goal)
-        if found is None:
-            found = self._by_goal[ticket.goal] = TicketView(ticket, "twin", twin=True)
-        return found
+    def known(self, goal: Goal) -> Ticket | None:
+        """Return what the judge knows of a goal: nothing where that is a twin."""
+        ticket = self.seen.get(goal.id)
+        return ticket if ticket is not None and ticket.goal is goal else None
 
-    def told(self, goal: Goal, event: Event, detail: Any, step: Callable[[], Any]) -> Any:
+    def told(
+        self, goal: Goal, event: Event, detail: Any, step: Callable[[], tuple[Command, ...]]
+    ) -> tuple[Command, ...]:
         """Have the judge see what a goal is told, and what it says."""
-        view = self._by_goal.get(goal)
-        if view is None or view.twin:
+        ticket = self.known(goal)
+        if ticket is None:
             return step()
-        before = self.judge.before(view)  # type: ignore[arg-type]
+        before = self.judge.before(ticket)
         commands = step()
-        if event is Event.LEFT:  # the machine's own caller never leaves a goal
-            view.ledger.releases += sum(each.name == "RELEASE" for each in commands)
-            view.ledger.since = self.world.now.steady
-        else:
-            shown = None if event.name.endswith("_DUE") else event
-            self.judge.after(view, before, shown, detail, commands)  # type: ignore[arg-type]
+        shown = None if event.name.endswith("_DUE") else event
+        self.judge.after(ticket, before, shown, detail, commands)
         return commands
 
-    def put_away(self, ticket: Ticket) -> None:
+    def put_away(self, goal: Goal) -> None:
         """Have the judge see that a goal is DONE, and its line has put it away."""
-        if ticket.goal.state is not State.DONE:
+        if goal.state is not State.DONE:
             return
-        view = self.view(ticket)
-        if view.twin:
-            self.judge.twin_is_done(view)  # type: ignore[arg-type]
+        ticket = self.known(goal)
+        if ticket is None:
+            self.judge.twin_is_done(goal)
         else:
-            event = Event.CLOSED if view.ledger.closed else None
-            self.judge.is_done(view, event)  # type: ignore[arg-type]
+            self.judge.is_done(ticket)
 
     # The leaves
 
@@ -348,7 +311,7 @@ class Caller:
             raise ValueError("no such variable")
         return "goal"
 
-    def _judge_attempt(self, leaf: Leaf, attempts: Attempts, ticket: Ticket) -> None:
+    def _judge_attempt(self, leaf: Leaf, attempts: Attempts, ticket: shared.Ticket) -> None:
         goal = ticket.goal
         outcome = goal.outcome
         assert outcome is not None
@@ -356,15 +319,16 @@ class Caller:
             outcome = Outcome.UNEXPECTED_RESULT
         record = AttemptRecord(attempts.attempt, outcome, goal.reason, 0.0, 0.0, None, goal)
         again = attempts.again(record, self.world.now)
-        self.judge.noted(leaf, self.view(ticket), record, again)  # type: ignore[arg-type]
+        self.judge.noted(leaf, self.seen[goal.id], record, again)
         leaf.ticket = None
         if not again:
             leaf.attempts = None
 
     def interrupt(self, leaf: Leaf) -> None:
-        """What py_trees' terminate(INVALID) does."""
+        """What py_trees' terminate(INVALID) does; twice, because it may come twice."""
         if leaf.ticket is not None:
             leaf.ticket.line.tell(leaf.ticket, Event.INTERRUPTED)
+            self.judge.interrupted_again(self.seen[leaf.ticket.goal.id])
         leaf.ticket = leaf.attempts = None
 
     def run_again(self, node: int) -> None:
@@ -380,17 +344,18 @@ class Caller:
     def close(self) -> None:
         """The process ends."""
         self.closed = True
-        for view in self.tickets:
-            view.real.line.tell(view.real, Event.CLOSED)
+        for ticket in self.tickets:
+            ticket.line.tell(ticket.real, Event.CLOSED)
 
-    def _left_behind(self) -> list[TicketView]:
+    def _left_behind(self) -> list[Ticket]:
+        """Goals that are still waited for, though no leaf has them any more."""
         held = {leaf.ticket for leaf in self.leaves}
         return [
-            view
-            for view in self.tickets
-            if view.real not in held
-            and view.goal.outcome is not None
-            and (view.goal.end is End.UNKNOWN or view.goal.suspect)
+            ticket
+            for ticket in self.tickets
+            if ticket.real not in held
+            and ticket.goal.outcome is not None
+            and (ticket.goal.end is End.UNKNOWN or ticket.goal.suspect)
         ]
 
     # What arrives, and what time does
@@ -400,18 +365,15 @@ class Caller:
         if message.number:
             client = self._clients[message.number - 1]
             client.hear(message)
-            view = self.seen.get(message.goal_id)
-            if message.kind == "answer" and message.detail and view and not client.closed:
-                self.judge.hears_acceptance(view, message.server)  # type: ignore[arg-type]
+            if message.kind == "answer" and message.detail and not client.closed:
+                self.judge.hears_acceptance(self.seen[message.goal_id], message.server)
             return
-        for of_node in list(self._traffics.values()):
-            for each in list(of_node._lines.values()):
-                in_sight = self.world.in_sight(message.server, of_node.node.number)  # type: ignore[attr-defined]
-                if each.name == message.server.action and in_sight:
-                    if message.kind == "feedback":
-                        each.feedback_came(message.goal_id, message.detail)
-                    elif message.kind == "status":
-                        each.statuses_came({message.goal_id: message.detail})
+        for each in self._lines_to(message.server.action):
+            if self.world.in_sight(message.server, each.traffic.node.number):
+                if message.kind == "feedback":
+                    each.feedback_came(message.goal_id, message.detail)
+                elif message.kind == "status":
+                    each.statuses_came({message.goal_id: message.detail})
 
     def attend(self) -> None:
         """What the alarm does, which is late where the process was frozen."""
@@ -425,6 +387,10 @@ class Caller:
             assert isinstance(each, Line)
             each._look_at = 0.0
             each.attend(self.moment())
+            for real in each.goals.values():
+                ticket = self.known(real.goal)
+                if ticket is not None and not self.froze:
+                    self.judge.polled(ticket)
         self.judge.nobody_waits_in_vain()
 
     def _freeze(self, seconds: float) -> None:
@@ -432,113 +398,85 @@ class Caller:
 
         So do servers that it sees, beyond their lease.
         """
+        self.froze = True
         alarm.standstill.lives(self.moment())
+        before = {
+            ticket: ticket.goal.state
+            for ticket in self.tickets
+            if ticket.goal.state in (State.WAITING_FOR_SERVER, State.SENDING, State.EXECUTING)
+            and not (ticket.ledger.crowded or self._falters(ticket))
+        }
         world, hidden = self.world, set[tuple[bytes, int]]()
         if seconds > LEASE:
             hidden = {(server.gid, node) for server in world.servers for node in NODES}
             hidden -= world.overlooked
         world.overlooked |= hidden
         world.now = Now(world.now.steady + seconds, world.now.ros + seconds * world.pace)
-        before = {
-            view: view.goal.state
-            for view in self.tickets
-            if not view.ledger.crowded
-            and view.goal.state in (State.WAITING_FOR_SERVER, State.SENDING, State.EXECUTING)
-        }
         self._attend()
-        for view, state in before.items():
-            if view.goal.state is not state:
-                raise Violation(f"who was frozen looks first for what came meanwhile: {view}")
+        for ticket, state in before.items():
+            if ticket.goal.state is not state:
+                raise Violation(f"who was frozen looks first for what came meanwhile: {ticket}")
         world.overlooked -= hidden
         for message in world._deliverable():
             if message in world.air:
                 world.deliver(message)
         self.attend()
 
+    def _falters(self, ticket: Ticket) -> bool:
+        """Whether its server is in sight without its services, which no standstill does."""
+        where = ticket.line.name, ticket.node
+        return bool(self.world.shown(*where)) and not self.world.ready(*where)
+
     def due_in(self) -> float:
         """Return the seconds until something is due (half a second where nothing is)."""
-        tickets = [
-            ticket
-            for of_node in self._traffics.values()
-            for each in of_node._lines.values()
-            for ticket in each.goals.values()
-        ]
+        tickets = [ticket for each in self.lines for ticket in each.goals.values()]
         dues = [ticket.goal.due_in(self.world.now) for ticket in tickets]
         return min((due for due in dues if due is not None), default=0.5)
 
     # For the judge
 
     @property
-    def tickets(self) -> list[TicketView]:
+    def tickets(self) -> list[Ticket]:
         return list(self.seen.values())
 
     @property
-    def resources(self) -> Any:
+    def resources(self) -> Resources[shared.Ticket]:
         return shared.domain_of(DOMAIN).resources
 
     @property
-    def lines(self) -> dict[tuple[str, int], LineView]:
-        return {
-            (name, number): LineView(each)
-            for number, of_node in self._traffics.items()
-            for name, each in of_node._lines.items()
-        }
+    def lines(self) -> list[Line]:
+        return [each for of_node in self._traffics.values() for each in of_node._lines.values()]
 
-    def accepted_on_server(self, job: Any) -> None:
+    def _lines_to(self, action: str) -> list[Line]:
+        return [each for each in self.lines if each.name == action]
+
+    def accepted_on_server(self, job: Job) -> None:
+        """Not seen by any real caller: for the judge."""
         self.judge.accepted_on_server(job)
 
     def crowded(self, action: str, *, but_lost: bool = False) -> None:
-        for each in self.lines.values():
-            for view in each.tickets.values() if each.action == action else ():
-                view.ledger.crowded |= not (but_lost and view.goal.lost)
+        """Not seen either: there are two live servers under the name.
 
-    def out_of_sight(self, lost: TicketView, wanted: TicketView) -> bool:
+        Not an excuse for goals that are lost already, where one comes back.
+        """
+        for each in self._lines_to(action):
+            for real in each.goals.values():
+                ticket = self.known(real.goal)
+                if ticket is not None:
+                    ticket.ledger.crowded |= not (but_lost and ticket.goal.lost)
+
+    def out_of_sight(self, lost: Ticket, wanted: Ticket) -> bool:
         """Whether nothing that the node of `wanted` sees shows the lost one's servers."""
-        action, world = lost.line.action, self.world
+        action, world = lost.line.name, self.world
         return not any(
-            lost.testimony.sent_to & world.shown(action, each.node)
-            and world.ready(action, each.node)
-            for each in self.lines.values()
-            if each.action == action and each.node == wanted.line.node
+            lost.testimony.sent_to & world.shown(action, wanted.node)
+            and world.ready(action, wanted.node)
+            for each in self._lines_to(action)
+            if each.traffic.node.number == wanted.node
         )
 
 
-class ProductionJudge(Judge):
-    """The judge, who here sees views, and goals that were left."""
-
-    def _ticket(self, job: Any) -> Any:
-        return self.caller.seen[job.goal_id]  # type: ignore[attr-defined]
-
-    def _deadlines_are_kept_in_mind(self, ticket: Any) -> None:
-        if not ticket.goal.lost:  # one that was left waits for nothing, also where it is UNKNOWN
-            super()._deadlines_are_kept_in_mind(ticket)
-
-
-class ProductionPlay(Play):
-    """A play whose caller is the production code; only within `installed`."""
-
-    def __init__(self, plans: Iterable[int], *, aloud: bool = False) -> None:
-        self.world, self.judge = World(ACTIONS), ProductionJudge()
-        numbers = list(plans)
-        self.world.preempts = sum(numbers) % 2 == 0
-        leaf_plans = [plan(number) for number in numbers]
-        self.caller = Caller(self.world, leaf_plans, self.judge)  # type: ignore[assignment]
-        self.told: list[str] | None = [] if aloud else None
-        self._last: dict[str, str] = {}
-        for leaf in self.caller.leaves:
-            self.say(leaf, leaf.plan)
-        for action in ACTIONS:
-            self.world.start(action)
-
-    def settle(self, *, heals: bool, drains: bool) -> None:
-        """As ever; each node comes to each action, for what was left there is only remembered."""
-        for action in ACTIONS:
-            for node in NODES:
-                self.caller.come(action, node)  # type: ignore[attr-defined]
-        super().settle(heals=heals, drains=drains)
-
-
-def _drain(tickets: Iterable[Ticket], hurry: Any = None) -> None:
+def _drain(tickets: Iterable[shared.Ticket], hurry: Any = None) -> None:
     """A drain whose patience is over at once."""
     wanted = [ticket for ticket in tickets if ticket.goal.state is not State.DONE]
     for ticket in wanted:
@@ -551,18 +489,28 @@ def _drain(tickets: Iterable[Ticket], hurry: Any = None) -> None:
 @contextmanager
 def installed() -> Iterator[None]:
     """Put the model world around the production code; the one lock is ours meanwhile."""
-    made, on, close_book = Ticket.__post_init__, Goal.on, Line.close_book
+    made, close_book = shared.Ticket.__post_init__, Line.close_book
+    on, poll = Goal.on, Goal.poll
 
-    def post_init(ticket: Ticket) -> None:
+    def post_init(ticket: shared.Ticket) -> None:
         made(ticket)
         now().begun(ticket)
 
     def told(goal: Goal, event: Event, moment: Any, detail: Any = None) -> Any:
         return now().told(goal, event, detail, lambda: on(goal, event, moment, detail))
 
-    def put_away(of_ticket: Line, ticket: Ticket) -> None:
+    def polled(goal: Goal, moment: Now) -> tuple[Command, ...]:
+        ticket = now().known(goal)
+        if ticket is not None:
+            now().judge.sees_clock(ticket)
+        return poll(goal, moment)
+
+    def put_away(of_ticket: Line, ticket: shared.Ticket) -> None:
         close_book(of_ticket, ticket)
-        now().put_away(ticket)
+        now().put_away(ticket.goal)
+
+    def fail(of_what: Line, what: str, error: Exception) -> None:
+        raise error
 
     patches: list[tuple[Any, str, Any]] = [
         (line, "time", ModelTime),
@@ -578,17 +526,20 @@ def installed() -> Iterator[None]:
         (way, "_remapped", lambda node, name: True),  # nothing is looked for out of sight
         (Line, "_instead", lambda self, ticket: ""),
         (Line, "close_book", put_away),
-        (line, "log", mock.Mock()),
-        (way, "log", mock.Mock()),
-        (traffic, "log", mock.Mock()),
+        (Line, "_warn_once", fail),
+        (Line, "__hash__", lambda self: self.traffic.node.number),  # sets are in the same order
+        (line, "log", Silence()),
+        (way, "log", Silence()),
+        (traffic, "log", Silence()),
         (traffic, "new_goal_id", lambda: now().new_goal_id()),
         (traffic, "drain", _drain),
         (alarm, "standstill", Standstill()),
         (alarm, "_open", set()),
         (alarm, "mind", lambda each: alarm._open.add(each)),
         (shared, "_domains", {}),
-        (Ticket, "__post_init__", post_init),
+        (shared.Ticket, "__post_init__", post_init),
         (Goal, "on", told),
+        (Goal, "poll", polled),
     ]
     with shared.lock:
         replaced = [(where, name, getattr(where, name)) for where, name, _ in patches]

@@ -6,7 +6,7 @@ BT_SEED and BT_CROWDED_HISTORIES as in test_histories.py.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -17,18 +17,11 @@ from bt_actions.twin import TwinTestimony
 from tests.machine.conftest import THOROUGH
 from tests.machine.crowds import CrowdPlay, crowded_history
 from tests.machine.histories import first_broken, shrink, tell
-from tests.machine.production import installed
 
 FIRST = int(os.environ.get("BT_SEED", "1"))
 COUNT = int(os.environ.get("BT_CROWDED_HISTORIES", "20000" if THOROUGH else "2000"))
 ENOUGH = 2_000
 """Histories in which each mistake must be found."""
-
-
-@pytest.fixture(autouse=True)
-def model_world() -> Iterator[None]:
-    with installed():
-        yield
 
 
 @pytest.mark.timeout(600)
@@ -45,6 +38,7 @@ MISTAKES: dict[str, tuple[Any, str, Callable[..., Any]]] = {
     "takes what was told before for news": (TwinTestimony, "_news", lambda self, ended: ended),
     "takes any answer for all": (testimony.Testimony, "_may_be_at_two", lambda self, watch: False),
     "is alone with whom it does not know": (TwinTestimony, "_is_alone", lambda self, watch: True),
+    "hears the first of two acceptances": (Past, "accepted", lambda self, *answer: None),
     "forgets what has ended": (Past, "keep", lambda self, ticket: None),
 }
 

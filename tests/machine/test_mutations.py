@@ -1,6 +1,7 @@
 """The generator of histories finds every one of these wrong machines: so it would find it in ours.
 
-Each mutation is one plausible mistake, made on purpose and undone after the test.
+Each mutation is one plausible mistake, made on purpose and undone after the test. Those about
+several servers of one name are in test_crowds.py.
 """
 
 from __future__ import annotations
@@ -10,15 +11,18 @@ from typing import Any
 
 import pytest
 
-from bt_actions import testimony, twin
 from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.deadlines import Deadlines
 from bt_actions.goal import TABLE, Goal, Row
 from bt_actions.goal_terms import Command, Event, State
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.resources import Answer, Resources
-from tests.machine.callers import Caller
+from bt_actions.ros.line import Line
+from bt_actions.ros.shared import Domain, Ticket
+from bt_actions.ros.traffic import Traffic
+from bt_actions.standstill import Standstill
 from tests.machine.histories import broken, first_broken, random_history
+from tests.machine.production import now as playing
 
 ENOUGH = 15_000
 """Histories in which each mistake must be found; CI plays 50,000 on the right machine."""
@@ -61,13 +65,14 @@ def begins_though_it_was_interrupted(patch: Patch) -> None:
 
 @mutation
 def takes_a_late_answer_for_the_attempt_that_runs_now(patch: Patch) -> None:
-    def addressee(caller: Caller, line: Any, message: Any) -> Any:
-        for leaf in caller.leaves:
-            if message.name.startswith(f"{leaf.name}.") and leaf.ticket is not None:
-                return leaf.ticket if leaf.ticket.goal.sent else None
-        return line.tickets.get(message.goal_id)
+    def heard_of(line: Line, goal_id: bytes) -> Ticket | None:
+        runs_now: Ticket | None = playing().seen[goal_id].real.owner.ticket
+        if runs_now is not None:
+            return runs_now if runs_now.goal.sent else None
+        return original(line, goal_id)
 
-    patch.setattr(Caller, "addressee", addressee)
+    original = Line._heard_of
+    patch.setattr(Line, "_heard_of", heard_of)
 
 
 @mutation
@@ -183,17 +188,37 @@ def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
 
 @mutation
 def minds_only_the_goals_of_its_own_node(patch: Patch) -> None:
-    def in_the_way(caller: Caller, ticket: Any) -> bool:
-        caller.look(ticket.line)
-        mine = ticket.line.tickets.values()
-        return any(other.goal.bars(ticket.goal, same_server=True) for other in mine)
+    patch.setattr(Traffic, "_in_the_way_of", lambda self, ticket: ticket.line.in_the_way_of(ticket))
 
-    patch.setattr(Caller, "_in_the_way_of", in_the_way)
+
+@mutation
+def knows_of_nothing_in_the_way(patch: Patch) -> None:
+    patch.setattr(Traffic, "_in_the_way_of", lambda self, ticket: False)
 
 
 @mutation
 def leaves_a_lost_goal_to_a_node_that_is_not_shown_its_server(patch: Patch) -> None:
-    patch.setattr(Caller, "_take_over", lambda caller, line: None)
+    patch.setattr(Line, "_take_over", lambda self, now: None)
+
+
+@mutation
+def adopts_nothing_that_was_left(patch: Patch) -> None:
+    patch.setattr(Line, "_adopt", lambda self: None)
+
+
+@mutation
+def remembers_nothing_that_is_lost(patch: Patch) -> None:
+    patch.setattr(Domain, "keep_lost", lambda self, *lost: None)
+
+
+@mutation
+def takes_who_is_not_in_sight_yet_for_lost(patch: Patch) -> None:
+    patch.setattr(Standstill, "servers_take", lambda self, now: 0.0)
+
+
+@mutation
+def takes_what_has_not_come_in_yet_for_late(patch: Patch) -> None:
+    patch.setattr(Standstill, "answers_take", lambda self, now: 0.0)
 
 
 @mutation
@@ -244,7 +269,7 @@ def runs_on_beside_the_goal_that_replaced_it(patch: Patch) -> None:
 
 @mutation
 def takes_preemption_for_a_failure(patch: Patch) -> None:
-    patch.setattr(Caller, "_rival_sent", lambda self, ticket: False)
+    patch.setattr(Line, "_rival_sent", lambda self, ticket: False)
 
 
 @mutation
@@ -303,21 +328,6 @@ def says_gone_for_every_end(patch: Patch) -> None:
         return state
 
     decide(patch, State.CANCELING, Event.RESULT, close)
-
-
-@mutation
-def believes_one_server_where_two_may_have_it(patch: Patch) -> None:
-    patch.setattr(testimony.Testimony, "_may_be_at_two", lambda self, watch: False)
-
-
-@mutation
-def takes_the_first_end_of_a_goal_for_that_of_its_twin(patch: Patch) -> None:
-    patch.setattr(twin.TwinTestimony, "_news", lambda self, ended: ended)
-
-
-@mutation
-def hears_the_first_of_two_acceptances(patch: Patch) -> None:
-    patch.setattr(Caller, "_found_twice", lambda self, line, message: None)
 
 
 def forget(deadline: Event) -> Callable[[Patch], None]:

@@ -1,8 +1,8 @@
 """A world of action servers in virtual time, in which every message may be lost, late or doubled.
 
 It holds what is true: both clocks, the network, and what really runs on each server. It knows
-nothing of goal.py (callers.py drives that) and judges nothing (judge.py does). No ROS, no thread,
-no randomness: a move is offered by `World.options` and made by `World.make`.
+nothing of goal.py (production.py has that driven) and judges nothing (judge.py does). No ROS, no
+thread, no randomness: a move is offered by `World.options` and made by `World.make`.
 """
 
 from __future__ import annotations
@@ -103,11 +103,13 @@ class Message:
 
 
 class Client(Protocol):
-    """Who gets the answers, and acts as time goes by (callers.Caller)."""
+    """Who gets the answers, and acts as time goes by (production.Caller)."""
 
     def receive(self, message: Message) -> None: ...
 
     def attend(self) -> None: ...
+
+    def due_in(self) -> float: ...
 
     def accepted_on_server(self, job: Job) -> None: ...
 
@@ -172,7 +174,7 @@ class World:
     def wait(self, seconds: float | None) -> None:
         """Let time pass, until the client's next deadline where `seconds` is None."""
         if seconds is None:
-            seconds = getattr(self.client, "due_in", lambda: 0.5)()
+            seconds = self.client.due_in()
         self.now = Now(self.now.steady + seconds, self.now.ros + seconds * self.pace)
         self.client.attend()
 
