@@ -105,7 +105,7 @@ class Goal:
         self._judged = False  # the tree went on because of them
         self._never_came = False  # denied for good
         self._judged_before = False  # and its server was lost since
-        self._was_left = False  # by our node: its server is the same still
+        self._was_left = False  # LEFT, not SERVER_LOST
         self._doubts = 0
         self._seen_status: int | None = None  # terminal, from the status topic
         self._asked_since = 0  # questions for the result since then, in vain,
@@ -572,7 +572,8 @@ class Goal:
 
     def _ask_changed_server(self, now: Now, detail: Any) -> State:
         """Ask for the result; what is to be canceled, is asked to cancel again, too."""
-        if self.state is State.CANCELING and not self.lost and self.end is End.UNKNOWN:
+        open_end = self.end is End.UNKNOWN or self.suspect
+        if self.state is State.CANCELING and not self.lost and open_end:
             self._commands.append(Command.CANCEL)
         if self._accepted:
             self._commands.append(Command.ASK_RESULT)
@@ -598,7 +599,7 @@ class Goal:
         self.lost = False
         if not (self._was_left and self._denied_lately(now)):
             self._denied_since = None
-        self._was_left, self._never_came, self._asked = False, False, 0
+        self._never_came, self._asked = False, 0
         self._cancel_code = None
         if self.end is End.NEVER_STARTED:  # and this is the question whether that still holds
             self._ask(now)

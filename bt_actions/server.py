@@ -13,6 +13,7 @@ ghost and its successor.
 from __future__ import annotations
 
 from enum import Enum
+from typing import NamedTuple
 
 GID = bytes
 
@@ -26,8 +27,9 @@ PROBES_KEPT = 20
 """Probes whose answers are counted; of those before, none is expected any more."""
 LEASE = 25.0
 """Seconds after which no ghost is left: a server that is still shown is there."""
-NOT_READY_FOR = 1.0
-"""Seconds without readiness, though requests would be read, until the server counts as gone."""
+NOT_READY_FOR = 2.0
+"""Seconds without readiness and without a word, though requests would be read, until the server
+counts as gone."""
 
 
 class Server(Enum):
@@ -38,6 +40,14 @@ class Server(Enum):
     SETTLING = "settling"
     """More than one is shown, and it is not known yet which of them live."""
     AMBIGUOUS = "ambiguous"
+
+
+class _Answers(NamedTuple):
+    """What came back to one probe, and when it was sent."""
+
+    number: int
+    first: float
+    sent: float
 
 
 class ServerWatch:
@@ -53,12 +63,18 @@ class ServerWatch:
         self._not_alone_before = float("-inf")
         self._probed_at = float("-inf")
         self._sent: dict[int, float] = {}  # probe: when it was sent
-        self._answers: dict[int, tuple[int, float]] = {}  # probe: answers, time of the first
+        self._answers: dict[int, _Answers] = {}  # by probe
+        self._heard_at = float("-inf")
         self._both_answered = False
         self._most_answers = 0
 
-    def observe(self, now: float, ready: bool, gids: frozenset[GID]) -> None:
-        """Take what discovery shows at `now` (seconds, steady clock)."""
+    def observe(
+        self, now: float, ready: bool, gids: frozenset[GID], *, concludes: bool = True
+    ) -> None:
+        """Take what discovery shows at `now` (seconds, steady clock).
+
+        `concludes`: whether all answers that have come are in, so that silence means something.
+        """
         if ready:
             self._unready_since = None
         elif self._unready_since is None:
@@ -71,7 +87,7 @@ class ServerWatch:
             self._crowded_since = now if len(gids) > 1 else None
             self.gids = gids
         since = self._crowded_since
-        if since is None or self._both_answered or now < self._not_alone_before:
+        if not concludes or since is None or self._both_answered or now < self._not_alone_before:
             return
         if now - since >= SLOWEST_START:
             self.alone = self._answered_once(now, since)
@@ -87,10 +103,10 @@ class ServerWatch:
 
     def _answered_once(self, now: float, sent_since: float) -> bool:
         return any(
-            count == 1
-            and now - first >= SETTLED_AFTER
-            and self._sent.get(probe, float("-inf")) >= sent_since
-            for probe, (count, first) in self._answers.items()
+            answers.number == 1
+            and now - answers.first >= SETTLED_AFTER
+            and answers.sent >= sent_since
+            for answers in self._answers.values()
         )
 
     def alone_since(self, now: float, moment: float) -> bool:
@@ -108,12 +124,18 @@ class ServerWatch:
 
     def probe_answered(self, now: float, probe: int) -> None:
         """Take one answer to the probe numbered `probe`."""
-        count, first = self._answers.get(probe, (0, now))
-        self._answers[probe] = (count + 1, first)
+        self.heard(now)
+        sent = self._sent.get(probe, float("-inf"))
+        count, first, sent = self._answers.get(probe, (0, now, sent))
+        self._answers[probe] = _Answers(count + 1, first, sent)
         if len(self._answers) > PROBES_KEPT:
             del self._answers[next(iter(self._answers))]
         if count + 1 > 1:
             self.two_answered(count + 1)
+
+    def heard(self, now: float) -> None:
+        """Take any word of a server: whoever speaks is there."""
+        self._heard_at = now
 
     def two_answered(self, answers: int = 2) -> None:
         """Take note that two, or more, have answered one question, a probe or another."""
@@ -147,19 +169,29 @@ class ServerWatch:
             return Server.AMBIGUOUS
         return Server.READY if self.alone else Server.SETTLING
 
-    def wants_probe(self, now: float) -> bool:
-        """Whether a probe is due; the caller sends one when this says so."""
-        open_question = self._crowded_since is not None and not self._both_answered
-        if not open_question or now - self._probed_at < PROBE_EVERY:
+    def wants_probe(self, now: float, *, runs: bool = False) -> bool:
+        """Whether a probe is due; the caller sends one when this says so.
+
+        `runs`: goals may run here, so that it matters whether one that is not ready is gone.
+        """
+        is_open = self._crowded_since is not None and not self._both_answered
+        is_open |= runs and self._unready_since is not None and bool(self.gids)
+        if not is_open or now - self._probed_at < PROBE_EVERY:
             return False
         self._probed_at = now
         return True
 
     def gone(self, now: float, sent_to: frozenset[GID]) -> bool:
-        """Whether none of the servers that a goal was sent to is there any more."""
+        """Whether none of the servers that a goal was sent to is there any more.
+
+        One that is not ready is gone if nothing is heard, and no other is in sight: readiness is
+        that of the name, and a second server that is discovered in part takes it away.
+        """
         if not sent_to & self.gids:
             return True
-        return self._unready_since is not None and now - self._unready_since >= NOT_READY_FOR
+        if self._unready_since is None or len(self.gids) > 1:
+            return False
+        return now - max(self._unready_since, self._heard_at) >= NOT_READY_FOR
 
     def changed(self, sent_to: frozenset[GID]) -> bool:
         """Whether a server is shown that was not there when the goal was sent."""

@@ -3,8 +3,8 @@
 One server's word does not speak for another's: where a second one opened, or woke up, when the
 request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
 other may run. So while more than one of the servers that the request went to may live, an ending
-is believed when a question was answered twice, or when it has turned out that one is a ghost. A
-goal that has ended, and turns up at another server, is a twin (twin.py).
+is believed when all in sight have answered a question, or when it has turned out that one is left,
+beside ghosts. A goal that has ended, and turns up at another server, is a twin (twin.py).
 
 Told of answers and of looks at the server, it returns what the goal is to be told. What follows
 from that is the goal's (goal.py); who lives is known to the watch (server.py). No ROS, no thread,
@@ -132,7 +132,7 @@ class Testimony:
         if answers[-1] == CANCEL_UNKNOWN_GOAL:
             if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
                 return []
-            by_some = len(answers) < _all_in_sight(watch) and len(self.sent_to) > 1
+            by_some = len(answers) < _answers_wanted(watch) and len(self.sent_to) > 1
             if by_some and (self._may_be_at_two(watch) or asked < self._fresh_since):
                 return []
         return [(Event.CANCEL_ANSWERED, answers[-1])]
@@ -149,7 +149,7 @@ class Testimony:
             if len(self.sent_to) > 1:
                 if asked < self._fresh_since:
                     return []
-                if len(answers) < _all_in_sight(watch) and self._may_be_at_two(watch):
+                if len(answers) < _answers_wanted(watch) and self._may_be_at_two(watch):
                     self._ended = done
                     return []
             self._ends_told = tuple(ENDS[each[0]] for each in ended)
@@ -159,7 +159,7 @@ class Testimony:
             return [(Event.RESULT, done)]
         if status != 0:  # answered too soon, by a server that is none of rclpy's or rclcpp's
             return [(Event.STATUS, status)]
-        by_each = len(answers) >= _all_in_sight(watch)
+        by_each = len(answers) >= _answers_wanted(watch)
         if watch.changed(self.sent_to) and not (by_each and asked >= self._fresh_since):
             if self._denied_at is None:  # by one of several; `looked` finds out what that means
                 self._denied_at = now
@@ -235,8 +235,8 @@ class Testimony:
     def _note_changes(self, watch: ServerWatch, now: float) -> None:
         """Who has left may have answered what was asked before; who is back was not asked."""
         crowd = watch.gids if _is_crowded(watch) else frozenset[GID]()
-        left, came = self._crowd - watch.gids, (crowd - self._in_sight) & self.servers
-        if left or came:
+        left, came = self._crowd - watch.gids, (watch.gids - self._in_sight) & self.servers
+        if left or (came and len(self.servers) > 1):
             self._fresh_since = now
             self._one_left |= bool(left)
             self._one_came |= bool(came)
@@ -252,8 +252,11 @@ class Testimony:
         return _is_crowded(watch) and len(self.sent_to & watch.gids) > 1
 
 
-def _all_in_sight(watch: ServerWatch) -> int:
-    """Return how many answers one question has when each has answered: newcomers do, too."""
+def _answers_wanted(watch: ServerWatch) -> int:
+    """Return how many answers one question has when all in sight have answered, newcomers, too.
+
+    Two where one is in sight: of two that were asked, one has gone since.
+    """
     return max(2, len(watch.gids))
 
 

@@ -1173,6 +1173,37 @@ def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> No
     assert life.goal.suspect is not counts
 
 
+@pytest.mark.parametrize(
+    ("ways", "counts"),
+    [
+        ([Event.LEFT], True),
+        ([Event.SERVER_LOST], False),
+        ([Event.LEFT, Event.SERVER_LOST], False),
+    ],
+    ids=["left", "lost", "left, and then out of sight"],
+)
+def test_denials_count_only_as_long_as_the_server_was_there(
+    ways: list[Event], counts: bool
+) -> None:
+    life = denied_suspect()
+    for _ in range(25):
+        life.pass_time(1.0)
+        denied(life)
+    for way in ways:
+        life.on(way)
+    life.pass_time(0.5)
+    life.on(Event.SERVER_RETURNED)
+    for _ in range(8):
+        life.pass_time(1.0)
+        denied(life)
+    assert life.goal.suspect is not counts
+
+
+def test_a_suspect_whose_server_is_back_beside_another_is_canceled_again() -> None:
+    life = denied_suspect()
+    assert CANCEL in life.on(Event.SERVER_CHANGED)
+
+
 def test_a_process_that_ends_does_not_say_never_started_of_a_request_without_answer() -> None:
     life = suspect()
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)

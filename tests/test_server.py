@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.server import LEASE, PROBE_EVERY, SETTLED_AFTER, SLOWEST_START, Server, ServerWatch
+from bt_actions.server import (
+    LEASE,
+    NOT_READY_FOR,
+    PROBE_EVERY,
+    PROBES_KEPT,
+    SETTLED_AFTER,
+    SLOWEST_START,
+    Server,
+    ServerWatch,
+)
 
 OLD, NEW, THIRD = b"old", b"new", b"third"
 
@@ -184,10 +193,52 @@ def test_it_is_gone_when_it_is_not_ready_for_a_while_but_not_at_once(watch: Serv
     watch.observe(1.0, True, gids(OLD))
     watch.observe(1.2, False, gids(OLD))
     assert not watch.gone(1.2, gids(OLD))
-    watch.observe(2.3, False, gids(OLD))
-    assert watch.gone(2.3, gids(OLD))
-    watch.observe(2.4, True, gids(OLD))
-    assert not watch.gone(2.4, gids(OLD))
+    late = 1.2 + NOT_READY_FOR
+    watch.observe(late, False, gids(OLD))
+    assert watch.gone(late, gids(OLD))
+    watch.observe(late + 0.1, True, gids(OLD))
+    assert not watch.gone(late + 0.1, gids(OLD))
+
+
+def test_one_that_is_not_ready_is_asked_and_is_not_gone_while_it_speaks(watch: ServerWatch) -> None:
+    watch.observe(1.0, False, gids(OLD))
+    assert not watch.wants_probe(1.0), "nothing runs there"
+    assert watch.wants_probe(1.0, runs=True)
+    assert not watch.wants_probe(1.0, runs=True)
+    watch.probe_sent(1.0, 1)
+    watch.probe_answered(1.5, 1)
+    assert not watch.gone(1.4 + NOT_READY_FOR, gids(OLD))
+    assert watch.gone(1.5 + NOT_READY_FOR, gids(OLD))
+    watch.heard(3.0)
+    assert not watch.gone(1.5 + NOT_READY_FOR, gids(OLD))
+
+
+def test_a_second_server_that_is_discovered_in_part_does_not_make_the_first_gone(
+    watch: ServerWatch,
+) -> None:
+    """A name is ready only where all services of all its servers are matched."""
+    watch.observe(1.0, False, gids(OLD, NEW))
+    assert not watch.gone(60.0, gids(OLD))
+    watch.observe(61.0, False, gids(NEW))
+    assert watch.gone(61.0, gids(OLD))
+
+
+def test_who_has_answered_is_alone_also_when_its_probe_is_long_past(watch: ServerWatch) -> None:
+    """It is busy since, and answers no newer one."""
+    settle(watch)
+    for probe in range(2, 2 * PROBES_KEPT):
+        watch.probe_sent(5.0 + probe / 2, probe)
+    watch.observe(30.0, True, gids(OLD, NEW))
+    assert watch.alone
+
+
+def test_who_only_sees_concludes_nothing_from_silence(watch: ServerWatch) -> None:
+    crowd(watch).probe_answered(1.1, 1)
+    late = 1.1 + SLOWEST_START
+    watch.observe(late, True, gids(OLD, NEW), concludes=False)
+    assert not watch.alone
+    watch.observe(late, True, gids(OLD, NEW))
+    assert watch.alone
 
 
 def test_a_newcomer_is_a_change_and_a_departure_is_not(watch: ServerWatch) -> None:
@@ -201,8 +252,8 @@ def test_looking_seldom_is_not_being_away(watch: ServerWatch) -> None:
     """Nobody looked for a minute; the first look finds it not ready, for how long nobody knows."""
     watch.observe(60.0, False, gids(OLD))
     assert not watch.gone(60.0, gids(OLD))
-    watch.observe(61.0, False, gids(OLD))
-    assert watch.gone(61.0, gids(OLD))
+    watch.observe(60.0 + NOT_READY_FOR, False, gids(OLD))
+    assert watch.gone(60.0 + NOT_READY_FOR, gids(OLD))
 
 
 def test_after_a_standstill_of_ours_answers_have_time_to_come_in(watch: ServerWatch) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from bt_actions import testimony
@@ -327,6 +329,43 @@ def test_who_is_back_is_asked_and_what_was_asked_before_is_not_all(
     assert events(said.looked(watch, 2.2)) == [Event.SERVER_CHANGED]
     assert said.finished(watch, 2.4, 2.3, [ABORTED]) == []
     assert said.finished(watch, 2.4, 2.3, [ABORTED, ABORTED])[-1] == (Event.RESULT, ABORTED)
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        (lambda said, watch: said.answered(watch, 1.1, [False]), [Event.SERVER_AMBIGUOUS]),
+        (lambda said, watch: said.canceled(watch, 1.1, 0.9, [DENIED]), []),
+        (lambda said, watch: said.finished(watch, 1.1, 0.9, [UNKNOWN]), []),
+        (lambda said, watch: [(Event(e), s) for e, s in said.shown(watch, 1.1, 4) if s == 4], []),
+    ],
+    ids=["refused", "denied to cancel", "denied", "ended"],
+)
+def test_what_comes_when_one_has_just_left_may_be_its_word(
+    said: testimony.Testimony, watch: ServerWatch, word: Any, told: list[Event]
+) -> None:
+    watch.observe(1.0, True, frozenset({ONE}))
+    assert events(word(said, watch)) == told
+
+
+def test_one_in_place_of_the_other_is_a_change(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    watch.observe(1.0, True, frozenset({ONE}))
+    said.looked(watch, 1.0)
+    watch.observe(2.0, True, frozenset({OTHER}))
+    assert said.finished(watch, 2.1, 1.5, [ABORTED]) == [], "by the one that has gone"
+    assert events(said.looked(watch, 2.2)) == [Event.SERVER_CHANGED]
+
+
+def test_a_newcomer_is_not_one_that_is_back(watch: ServerWatch) -> None:
+    said = sent(watch)
+    said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
+    said.looked(watch, 0.5)
+    watch.observe(1.0, True, BOTH)
+    assert said.finished(watch, 1.0, 0.5, [UNKNOWN]) == []
+    watch.observe(1.1, True, frozenset({OTHER}))
+    assert events(said.looked(watch, 1.1)) == [Event.SERVER_LOST]
 
 
 def test_what_was_said_before_a_loss_is_of_no_account_after_it(

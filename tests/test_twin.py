@@ -345,3 +345,31 @@ def test_the_end_of_the_one_server_there_is_told_once() -> None:
     case.looked(twin, 2.0)
     twin.sent_to = frozenset({ONE})
     assert events(twin.finished(case.watch, 2.2, 2.1, [SUCCEEDED])) == [Event.RESULT_UNKNOWN]
+
+
+def test_what_was_asked_before_one_left_counts_for_nothing(case: Case) -> None:
+    twin = case.twin()
+    case.looked(twin, 1.1)
+    case.sees(1.5, OTHER)
+    twin.canceled(case.watch, 1.6, 1.4, [REFUSED])
+    assert twin.finished(case.watch, 1.6, 1.4, [SUCCEEDED]) == []
+    case.looked(twin, 1.7)
+    told = twin.finished(case.watch, 1.9, 1.8, [SUCCEEDED])
+    assert events(told) == [Event.SERVER_LOST], "nobody has said that it runs"
+
+
+def test_three_that_accept_what_one_had_ended_tell_two_ends() -> None:
+    case = Case(ONE, OTHER, THIRD)
+    case.goal.end = End.SUCCEEDED
+    case.sees(0.5, ONE)
+    case.said.looked(case.watch, 0.5)
+    twin = case.twin_elsewhere()
+    case.sees(1.5, ONE, OTHER, THIRD)
+    assert events(twin.answered(case.watch, 1.6, [True] * 3)) == [Event.SERVER_RETURNED]
+    twin._goal.on(Event.SERVER_RETURNED, Now(1.6, 1.6))
+    assert twin.finished(case.watch, 1.8, 1.7, [SUCCEEDED, CANCELED]) == []
+
+
+def test_a_status_instead_of_an_end_is_a_status(case: Case) -> None:
+    twin = case.twin()
+    assert twin.finished(case.watch, 1.6, 1.4, [UNKNOWN, (2, None)]) == [(Event.STATUS, 2)]

@@ -71,6 +71,7 @@ class Line:
         self._heard_at = time.monotonic()  # of an orphan: when somebody last answered
         self.way = Way(self)
         self._look_at = 0.0
+        self._looked_like = Server.ABSENT  # at the last look
         self.in_sight_since = time.monotonic()
         """Since when a server of this name has been shown without a break that was seen."""
         self._just_came = True
@@ -102,6 +103,7 @@ class Line:
             if ticket is None:
                 self.past.runs(goal_id)
                 return
+            self.watch.heard(time.monotonic())
             self._pass_on(ticket, ticket.testimony.lives(self.watch, time.monotonic()))
             self.tell(ticket, Event.FEEDBACK, feedback)
             if ticket.keeps_feedback:
@@ -131,14 +133,16 @@ class Line:
     def _heard_of(self, goal_id: bytes) -> Ticket | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight."""
         ticket = self.goals.get(goal_id)
-        if ticket is not None and len(ticket.testimony.servers) > 1:
-            self.see()
+        if ticket is not None:
+            self.watch.heard(time.monotonic())
+            if len(ticket.testimony.servers) > 1:
+                self.see()
         return ticket
 
     def see(self) -> None:
-        """Observe the server now, and not at the next look; where our node is gone, that tells."""
+        """Observe now who is in sight; what follows for the server is for the next look to say."""
         with contextlib.suppress(Exception):
-            self._observe(time.monotonic())
+            self._observe(time.monotonic(), concludes=False)
 
     def _pass_on(self, ticket: Ticket, told: Told) -> None:
         for event, detail in told:
@@ -343,6 +347,7 @@ class Line:
     def open(self, client: ActionClient) -> None:
         """Go on with another client, of which nothing is known yet."""
         self.client, self.watch = client, ServerWatch()
+        self._looked_like = Server.ABSENT
         self._look_at = 0.0
         alarm.wake_by(time.monotonic())
 
@@ -454,9 +459,11 @@ class Line:
         for ticket in settled[:-LOST_KEPT]:
             self.tell(ticket, Event.CLOSED)
 
-    def _observe(self, now: float) -> None:
+    def _observe(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""
-        self.watch.observe(now, self.client.server_is_ready(), self.way.shown())
+        self.watch.observe(
+            now, self.client.server_is_ready(), self.way.shown(), concludes=concludes
+        )
 
     def look(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
@@ -470,7 +477,7 @@ class Line:
             self.pump()
             if self.client.closed:  # by what came, and nobody used the line
                 return Server.ABSENT
-        before = self.watch.state(now)
+        before = self._looked_like
         try:
             self._observe(now)
         except Exception:  # noqa: BLE001 - InvalidHandle: it was destroyed since
@@ -479,7 +486,8 @@ class Line:
             return Server.ABSENT
         self._adopt()
         self._take_over(now)
-        if self.way.wants_question(now) or self.watch.wants_probe(now):
+        runs = any(ticket.goal.sent and not ticket.goal.lost for ticket in self.goals.values())
+        if self.way.wants_question(now) or self.watch.wants_probe(now, runs=runs):
             self.probe()
         for ticket in list(self.goals.values()):
             gone = self.watch.gone(now, ticket.testimony.sent_to)
@@ -491,7 +499,7 @@ class Line:
                 if gone and not ticket.goal.lost:
                     self.pump()  # its last words
                 self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
-        state = self.watch.state(now)
+        state = self._looked_like = self.watch.state(now)
         if before is Server.ABSENT:
             self.in_sight_since = now
         came = now - self.in_sight_since < BESIDE

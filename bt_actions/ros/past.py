@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goal_terms import CANCEL_ACCEPTED, CANCEL_REJECTED, Event
+from bt_actions.goal_terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.shared import Ticket
@@ -53,7 +53,10 @@ class Past:
         self._ended: dict[bytes, Ended] = {}
 
     def keep(self, ticket: Ticket) -> None:
-        """Keep a goal that is DONE in mind; where one that may run it is gone, wait for that."""
+        """Keep a goal that is DONE in mind; where one that may run it is gone, wait for that.
+
+        But not where it is lost, and is given up with many others.
+        """
         line = self._line
         twin = dataclasses.replace(
             ticket,
@@ -63,7 +66,8 @@ class Past:
         )
         line.see()
         elsewhere = ticket.testimony.may_run_at(line.watch)
-        if elsewhere:
+        given_up = ticket.goal.lost and ticket.goal.end not in ENDS.values()
+        if elsewhere and not given_up:
             twin.testimony = TwinTestimony(twin.goal, ticket.testimony, elsewhere)
             twin.testimony.taken_over()
             line.goals[twin.goal.id] = twin
@@ -81,16 +85,16 @@ class Past:
 
     def accepted(self, goal_id: bytes, answers: Sequence[bool] = (True,)) -> None:
         """Take an acceptance: it may have been overtaken by the result, or have come twice."""
-        ended = self._ended.get(goal_id)
+        ended = self._get(goal_id)
         if ended is None:
             return
         is_news = not ended.accepted and sum(answers) == 1
         if self._may_be_several(ended) or is_news:
-            self._turns_up(ended)
+            self._hand_over(ended)
 
     def cancel_answered(self, goal_id: bytes, asked: float, code: int) -> None:
         """Take an answer to a cancel request: who has ended a goal neither agrees nor refuses."""
-        ended = self._ended.get(goal_id)
+        ended = self._get(goal_id)
         if ended is not None and asked > ended.since and code in (CANCEL_ACCEPTED, CANCEL_REJECTED):
             self.accepted(goal_id)
 
@@ -100,8 +104,8 @@ class Past:
         What seems to be older than the end may be all that a second server ever says of it; to ask
         it to cancel tells.
         """
-        ended = self._ended.get(goal_id)
-        if ended is None or self._line.is_parents:
+        ended = self._get(goal_id)
+        if ended is None:
             return
         if time.monotonic() - ended.since > STALE:
             self.accepted(goal_id)
@@ -110,11 +114,15 @@ class Past:
             with contextlib.suppress(Exception):  # our node is gone; the next look tells
                 self._line.client.cancel(goal_id)
 
+    def _get(self, goal_id: bytes) -> Ended | None:
+        """Return what has ended; in the child of a fork nothing has, it is the parent's."""
+        return None if self._line.is_parents else self._ended.get(goal_id)
+
     def _may_be_several(self, ended: Ended) -> bool:
         self._line.see()
         return len(ended.said.servers | self._line.watch.gids) > 1
 
-    def _turns_up(self, ended: Ended) -> None:
+    def _hand_over(self, ended: Ended) -> None:
         line, twin = self._line, ended.twin
         del self._ended[twin.goal.id]
         twin.owner = ended.owner()

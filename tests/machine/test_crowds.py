@@ -33,8 +33,8 @@ def test_no_history_breaks_a_rule() -> None:
 
 
 MISTAKES: dict[str, tuple[Any, str, Callable[..., Any]]] = {
-    "believes two of three": (testimony, "_all_in_sight", lambda watch: 2),
-    "waits for who is not there": (testimony, "_all_in_sight", lambda watch: 3),
+    "believes two of three": (testimony, "_answers_wanted", lambda watch: 2),
+    "waits for who is not there": (testimony, "_answers_wanted", lambda watch: 3),
     "takes what was told before for news": (TwinTestimony, "_news", lambda self, ended: ended),
     "takes any answer for all": (testimony.Testimony, "_may_be_at_two", lambda self, watch: False),
     "is alone with whom it does not know": (TwinTestimony, "_is_alone", lambda self, watch: True),

@@ -19,7 +19,7 @@ from bt_actions.ros import line as module
 from bt_actions.ros.line import LEASE, Line
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
-from bt_actions.server import ServerWatch
+from bt_actions.server import Server, ServerWatch
 from bt_actions.standstill import AT_MOST, Leniency, Standstill
 
 OURS, NEW = b"ours", b"new"
@@ -100,6 +100,7 @@ def look(line: Any, seen: ServerWatch, now: float) -> None:
         seen.observe(now, True, seen.gids)
         raise RuntimeError
 
+    line._looked_like = Server.ABSENT
     line.watch, line._observe = seen, observe
     line.traffic, line.way = SimpleNamespace(node=None), SimpleNamespace(come_home=lambda: True)
     line.client = SimpleNamespace(closed=False)

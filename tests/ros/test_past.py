@@ -34,6 +34,7 @@ class OfPast(Line):
         self.past = Past(self)
         self.past._ended[GOAL] = Ended(lambda: None, True, 10.0, twin, said)
         self.watch: Any = SimpleNamespace(gids=frozenset({ONE}), two_answered=lambda: None)
+        self.watch.heard = lambda _: None
         self.asked: list[bytes] = []
         self.client: Any = SimpleNamespace(cancel=self.asked.append)
         self._generation = shared.generation
@@ -43,7 +44,7 @@ class OfPast(Line):
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
         monkeypatch.setattr(module, "alarm", SimpleNamespace(mind=lambda _: None))
 
-    def _observe(self, now: float) -> None:
+    def _observe(self, now: float, *, concludes: bool = True) -> None:
         self.watch.gids |= self.comes_in_sight
 
     def tell(self, ticket: Any, event: Event, detail: Any = None, message: Any = None) -> None:
@@ -53,6 +54,26 @@ class OfPast(Line):
 @pytest.fixture
 def line(monkeypatch: pytest.MonkeyPatch) -> OfPast:
     return OfPast(monkeypatch, ONE, OTHER)
+
+
+def test_one_servers_acceptance_that_the_result_has_overtaken_is_no_news(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    line = OfPast(monkeypatch, ONE)
+    line.goal_answered(GOAL, (True,))
+    assert not line.found
+    line.past._ended[GOAL].accepted = False
+    line.goal_answered(GOAL, (True, True))
+    assert not line.found, "twice by one"
+    line.goal_answered(GOAL, (True,))
+    assert line.found == [Event.SERVER_RETURNED]
+
+
+def test_the_child_of_a_fork_finds_nothing(line: OfPast) -> None:
+    line._generation += 1
+    line.goal_answered(GOAL, (True,))
+    line.cancel_answered(GOAL, 10.5, (AGREED,))
+    assert not line.found
 
 
 def test_what_may_be_older_than_the_end_is_followed_up_where_there_are_two(line: OfPast) -> None:
