@@ -22,7 +22,7 @@ from bt_actions.goal import State
 from bt_actions.ros.shared import Change, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.ros.way import Way
-from bt_actions.server import Server, ServerWatch
+from bt_actions.server import NOT_READY_FOR, Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import Host, HostFactory, Journal
 from tests.support.reliability import Record
@@ -772,6 +772,24 @@ class TestTwice:
         assert of_process(journal, other.pid)[:5] == CANCELED
         assert stood(more) == (Outcome.SERVER_AMBIGUOUS, End.NEVER_STARTED)
         record.outcome = "SUCCEEDED; what the second server took is canceled"
+
+    def test_a_second_server_that_is_seen_in_part_leaves_the_firsts_goal_alone(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """The name is made not ready, as rmw has it where half of a second one is discovered"""
+        one = new_host()
+        journal = one.open(name, "*:no_feedback")
+        leaf = MoveRobot("m", 40.0, action_name=name, timeout=Timeouts(server=20.0))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING", 20.0)
+            with lock:
+                Traffic.of(node)._lines[name].client.server_is_ready = lambda: False
+            assert holds_for(lambda: leaf.outcome is None, 2 * NOT_READY_FOR)
+            assert journal.events() == ["received", "accepted"]
+        assert stood(leaf) == (Outcome.CANCELED, End.CANCELED)
+        assert of_process(journal, one.pid) == CANCELED
+        record.outcome = "runs on; CANCELED when it is not wanted any more"
 
     @pytest.mark.parametrize("loop", ["our runner", "a foreign loop"])
     def test_shutdown_waits_for_what_the_second_server_took(
