@@ -72,6 +72,7 @@ class Line:
         self.way = Way(self)
         self._look_at = 0.0
         self._looked_like = Server.ABSENT  # at the last look
+        self._was_away = False  # seen between two looks
         self.in_sight_since = time.monotonic()
         """Since when a server of this name has been shown without a break that was seen."""
         self._just_came = True
@@ -142,7 +143,9 @@ class Line:
     def see(self) -> None:
         """Observe now who is in sight; what follows for the server is for the next look to say."""
         with contextlib.suppress(Exception):
-            self._observe(time.monotonic(), concludes=False)
+            now = time.monotonic()
+            self._observe(now, concludes=False)
+            self._was_away |= self.watch.state(now) is Server.ABSENT
 
     def _pass_on(self, ticket: Ticket, told: Told) -> None:
         for event, detail in told:
@@ -271,9 +274,8 @@ class Line:
             if command is Command.SEND:
                 ticket.testimony.sent(self.watch)
                 self.client.send(goal.id, message)
-                with contextlib.suppress(Exception):  # it has left: what fails now is no failure
-                    self._observe(time.monotonic())
-                    ticket.testimony.sent(self.watch)  # who opened since got it, too
+                self.see()
+                ticket.testimony.sent(self.watch)  # who opened since got it, too
             elif command is Command.CANCEL:
                 self.client.cancel(goal.id)
             else:
@@ -500,8 +502,9 @@ class Line:
                     self.pump()  # its last words
                 self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
         state = self._looked_like = self.watch.state(now)
-        if before is Server.ABSENT:
+        if before is Server.ABSENT or self._was_away:
             self.in_sight_since = now
+        self._was_away = False
         came = now - self.in_sight_since < BESIDE
         if self._just_came and not came:
             self.traffic.notify(None)  # what was held up for it may be sent

@@ -100,7 +100,7 @@ def look(line: Any, seen: ServerWatch, now: float) -> None:
         seen.observe(now, True, seen.gids)
         raise RuntimeError
 
-    line._looked_like = Server.ABSENT
+    line._looked_like, line._was_away = Server.ABSENT, False
     line.watch, line._observe = seen, observe
     line.traffic, line.way = SimpleNamespace(node=None), SimpleNamespace(come_home=lambda: True)
     line.client = SimpleNamespace(closed=False)
@@ -131,6 +131,33 @@ def test_a_look_that_comes_late_decides_nothing_about_who_is_alone(
     line: Any = SimpleNamespace(_look_at=due, pump=lambda: None)
     look(line, seen, 3.0)
     assert seen.alone is alone
+
+
+def test_a_break_between_two_looks_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What else comes back with the server is waited for."""
+    monkeypatch.setattr(module, "is_valid", lambda _: True)
+    monkeypatch.setattr(Line, "_adopt", lambda _: None)
+    monkeypatch.setattr(Line, "_take_over", lambda *_: None)
+    line: Any = object.__new__(Line)
+    domain = SimpleNamespace(lost_sight=False, known=set(), number=1)
+    line.traffic = SimpleNamespace(node=None, notify=lambda _: None, domain=domain)
+    line.name, line.action_type, line.goals, line.watch = "x", None, {}, ServerWatch()
+    line._looked_like, line._was_away, line._just_came = Server.ABSENT, False, False
+    line._look_at, line._warned_crowd = 0.0, False
+    shown = frozenset({OURS})
+    line.client = SimpleNamespace(closed=False, server_is_ready=lambda: bool(shown))
+    line.way = SimpleNamespace(
+        shown=lambda: shown, wants_question=lambda _: False, seek=lambda _: None
+    )
+    for now in (1.0, 1.2):
+        line.look(now)
+    assert line.in_sight_since == 1.0
+    shown = frozenset()
+    line.see()
+    shown = frozenset({OURS})
+    for now in (1.4, 1.6):
+        line.look(now)
+    assert line.in_sight_since == 1.4
 
 
 def test_a_line_without_goals_is_not_late(monkeypatch: pytest.MonkeyPatch) -> None:
