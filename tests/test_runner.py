@@ -931,12 +931,19 @@ class TestWhoseGoalsTheyAre:
 
 class TestWhoWaits:
     def test_a_wait_ends_when_another_thread_shuts_down(
-        self, journal: Journal, name: str, node: Any
+        self, journal: Journal, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         runner = TreeRunner(MoveRobot("m", 9.0, action_name=name), node=node)
+        waits, minds = threading.Event(), runner._mind_signals
+        monkeypatch.setattr(runner, "_mind_signals", lambda: (waits.set(), minds())[1])
         runner.start()
         journal.wait_for("accepted")
-        threading.Thread(target=runner.shutdown).start()
+
+        def shut_down() -> None:
+            waits.wait()
+            runner.shutdown()
+
+        threading.Thread(target=shut_down).start()
         assert runner.wait(9.0) is Status.INVALID
         assert journal.ends() == ["canceled"]
 
