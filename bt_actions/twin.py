@@ -132,6 +132,9 @@ class TwinTestimony(Testimony):
         return max(1, since) if self._may_be_at_two(watch) else 1
 
     def _is_alone(self, watch: ServerWatch) -> bool:
-        """Whether only that server is in sight that runs it: nobody who has told its end before."""
+        """Whether only that server is in sight that runs it: nobody who has told its end before.
+
+        Which was told by itself where no other has ever had the goal.
+        """
         alone = len(self.sent_to) == 1 and self.servers & watch.gids == self.sent_to
         return alone and self.servers != self.sent_to
