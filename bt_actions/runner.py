@@ -252,7 +252,8 @@ class TreeRunner:
         """Wait for a tree that was started, and return or raise what `run` would.
 
         Signals take effect as in `run` while this, or `shutdown`, is on the main thread.
-        Raises TimeoutError when it is still running after `timeout` seconds; it goes on.
+        Raises TimeoutError, which says what its goals do, when it is still running after `timeout`
+        seconds; it goes on.
         """
         thread = self._thread
         if thread is None:
@@ -261,7 +262,13 @@ class TreeRunner:
         with self._mind_signals():
             thread.join(None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         if thread.is_alive():
-            raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s")
+            goals = [
+                f"{ticket.name} on {ticket.goal.server} is {ticket.goal.state.value}"
+                for ticket in list(self._tickets)
+                if not ticket.accounted_for
+            ]
+            what = f"; {', '.join(goals)}" if goals else ""
+            raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s{what}")
         self._thread = None
         outcome = self._outcome
         if isinstance(outcome, Status):

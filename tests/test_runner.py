@@ -326,10 +326,21 @@ class TestStart:
         gate = Gate()
         with TreeRunner(gate, node=node) as runner:
             runner.start()
-            with pytest.raises(TimeoutError, match="still running"):
+            with pytest.raises(TimeoutError, match=r"is still running after 0.05 s$"):
                 runner.wait(0.05)
             gate.passed = True
             assert runner.wait(5.0) is Status.SUCCESS
+
+    def test_who_gave_up_waiting_is_told_what_the_goals_do(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        told = list[str]()
+        with TreeRunner(MoveRobot("m", 9.0, action_name=name), node=node) as runner:
+            runner.observe(lambda e: told.append(e.state) if isinstance(e, GoalChanged) else None)
+            runner.start()
+            until(lambda: "EXECUTING" in told)
+            with pytest.raises(TimeoutError, match=f"0.05 s; m on {name} is EXECUTING$"):
+                runner.wait(0.05)
 
     def test_wait_without_start_raises(self, node: Any) -> None:
         with TreeRunner(Gate(), node=node) as runner, pytest.raises(RuntimeError, match="started"):

@@ -301,6 +301,7 @@ def simulated(context: Any, no_leaks: None) -> Iterator[tuple[SimulatedTime, Any
     )
     node.executor = None
     executor.shutdown()
+    clock.seen_by = node
     yield clock, node
     node.destroy_node()
     clock.close()

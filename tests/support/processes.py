@@ -146,6 +146,9 @@ class Journal:
         self.server = server
         self.killed: dict[int, float] = {}
 
+    def __repr__(self) -> str:
+        return f"<Journal of {self.server}: {', '.join(self.events())}>"
+
     def entries(self) -> list[Entry]:
         """Return all lines about this server so far."""
         if not self.path.exists():

@@ -19,9 +19,14 @@ class SimulatedTime:
         self._publisher = self._node.create_publisher(Clock, "/clock", 10)
         self._now = 5000.0
         self.rate = 1.0
+        self.seen_by: Any = None
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._publish)
         self._thread.start()
+
+    def __repr__(self) -> str:
+        seen = "nobody's" if self.seen_by is None else self.seen_by.get_clock().now().nanoseconds
+        return f"<SimulatedTime {self._now:.2f} s; the node's, by now: {seen} ns>"
 
     def _publish(self) -> None:
         last = time.monotonic()
