@@ -162,7 +162,7 @@ def test_a_second_sigint_leaves_at_once_and_cleanup_finishes_its_work(
     record.outcome = "exit code 3, naming the goal"
     if phase == "SENDING":
         journal.wait_for("accepted", within=6.0)
-        assert launch("cleanup", "--look", "3").wait() == 0
+        assert launch("cleanup").wait() == 0
         assert journal.ends() == ["canceled"]
         record.outcome += "; cleanup canceled it"
 
@@ -489,14 +489,14 @@ def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
         assert journal.count("cancel_requested") == 0, "a killed client can cancel nothing"
         received = {e.goal for e in journal.entries() if e.event == "received"}
         began = time.monotonic()
-        cleanup = launch("cleanup", "--look", "3")
+        cleanup = launch("cleanup")
         assert cleanup.wait() == 0, cleanup
         record.took(time.monotonic() - began, 15.0)
         asked = {e.goal for e in journal.entries() if e.event == "cancel_requested"}
         assert asked & received == {left}
         assert any(left in line and "CANCELED" in line for line in cleanup.lines), cleanup
         assert ours.outcome is None
-        again = launch("cleanup", "--look", "3")
+        again = launch("cleanup")
         assert again.wait() == 0
         assert again.lines[-1].startswith("nothing was left behind on the ")
     somebody.destroy()
@@ -517,12 +517,12 @@ def test_what_a_killed_container_left_is_found_by_its_name(
     journal.wait_for("accepted")
     run.send(signal.SIGKILL)
     run.wait()
-    here = launch("cleanup", "--look", "3")
+    here = launch("cleanup")
     assert here.wait() == 0, here
     assert any(line.startswith("not touched: ") for line in here.errors), here
     assert here.lines[-1].startswith("nothing of this machine was left behind on the ")
     assert journal.ends() == [None]
-    again = launch("cleanup", "--look", "3", environment=there)
+    again = launch("cleanup", environment=there)
     assert again.wait() == 0, again
     assert journal.ends() == ["canceled"]
     record.shows = "asked to cancel by the second cleanup only"
