@@ -309,8 +309,7 @@ class Goal:
 
     def _invalid(self, now: Now, detail: Any) -> State:
         """Give up: INVALID_GOAL."""
-        bare = isinstance(detail, KeyError) or not str(detail)  # KeyError("x") says 'x' only
-        return self._give_up_unsent(Outcome.INVALID_GOAL, repr(detail) if bare else str(detail))
+        return self._give_up_unsent(Outcome.INVALID_GOAL, str(detail))
 
     def _withdraw(self, now: Now, detail: Any) -> State:
         """Give up: CANCELED; nothing was sent."""

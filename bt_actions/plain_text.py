@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["clean", "clean_lines"]
+__all__ = ["clean", "clean_lines", "in_words"]
 
 _NONE = "\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
 """Controls, those that turn the direction of what follows, and characters that are none."""
@@ -24,3 +24,13 @@ def clean_lines(text: str) -> str:
     """Return `text` with its tabs and lines, from the second on set in, so that none passes for one
     of its own; and a space for each character that is not shown."""
     return _STRANGE.sub(" ", text).replace("\n", "\n  ")
+
+
+def in_words(error: Exception) -> str:
+    """Return what an exception of a stranger says; what it is, where it does not say anything."""
+    try:
+        said = str(error)
+        bare = isinstance(error, KeyError) or not said  # KeyError("x") says 'x' only
+        return repr(error) if bare else said
+    except Exception:  # noqa: BLE001 - it may be wrong in that, too
+        return type(error).__name__

@@ -101,6 +101,10 @@ class ServerWatch:
         """Whether more than one server is shown."""
         return self._crowded_since is not None
 
+    def crowded_for(self, now: float) -> float:
+        """Return for how many seconds all of those that are shown now have been, if several."""
+        return 0.0 if self._crowded_since is None else now - self._crowded_since
+
     def _answered_once(self, now: float, sent_since: float) -> bool:
         return any(
             answers.number == 1

@@ -31,6 +31,8 @@ Told = list[tuple[Event, Any]]
 NEVER = float("-inf")
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
+OVERTAKEN = 1.0
+"""Seconds after a newcomer is shown within which a word of who was there before may be older."""
 
 
 class Testimony:
@@ -50,6 +52,7 @@ class Testimony:
         self._refused = False
         self._ended: tuple[int, Any] | None = None
         self._denied_at: float | None = None  # by one that it was not sent to, maybe
+        self._beside: frozenset[GID] = frozenset()  # was in sight already when it last spoke
         self._asked_at = NEVER
         self._in_sight: frozenset[GID] = frozenset()  # just now
         self._crowd: frozenset[GID] = frozenset()  # the same, where it is not known who lives
@@ -101,7 +104,9 @@ class Testimony:
         self._accepted_by = max(self._accepted_by, accepted)
         if accepted:
             self._refused = False
+            self._spoke(watch, now)
         if accepted > 1:
+            self.sent_to |= watch.gids
             watch.two_answered()
             self._fresh_since = now
             return [(Event.SERVER_AMBIGUOUS, None)]
@@ -123,26 +128,31 @@ class Testimony:
     def canceled(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[int]
     ) -> Told:
-        """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal.
-
-        A denial by a newcomer counts at once: nothing is sent before it is known who lives, and
-        should the goal turn up all the same, it is canceled.
-        """
+        """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal."""
         self._note_changes(watch, now)
-        if answers[-1] == CANCEL_UNKNOWN_GOAL:
-            if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
+        if answers[-1] != CANCEL_UNKNOWN_GOAL:
+            self._spoke(watch, now)
+            return [(Event.CANCEL_ANSWERED, answers[-1])]
+        if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
+            return []
+        if len(answers) < _answers_wanted(watch):  # by some
+            if self._may_be_at_two(watch):
                 return []
-            by_some = len(answers) < _answers_wanted(watch) and len(self.sent_to) > 1
-            if by_some and (self._may_be_at_two(watch) or asked < self._fresh_since):
+            if len(self.sent_to) > 1 and asked < self._fresh_since:
                 return []
-        return [(Event.CANCEL_ANSWERED, answers[-1])]
+            if watch.changed(self.sent_to) and not watch.gone(now, self.sent_to):
+                return self._denied(now)  # maybe by a newcomer
+        return [(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)]
 
     def finished(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
         self._note_changes(watch, now)
-        status = answers[-1][0]
+        runs = [answer for answer in answers if answer[0] not in (0, *ENDS)]
+        if runs:  # answered too soon, by a server that is none of rclpy's or rclcpp's
+            self._ended = None
+            return [(Event.STATUS, runs[-1][0])]
         ended = [answer for answer in answers if answer[0] in ENDS]
         if ended:
             done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), ended[-1])
@@ -157,13 +167,9 @@ class Testimony:
                 watch.two_answered()
                 return [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, done)]
             return [(Event.RESULT, done)]
-        if status != 0:  # answered too soon, by a server that is none of rclpy's or rclcpp's
-            return [(Event.STATUS, status)]
         by_each = len(answers) >= _answers_wanted(watch)
         if watch.changed(self.sent_to) and not (by_each and asked >= self._fresh_since):
-            if self._denied_at is None:  # by one of several; `looked` finds out what that means
-                self._denied_at = now
-            return []
+            return self._denied(now)
         by_all = by_each or watch.state(now) is Server.READY
         return [(Event.RESULT_UNKNOWN, None)] if by_all and asked >= self._fresh_since else []
 
@@ -178,8 +184,7 @@ class Testimony:
 
     def lives(self, watch: ServerWatch, now: float) -> Told:
         """Take feedback, or a status: who has the goal lives, whoever else denies it."""
-        if len(self.sent_to) == 1:
-            self._denied_at = None
+        self._spoke(watch, now)
         return []
 
     # Told by discovery
@@ -221,13 +226,13 @@ class Testimony:
             return [(Event.RESULT, self._ended)]
         if self._refused:
             return [(Event.REJECTED, None)]
-        if not watch.changed(self.sent_to):
+        if not watch.changed(self.sent_to | self._beside):
             self._denied_at = None
-        elif not goal.accepted or watch.state(now) is Server.AMBIGUOUS:
+        elif watch.state(now) is Server.AMBIGUOUS:
             pass
         elif self._denied_at is not None and watch.alone_since(now, self._denied_at):
             return [(Event.SERVER_LOST, f"{name} was restarted under the goal")]
-        elif now - self._asked_at > ASK_EVERY:
+        elif goal.accepted and now - self._asked_at > ASK_EVERY:
             self._asked_at = now
             return [(Event.SERVER_CHANGED, None)]
         return []
@@ -241,6 +246,22 @@ class Testimony:
             self._one_left |= bool(left)
             self._one_came |= bool(came)
         self._crowd, self._in_sight = crowd, watch.gids
+
+    def _spoke(self, watch: ServerWatch, now: float) -> None:
+        """Take note that one of those that it was sent to lives, and is none of the newcomers.
+
+        So none of these has taken its place, unless the word is older than they are.
+        """
+        if watch.crowded_for(now) >= OVERTAKEN:
+            self._beside = watch.gids - self.sent_to
+        if len(self.sent_to) == 1:
+            self._denied_at = None
+
+    def _denied(self, now: float) -> Told:
+        """Take note of a denial by one of several; `looked` finds out what that means."""
+        if self._denied_at is None:
+            self._denied_at = now
+        return []
 
     def _forget(self, now: float) -> None:
         self._fresh_since = now

@@ -69,7 +69,7 @@ class TwinTestimony(Testimony):
     ) -> Told:
         """Take an answer to a question for the result; of an end that is no news, nothing."""
         self._note_changes(watch, now)
-        if answers[-1][0] not in (0, *ENDS):
+        if any(answer[0] not in (0, *ENDS) for answer in answers):
             return super().finished(watch, now, asked, answers)
         if asked < self._fresh_since:
             return []

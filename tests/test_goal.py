@@ -307,13 +307,6 @@ def test_a_message_that_cannot_be_built_is_not_sent() -> None:
     assert life.goal.reason == "no variable $pick_at"
 
 
-@pytest.mark.parametrize("error", [KeyError("pick_at"), ValueError()])
-def test_an_error_that_says_little_by_itself_is_named(error: Exception) -> None:
-    life = waiting()
-    life.on(Event.INVALID, error)
-    assert life.goal.reason == repr(error)
-
-
 def test_a_request_that_does_not_leave_started_nothing() -> None:
     life = sending()
     life.on(Event.SEND_FAILED, "no space left")

@@ -275,3 +275,66 @@ def test_a_ghost_that_a_standstill_has_hidden_has_a_moment_to_go(watch: ServerWa
     watch.observe(late, True, gids(OLD, NEW))
     assert watch.state(late) is Server.SETTLING
     assert watch.state(late + SETTLED_AFTER) is Server.AMBIGUOUS
+
+
+def test_answers_of_those_that_are_gone_are_not_counted_for_newcomers(watch: ServerWatch) -> None:
+    watch.observe(1.0, True, gids(OLD, NEW, THIRD))
+    watch.two_answered(3)
+    watch.observe(2.0, True, gids(OLD, NEW, b"fourth"))
+    watch.two_answered(2)
+    assert not watch.all_live(2.0)
+    watch.two_answered(3)
+    watch.two_answered(2)
+    assert watch.all_live(2.0), "the most that answered one question"
+
+
+def test_an_answer_to_one_crowd_is_no_second_one_in_another(watch: ServerWatch) -> None:
+    crowd(watch).probe_answered(1.1, 1)
+    watch.observe(2.0, True, gids(OLD, THIRD))
+    watch.probe_answered(2.1, 1)
+    assert watch.state(2.1) is Server.SETTLING
+
+
+def test_a_third_one_has_its_own_time_to_answer(watch: ServerWatch) -> None:
+    settle(watch).observe(10.0, True, gids(OLD, NEW, THIRD))
+    watch.probe_sent(10.0, 2)
+    watch.probe_answered(10.1, 2)
+    watch.observe(10.2 + SETTLED_AFTER, True, gids(OLD, NEW, THIRD))
+    assert watch.state(10.2 + SETTLED_AFTER) is Server.SETTLING
+
+
+def test_where_two_have_answered_one_is_not_alone_by_a_later_silence(watch: ServerWatch) -> None:
+    settle(watch).probe_answered(5.0, 1)
+    assert not watch.alone
+    watch.probe_sent(5.5, 2)
+    watch.probe_answered(5.6, 2)
+    watch.observe(9.0, True, gids(OLD, NEW))
+    assert not watch.alone
+
+
+def test_three_answers_to_one_probe_are_all_three(watch: ServerWatch) -> None:
+    watch.observe(1.0, True, gids(OLD, NEW, THIRD))
+    watch.probe_sent(1.0, 1)
+    for _ in range(3):
+        watch.probe_answered(1.1, 1)
+    assert watch.all_live(1.2)
+
+
+def test_who_is_not_ready_is_not_alone(watch: ServerWatch) -> None:
+    settle(watch).probe_sent(5.0, 2)
+    watch.probe_answered(5.0, 2)
+    watch.observe(7.0, False, gids(OLD, NEW))
+    assert not watch.alone_since(7.0, 4.9)
+
+
+def test_nobody_is_asked_where_nobody_is_shown(watch: ServerWatch) -> None:
+    watch.observe(1.0, False, gids())
+    assert not watch.wants_probe(1.0, runs=True)
+
+
+def test_a_crowd_is_as_old_as_its_newest_member(watch: ServerWatch) -> None:
+    assert watch.crowded_for(1.0) == 0.0
+    crowd(watch)
+    assert watch.crowded_for(1.5) == 0.5
+    watch.observe(2.0, True, gids(OLD, NEW, THIRD))
+    assert watch.crowded_for(2.5) == 0.5

@@ -9,7 +9,7 @@ import pytest
 from bt_actions import testimony
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import Event, Now
-from bt_actions.policy import Timeouts
+from bt_actions.policy import End, Timeouts
 from bt_actions.server import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER = b"one", b"other"
@@ -386,3 +386,200 @@ def test_an_acceptance_that_follows_a_status_may_be_the_others(
     said._goal.on(Event.STATUS, Now(0.0, 0.0), 2)
     assert events(said.answered(watch, 1.0, [True])) == [Event.SERVER_CHANGED]
     assert said.finished(watch, 1.1, 0.5, [UNKNOWN, ABORTED]) == [], "asked before it accepted"
+
+
+def told(said: testimony.Testimony, what: testimony.Told, now: float) -> list[Event]:
+    """Tell the goal, too; return the events."""
+    for event, detail in what:
+        said._goal.on(event, Now(now, now), detail)
+    return events(what)
+
+
+def beside_a_newcomer(watch: ServerWatch) -> testimony.Testimony:
+    """Of a goal that one server has; a second one came when it was on its way."""
+    said = sent(watch)
+    watch.observe(0.0, True, BOTH)
+    told(said, said.looked(watch, 0.0), 0.0)
+    return said
+
+
+def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
+    watch: ServerWatch,
+) -> None:
+    """It was too busy to be heard, accepts, and is too busy again; the newcomer denies the goal."""
+    said = beside_a_newcomer(watch)
+    now = alone(watch)
+    assert told(said, said.answered(watch, now, [True]), now) == [Event.ACCEPTED]
+    watch.probe_sent(now, 2)
+    watch.probe_answered(now, 2)
+    later = now + SETTLED_AFTER
+    assert said.finished(watch, later, now, [UNKNOWN]) == []
+    watch.observe(later, True, BOTH)
+    assert said.looked(watch, later) == []
+    assert watch.alone_since(later, now), "which would do, had it come later"
+    watch.observe(later, True, frozenset({OTHER}))
+    assert told(said, said.looked(watch, later), later) == [Event.SERVER_LOST]
+
+
+@pytest.mark.parametrize("word", ["feedback", "status", "answer to a cancel request"])
+def test_any_word_of_the_server_tells_it_from_who_was_in_sight(
+    watch: ServerWatch, word: str
+) -> None:
+    said = beside_a_newcomer(watch)
+    told(said, said.answered(watch, 0.1, [True]), 0.1)
+    now = alone(watch)
+    said.finished(watch, now, now, [UNKNOWN])
+    if word == "feedback":
+        said.lives(watch, now)
+    elif word == "status":
+        said.shown(watch, now, 2)
+    else:
+        said.canceled(watch, now, now, [CANCELED])
+    said.finished(watch, now, now, [UNKNOWN])
+    watch.probe_sent(now, 2)
+    watch.probe_answered(now, 2)
+    assert said.looked(watch, now + SETTLED_AFTER) == []
+    third = BOTH | {b"third"}
+    watch.observe(now + 1.0, True, third)
+    assert events(said.looked(watch, now + 1.0)) == [Event.SERVER_CHANGED], "this one may have"
+
+
+def test_a_word_may_be_older_than_the_newcomer_that_it_comes_in_beside(watch: ServerWatch) -> None:
+    said = beside_a_newcomer(watch)
+    told(said, said.answered(watch, 0.1, [True]), 0.1)
+    said.lives(watch, testimony.OVERTAKEN / 2)
+    said.finished(watch, 1.0, 1.0, [UNKNOWN])
+    watch.probe_sent(1.0, 1)
+    watch.probe_answered(1.0, 1)
+    now = 1.0 + SLOWEST_START + SETTLED_AFTER
+    watch.observe(now, True, BOTH)
+    assert events(said.looked(watch, now)) == [Event.SERVER_LOST]
+
+
+def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -> None:
+    said = beside_a_newcomer(watch)
+    told(said, [(Event.INTERRUPTED, None)], 0.0)
+    assert said.canceled(watch, 0.2, 0.1, [DENIED]) == []
+    assert said.looked(watch, 0.3) == []
+    now = alone(watch)
+    watch.probe_sent(now, 2)
+    watch.probe_answered(now, 2)
+    assert said.canceled(watch, now, now, [DENIED]) == []
+    now += SETTLED_AFTER
+    assert told(said, said.looked(watch, now), now) == [Event.SERVER_LOST]
+    assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"
+
+
+def test_what_both_deny_neither_has(watch: ServerWatch) -> None:
+    said = beside_a_newcomer(watch)
+    assert said.canceled(watch, 0.2, 0.1, [DENIED, DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
+
+
+def test_where_one_says_that_it_runs_it_has_not_ended(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    assert said.finished(watch, 0.1, 0.0, [ABORTED]) == []
+    for answers in ([ABORTED, (2, None)], [(2, None), ABORTED]):
+        assert said.finished(watch, 0.1, 0.0, answers) == [(Event.STATUS, 2)]
+    assert said.looked(watch, alone(watch)) == [], "and not what was said before"
+
+
+def test_two_that_accepted_it_both_have_to_tell_also_where_one_came_later(
+    watch: ServerWatch,
+) -> None:
+    said = sent(watch)
+    watch.observe(0.5, True, BOTH)
+    assert told(said, said.answered(watch, 0.6, [True, True]), 0.6) == [Event.SERVER_AMBIGUOUS]
+    assert said.sent_to == BOTH
+    assert said.finished(watch, 0.8, 0.7, [CANCELED_END]) == []
+
+
+def test_a_request_went_to_all_that_were_shown_before_and_after(watch: ServerWatch) -> None:
+    watch.observe(0.0, True, BOTH)
+    said = sent(watch)
+    watch.observe(0.1, True, frozenset({ONE}))
+    said.sent(watch)
+    assert said.sent_to == BOTH
+
+
+def test_a_ghost_that_leaves_runs_nothing(said: testimony.Testimony, watch: ServerWatch) -> None:
+    now = alone(watch)
+    said.looked(watch, now)
+    watch.observe(now, True, frozenset({ONE}))
+    said.looked(watch, now)
+    assert not said.may_run_at(watch)
+
+
+def test_who_refused_does_not_matter_where_the_other_has_accepted(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.answered(watch, 0.0, [False])
+    told(said, said.answered(watch, 0.0, [False, True]), 0.0)
+    watch.observe(1.0, True, frozenset({ONE}))
+    assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED]
+
+
+def test_where_one_was_asked_its_acceptance_may_follow_its_status(watch: ServerWatch) -> None:
+    said = sent(watch)
+    told(said, [(Event.STATUS, 2)], 0.0)
+    assert events(said.answered(watch, 0.1, [True])) == [Event.ACCEPTED]
+
+
+def test_a_success_counts_most(said: testimony.Testimony, watch: ServerWatch) -> None:
+    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED, ABORTED])[-1] == (Event.RESULT, SUCCEEDED)
+
+
+def test_a_denial_counts_from_the_first(watch: ServerWatch) -> None:
+    said = beside_a_newcomer(watch)
+    told(said, said.answered(watch, 0.0, [True]), 0.0)
+    for now in (0.0, 3.5):
+        said.finished(watch, now, now, [UNKNOWN])
+    assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
+
+
+def test_that_there_are_two_is_told_once(said: testimony.Testimony, watch: ServerWatch) -> None:
+    watch.two_answered()
+    assert events(said.looked(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
+    assert said.looked(watch, 0.2) == []
+
+
+def test_a_newcomer_that_lives_beside_it_is_not_asked_about(watch: ServerWatch) -> None:
+    said = sent(watch)
+    told(said, said.answered(watch, 0.0, [True]), 0.0)
+    watch.observe(1.0, True, BOTH)
+    watch.two_answered()
+    assert said.looked(watch, 2.0) == []
+
+
+def test_one_of_three_that_was_away_between_two_looks_was_away(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    third = BOTH | {b"third"}
+    watch.observe(0.0, True, third)
+    said.sent(watch)
+    said.answered(watch, 0.1, [False])
+    for now, shown in ((1.0, BOTH), (1.1, third)):
+        watch.observe(now, True, shown)
+        said.shown(watch, now, 2)
+    assert events(said.looked(watch, 1.2)) == [Event.SERVER_AMBIGUOUS]
+
+
+def test_a_refusal_of_one_that_has_gone_is_told_as_no_end_ever(
+    said: testimony.Testimony, watch: ServerWatch
+) -> None:
+    said.answered(watch, 0.0, [False])
+    watch.observe(1.0, True, frozenset({ONE}))
+    assert told(said, said.looked(watch, 1.0), 1.0) == [Event.SERVER_AMBIGUOUS]
+    assert said.looked(watch, 1.2) == []
+
+
+def test_what_was_asked_before_a_server_was_lost_is_not_its_word_when_it_is_back(
+    watch: ServerWatch,
+) -> None:
+    said = sent(watch)
+    told(said, said.answered(watch, 0.0, [True]), 0.0)
+    watch.observe(1.0, True, frozenset())
+    assert told(said, said.looked(watch, 1.0), 1.0) == [Event.SERVER_LOST]
+    watch.observe(2.0, True, frozenset({ONE}))
+    assert told(said, said.looked(watch, 2.0), 2.0) == [Event.SERVER_RETURNED]
+    assert said.finished(watch, 2.1, 0.5, [UNKNOWN]) == []

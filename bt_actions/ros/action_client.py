@@ -90,6 +90,9 @@ class Listener(Protocol):
     def probe_answered(self, probe: int) -> None:
         """A server answered the probe of this number; each live server answers once."""
 
+    def all_delivered(self) -> None:
+        """Nothing that has been taken waits any more."""
+
 
 @dataclass(slots=True)
 class _Question:
@@ -285,6 +288,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                     self._tell(kind, about, detail)
                 except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
                     log.error(f"{self._action_name}: {kind} was not taken in: {error!r}")
+            if any_came:
+                self._listener.all_delivered()
             return any_came
 
     def _tell(self, kind: str, about: Any, detail: Any) -> None:
@@ -305,6 +310,11 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
             tell.statuses_came(about)
         else:
             tell.probe_answered(about)
+
+    @property
+    def has_more(self) -> bool:
+        """Whether something has been taken, and not been delivered yet."""
+        return bool(self._inbox)
 
     @property
     def closed(self) -> bool:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goal_terms import (
+    CANCEL_UNKNOWN_GOAL,
     STATUS_SUCCEEDED,
     Command,
     Event,
@@ -45,7 +46,7 @@ its return would matter. The last: between two takes of answers by the alarm, wh
 LATE = 0.5
 """Seconds by which a look is so late that answers may have come in between, unseen."""
 SILENT_FOR = 40.0
-"""Seconds without any answer until goals whose node is gone are left to whoever can see whether
+"""Seconds without a word of them until goals whose node is gone are left to whoever can see whether
 their server is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
 BESIDE = 1.0
 """Seconds for which a server may be in sight before another one that was there all the time, or
@@ -68,7 +69,7 @@ class Line:
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
         self.orphaned = False
-        self._heard_at = time.monotonic()  # of an orphan: when somebody last answered
+        self._ran_at = time.monotonic()  # of an orphan: when last heard of a goal that may run
         self.way = Way(self)
         self._look_at = 0.0
         self._looked_like = Server.ABSENT  # at the last look
@@ -104,8 +105,9 @@ class Line:
             if ticket is None:
                 self.past.runs(goal_id)
                 return
-            self.watch.heard(time.monotonic())
-            self._pass_on(ticket, ticket.testimony.lives(self.watch, time.monotonic()))
+            now = self._ran_at = time.monotonic()
+            self.watch.heard(now)
+            self._pass_on(ticket, ticket.testimony.lives(self.watch, now))
             self.tell(ticket, Event.FEEDBACK, feedback)
             if ticket.keeps_feedback:
                 ticket.feedback.append(feedback)
@@ -114,7 +116,7 @@ class Line:
     def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         """Pass on an answer to a cancel request."""
         with lock:
-            ticket = self._heard_of(goal_id)
+            ticket = self._heard_of(goal_id, runs=answers[-1] != CANCEL_UNKNOWN_GOAL)
             if ticket is not None:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.canceled(self.watch, now, asked, answers))
@@ -126,16 +128,21 @@ class Line:
     ) -> None:
         """Pass on a result."""
         with lock:
-            ticket = self._heard_of(goal_id)
+            ticket = self._heard_of(goal_id, runs=answers[-1][0] != 0)
             if ticket is not None:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.finished(self.watch, now, asked, answers))
 
-    def _heard_of(self, goal_id: bytes) -> Ticket | None:
-        """Return the goal that an answer is about; of one of several it counts who is in sight."""
+    def _heard_of(self, goal_id: bytes, *, runs: bool = True) -> Ticket | None:
+        """Return the goal that an answer is about; of one of several it counts who is in sight.
+
+        `runs`: it is no denial, which may be the word of another server.
+        """
         ticket = self.goals.get(goal_id)
         if ticket is not None:
             self.watch.heard(time.monotonic())
+            if runs:
+                self._ran_at = time.monotonic()
             if len(ticket.testimony.servers) > 1:
                 self.see()
         return ticket
@@ -177,6 +184,11 @@ class Line:
         with lock:
             self.watch.probe_answered(time.monotonic(), probe)
             self.traffic.notify(None)
+
+    def all_delivered(self) -> None:
+        """Let go of the client, if it was kept for what has just been delivered."""
+        with lock:
+            self.traffic.drop_if_unused(self)
 
     # What the goals want
 
@@ -291,8 +303,7 @@ class Line:
         if self.is_parents:
             return
         try:
-            if self.client.pump():
-                self._heard_at = time.monotonic()
+            self.client.pump()
         except Exception as error:  # noqa: BLE001 - the middleware's: any
             self._warn_once("something that arrived could not be taken", error)
 
@@ -543,14 +554,14 @@ class Line:
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""
         if not self.orphaned:
-            self.orphaned, self._heard_at = True, time.monotonic()
+            self.orphaned, self._ran_at = True, time.monotonic()
             if any(not ticket.accounted_for for ticket in self.goals.values()):
                 log.warning(f"{self.name}: the node is gone; canceling what it left")
         for ticket in list(self.goals.values()):  # also one that was begun since
             if ticket.goal.outcome is None:
                 self.tell(ticket, Event.INTERRUPTED)
         patience = max((each.goal.drains_within for each in self.goals.values()), default=0.0)
-        silent = time.monotonic() - self._heard_at > max(SILENT_FOR, patience)
+        silent = time.monotonic() - self._ran_at > max(SILENT_FOR, patience)
         if silent and not alarm.standstill.answers_take(time.monotonic()):
             self.put_away(all_of_them=True)  # from here nobody can see whether the server is gone
 

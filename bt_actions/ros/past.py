@@ -91,6 +91,8 @@ class Past:
         is_news = not ended.accepted and sum(answers) == 1
         if self._may_be_several(ended) or is_news:
             self._hand_over(ended)
+        elif sum(answers) > 1:  # by one, twice, or by one that is not shown yet
+            self._ask(ended)
 
     def cancel_answered(self, goal_id: bytes, asked: float, code: int) -> None:
         """Take an answer to a cancel request: who has ended a goal neither agrees nor refuses."""
@@ -109,10 +111,15 @@ class Past:
             return
         if time.monotonic() - ended.since > STALE:
             self.accepted(goal_id)
-        elif self._may_be_several(ended) and ended.questions < QUESTIONS:
+        elif self._may_be_several(ended):
+            self._ask(ended)
+
+    def _ask(self, ended: Ended) -> None:
+        """Ask whoever has it to cancel: whoever has ended it will deny it."""
+        if ended.questions < QUESTIONS:
             ended.questions += 1
             with contextlib.suppress(Exception):  # our node is gone; the next look tells
-                self._line.client.cancel(goal_id)
+                self._line.client.cancel(ended.twin.goal.id)
 
     def _get(self, goal_id: bytes) -> Ended | None:
         """Return what has ended; in the child of a fork nothing has, it is the parent's."""

@@ -27,6 +27,7 @@ from rclpy.node import Node
 from bt_actions.goal import ASK_AGAIN, Goal
 from bt_actions.goal_ids import new_goal_id
 from bt_actions.goal_terms import Event, State
+from bt_actions.plain_text import in_words
 from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
 from bt_actions.ros import alarm, shared
@@ -106,8 +107,12 @@ class Traffic:
             self.drop_if_unused(line)
 
     def drop_if_unused(self, line: Line) -> None:
-        """Destroy the client of a line that has no user and no open goal."""
-        if line.users <= 0 and not line.goals and self._lines.get(line.name) is line:
+        """Destroy the client of a line that has no user and no open goal.
+
+        Not before it has delivered all: a second server may have taken the last goal, too.
+        """
+        unused = line.users <= 0 and not line.goals and not line.client.has_more
+        if unused and self._lines.get(line.name) is line:
             del self._lines[line.name]
             line.close()
 
@@ -186,7 +191,7 @@ class Traffic:
         try:
             message = make_message()
         except Exception as error:  # noqa: BLE001 - the user's: any
-            line.tell(ticket, Event.INVALID, error)
+            line.tell(ticket, Event.INVALID, in_words(error))  # which may run code of the user's
             return
         with lock:
             if self._may_send(ticket):

@@ -309,14 +309,15 @@ class Judge:
             ticket.ledger.crowded = True
 
     def is_done(self, ticket: Ticket) -> None:
-        """A goal is DONE, and its line has put it away."""
-        if ticket.ledger.closed or len(ticket.ledger.heard) < 2:
+        """A goal is DONE, and its line has put it away; not what a line is told that is gone."""
+        if self.caller.closed or len(ticket.ledger.heard) < 2:
             return
         world = self.caller.world
         known = [job for job in ticket.ledger.jobs if job.server.gid in ticket.ledger.heard]
         runs = any(job.live and world.in_sight(job.server, ticket.node) for job in known)
         rule = "an end is known when it has ended everywhere, or a twin is kept in mind"
-        self._hold(not runs or ticket.goal.id in ticket.line.goals, rule)
+        minded = ticket.goal.id in ticket.line.goals or not self._may_be_several(ticket)
+        self._hold(not runs or minded, rule)
 
     def twin_is_done(self, twin: Goal) -> None:
         """What a second server took has ended there."""
@@ -332,10 +333,15 @@ class Judge:
         news, ledger = server.gid not in ticket.ledger.heard, ticket.ledger
         ledger.heard |= {server.gid}
         runs = any(job.live and job.server is server for job in ledger.jobs)
-        several = len(ticket.testimony.sent_to | ticket.line.watch.gids) > 1
+        several = self._may_be_several(ticket)
         if news and runs and ticket.goal.state is State.DONE and several:
             minded = ledger.closed or ticket.goal.id in ticket.line.goals
             self._hold(minded, "what a second server accepts of a goal that has ended is minded")
+
+    @staticmethod
+    def _may_be_several(ticket: Ticket) -> bool:
+        """Whether more than one is shown: else two acceptances may be those of one."""
+        return len(ticket.testimony.sent_to | ticket.line.watch.gids) > 1
 
     def accepted_on_server(self, job: Job) -> None:
         """A server begins to execute a goal: is it alone on its resources?"""

@@ -52,7 +52,7 @@ class ModelClient:
 
     def __init__(self, node: Any, action_type: Any, name: str, listener: Any) -> None:
         self.node, self.name, self._listener = node, name, listener
-        self.closed = False
+        self.closed = self.has_more = False
         self.hearing = Hearing()
         self._asked: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
         self._past: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}

@@ -62,6 +62,8 @@ class Heard:
     def probe_answered(self, probe: int) -> None:
         self.probes.append(probe)
 
+    def all_delivered(self) -> None: ...
+
     def answers(self, kind: str) -> list[Any]:
         return {"goal": self.goals, "result": self.results, "cancel": self.cancels}[kind]
 

@@ -65,6 +65,7 @@ def test_one_servers_acceptance_that_the_result_has_overtaken_is_no_news(
     line.past._ended[GOAL].accepted = False
     line.goal_answered(GOAL, (True, True))
     assert not line.found, "twice by one"
+    assert line.asked == [GOAL], "or by one that is not shown yet"
     line.goal_answered(GOAL, (True,))
     assert line.found == [Event.SERVER_RETURNED]
 

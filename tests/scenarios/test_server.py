@@ -22,7 +22,7 @@ from bt_actions.goal import State
 from bt_actions.ros.shared import Change, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.ros.way import Way
-from bt_actions.server import NOT_READY_FOR, Server, ServerWatch
+from bt_actions.server import NOT_READY_FOR, SLOWEST_START, Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import Host, HostFactory, Journal
 from tests.support.reliability import Record
@@ -790,6 +790,48 @@ class TestTwice:
         assert stood(leaf) == (Outcome.CANCELED, End.CANCELED)
         assert of_process(journal, one.pid) == CANCELED
         record.outcome = "runs on; CANCELED when it is not wanted any more"
+
+    def test_a_busy_server_that_was_heard_beside_the_second_is_not_taken_for_dead(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """It answers nobody for 6 s, accepts, and is busy again for 7 s; a second server comes"""
+        one, other = new_host(), new_host()
+        journal = one.open(name, "*:no_feedback", thinks=6.0, busy=4.0 + SLOWEST_START)
+        leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(accept=30.0))
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "SENDING")
+            other.open(name)
+            assert runner.wait(30.0) is Status.SUCCESS
+        assert stood(leaf) == (Outcome.SUCCEEDED, End.SUCCEEDED)
+        assert of_process(journal, one.pid) == ["received", "accepted", "succeeded"]
+        assert of_process(journal, other.pid) == []
+        record.outcome = "runs on; SUCCEEDED"
+
+    def test_what_a_second_server_denies_the_first_may_still_start(
+        self, new_host: HostFactory, name: str, node: Any, record: Record
+    ) -> None:
+        """Too busy to answer, a second one comes, which denies the goal; tried again if so told"""
+        one, other = new_host(), new_host()
+        journal = one.open(name, "*:slow=100")
+        again = Retry(3, outcomes=["ACCEPT_TIMEOUT"])
+        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=1.5), retry=again)
+        leaf.setup(node=node)
+        until_shown(node, name, 1)
+        one.freeze()
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "SENDING")
+            other.open(name)
+            assert runner.wait(30.0) is Status.FAILURE
+            assert leaf.outcome is Outcome.ACCEPT_TIMEOUT
+            assert leaf.end in (End.SERVER_GONE, End.UNKNOWN), "it has not said that it never did"
+            one.thaw()
+            until(lambda: "canceled" in of_process(journal, one.pid))
+        assert leaf.end is End.CANCELED
+        assert len(leaf.history) == 1
+        assert of_process(journal, other.pid) == []
+        record.outcome = "ACCEPT_TIMEOUT, not tried again; canceled when it is accepted"
 
     @pytest.mark.parametrize("loop", ["our runner", "a foreign loop"])
     def test_shutdown_waits_for_what_the_second_server_took(

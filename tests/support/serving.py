@@ -13,6 +13,7 @@ import queue
 import signal
 import sys
 import threading
+import time
 from typing import Any
 
 import rclpy
@@ -41,18 +42,37 @@ class Serving:
         self.servers: dict[str, ScriptedServer | Simulation] = {}
 
     def open(
-        self, name: str, journal: str, faults: list[str], step_period: float = 0.05, **script: Any
+        self,
+        name: str,
+        journal: str,
+        faults: list[str],
+        step_period: float = 0.05,
+        thinks: float = 0.0,
+        busy: float = 0.0,
+        **script: Any,
     ) -> None:
-        """Serve MoveRobot under `name`: a goal takes as many seconds as its distance says."""
+        """Serve MoveRobot under `name`: a goal takes as many seconds as its distance says.
+
+        It answers nobody for `thinks` seconds before it accepts one, and for `busy` s after that.
+        """
+
+        def refusal(goal: MoveRobot.Goal) -> str | None:
+            time.sleep(thinks)
+            return _refuse(goal)
+
+        def duration(goal: MoveRobot.Goal) -> float:
+            time.sleep(busy)
+            return abs(float(goal.distance))
+
         self.servers[name] = ScriptedServer(
             self.node,
             MoveRobot,
             name,
             Script(
-                duration=lambda goal: abs(goal.distance),
+                duration=duration,
                 feedback=lambda goal, done: MoveRobot.Feedback(current_pose=goal.distance * done),
                 result=lambda goal: MoveRobot.Result(final_pose=goal.distance),
-                refuse=_refuse,
+                refuse=refusal,
                 **script,
             ),
             faults=faults,
