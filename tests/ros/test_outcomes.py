@@ -30,7 +30,9 @@ from bt_actions import (
 from bt_actions.behaviours.variables import read, write
 from bt_actions.events import GoalChanged
 from bt_actions.goal_terms import Event
+from bt_actions.policy import Busy
 from bt_actions.ros.shared import lock
+from bt_actions.ros.traffic import Traffic
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.waiting import until
@@ -273,6 +275,36 @@ class TestNoServer:
                 line.tell(ticket, Event.INTERRUPTED)
                 assert line.goals == {goal_id: twin}, "the goal that has ended is not its twin"
             until(lambda: not line.goals)
+
+    def test_what_had_come_when_the_last_goal_ended_is_heard(
+        self, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The leaf has gone; behind the result lies the acceptance of a second server."""
+        traffic = Traffic.of(node)
+        line = traffic.line(MoveRobotAction, name)
+        shown = [frozenset({b"one", b"other"})]
+        monkeypatch.setattr(line.way, "shown", lambda: shown[-1])
+        monkeypatch.setattr(line.client, "server_is_ready", lambda: True)
+        gone = MoveRobot("gone", 0.1, action_name=name)
+        with lock:
+            line.see()
+            ticket = traffic.begin(line, gone, Timeouts(), frozenset({"base"}), Busy.WAIT)
+            line.tell(ticket, Event.SERVER_READY, message=MoveRobotAction.Goal())
+            line.tell(ticket, Event.ACCEPTED)
+            traffic.leave(line)
+            asked, goal_id = time.monotonic(), ticket.goal.id
+            ended = (asked, ((5, MoveRobotAction.Result()), (0, None)))
+            line.client._inbox.append(("result", goal_id, ended))
+            line.client._inbox.append(("goal", goal_id, (asked, (True, True))))
+            line.client._deliver()
+            assert ticket.goal.end is End.CANCELED
+            twin = line.goals[goal_id]
+            assert not line.client.closed
+            shown.append(frozenset())
+        until(lambda: twin.goal.end is End.SERVER_GONE)
+        with lock:
+            line.tell(twin, Event.CLOSED)
+            assert line.client.closed, "when there is nothing more to hear"
 
     def test_two_servers_are_ambiguous_and_neither_gets_the_goal(
         self,
@@ -777,6 +809,25 @@ class TestInvalidGoal:
         assert leaf.reason
         assert len(leaf.history) == 1
         assert journal.events() == []
+
+    def test_what_an_error_says_is_asked_without_the_lock(
+        self, serve: Any, name: str, run: Run
+    ) -> None:
+        """It may ask a leaf on another thread for something."""
+        under_the_lock = list[bool]()
+
+        class Mine(Exception):
+            def __str__(self) -> str:
+                under_the_lock.append(lock._is_owned())  # type: ignore[attr-defined]
+                return "no such place"
+
+        def goal() -> None:
+            raise Mine
+
+        serve()
+        leaf = run(ActionBehaviour("m", MoveRobotAction, name, goal))
+        assert leaf.reason == "no such place"
+        assert under_the_lock and not any(under_the_lock)
 
 
 class TestRetry:
