@@ -373,3 +373,18 @@ def test_three_that_accept_what_one_had_ended_tell_two_ends() -> None:
 def test_a_status_instead_of_an_end_is_a_status(case: Case) -> None:
     twin = case.twin()
     assert twin.finished(case.watch, 1.6, 1.4, [UNKNOWN, (2, None)]) == [(Event.STATUS, 2)]
+
+
+def test_of_three_that_took_it_two_are_left_to_tell() -> None:
+    case = Case(ONE, OTHER, THIRD)
+    case.goal.end = End.SUCCEEDED
+    twin = case.twin()
+    twin.answered(case.watch, 2.0, [True] * 3)
+    told = twin.finished(case.watch, 2.1, 2.0, [SUCCEEDED, CANCELED, UNKNOWN])
+    assert told[-1] == (Event.RESULT, CANCELED)
+
+
+def test_where_one_says_that_it_runs_the_twin_has_not_ended(case: Case) -> None:
+    twin = case.twin()
+    for answers in ([ABORTED, (2, None)], [(2, None), ABORTED]):
+        assert twin.finished(case.watch, 2.1, 2.0, answers) == [(Event.STATUS, 2)]

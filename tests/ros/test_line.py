@@ -7,19 +7,23 @@ real servers, and tests/machine with whole histories.
 from __future__ import annotations
 
 import time
+from collections import deque
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bt_actions import End, Outcome
-from bt_actions.goal_terms import Now, State
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import STATUS_ABORTED, STATUS_SUCCEEDED, Event, Now, State
+from bt_actions.policy import Busy, Timeouts
 from bt_actions.ros import alarm, traffic
 from bt_actions.ros import line as module
-from bt_actions.ros.line import LEASE, Line
-from bt_actions.ros.shared import lock
+from bt_actions.ros.line import BESIDE, LEASE, LOOK_WHILE_RUNNING, SILENT_FOR, Line
+from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
 from bt_actions.ros.traffic import Traffic
-from bt_actions.server import Server, ServerWatch
+from bt_actions.server import PROBES_KEPT, Server, ServerWatch
 from bt_actions.standstill import AT_MOST, Leniency, Standstill
 
 OURS, NEW = b"ours", b"new"
@@ -179,11 +183,31 @@ STILL.lives(0.0)
 STILL.lives(1.0)
 
 
-@pytest.mark.parametrize("state", [State.WAITING_FOR_SERVER, State.EXECUTING])
+LONG = Standstill()
+"""Of 3 s, which may hide servers for 4."""
+LONG.lives(-1.8)
+LONG.lives(1.2)
+
+
+@pytest.mark.parametrize(
+    ("state", "still", "doubt", "seconds"),
+    [
+        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.8),
+        (State.EXECUTING, STILL, 0.0, 0.8),
+        (State.WAITING_FOR_SERVER, LONG, 0.0, 4.0),
+        (State.EXECUTING, LONG, 0.0, 1.0),
+        (State.EXECUTING, Standstill(), 5.0, LOOK_WHILE_RUNNING),
+    ],
+    ids=["a server", "an answer", "a hidden server", "an answer, long", "who may not hear us"],
+)
 def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
-    monkeypatch: pytest.MonkeyPatch, state: State
+    monkeypatch: pytest.MonkeyPatch,
+    state: State,
+    still: Standstill,
+    doubt: float,
+    seconds: float,
 ) -> None:
-    monkeypatch.setattr(alarm, "standstill", STILL)
+    monkeypatch.setattr(alarm, "standstill", still)
     held: list[float] = []
     goal = SimpleNamespace(state=state, due_in=lambda _: 0.0, hold=lambda s, _: held.append(s))
     clocks = SimpleNamespace(now=lambda: Now(1.2, 1.2))
@@ -191,12 +215,12 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         is_parents=False,
         traffic=SimpleNamespace(clocks=clocks),
         pump=lambda: None,
-        way=SimpleNamespace(in_doubt=lambda _: 0.0),
+        way=SimpleNamespace(in_doubt=lambda _: doubt),
         _apply=lambda *_: None,
     )
     ticket: Any = SimpleNamespace(goal=goal, paused_at=None)
     Line.poll(line, ticket)
-    assert held == [pytest.approx(0.8)]
+    assert held == [pytest.approx(seconds)]
 
 
 def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
@@ -300,3 +324,157 @@ def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(
     assert "it refuses" in first_word
     assert "accounted for at last" in last_word
     assert "its server is back; canceling it" in of_its_return, "no error: it soon has an end"
+
+
+def test_a_goal_that_succeeded_was_not_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Any other end may be the doing of a newer goal, whose acceptance it has overtaken."""
+    told = list[Event]()
+    line: Any = SimpleNamespace(_rival_sent=lambda _: True)
+    line.tell = lambda _ticket, event, _detail=None: told.append(event)
+    Line._pass_on(line, SimpleNamespace(), [(Event.RESULT, (STATUS_SUCCEEDED, None))])  # type: ignore[arg-type]
+    assert told == [Event.RESULT]
+    Line._pass_on(line, SimpleNamespace(), [(Event.RESULT, (STATUS_ABORTED, None))])  # type: ignore[arg-type]
+    assert told[1:] == [Event.REPLACED, Event.RESULT]
+
+
+def test_a_goal_that_is_accepted_replaces_the_older_ones_and_no_newer() -> None:
+    now, told = Now(0.0, 0.0), list[str]()
+    goals = [Goal(name.encode(), "m", Timeouts(), now, busy=Busy.REPLACE) for name in "abc"]
+    line: Any = SimpleNamespace(goals={}, _carry_out=lambda *_: None)
+    line.tell = lambda ticket, _event, _detail: told.append(ticket.name)
+    tickets = []
+    for goal in goals:
+        for event in (Event.GRANTED, Event.SERVER_READY):
+            goal.on(event, now)
+        traffic: Any = SimpleNamespace(note=lambda _: None)
+        tickets.append(Ticket(goal, line, traffic, None, goal.id.decode()))
+    holders = SimpleNamespace(holders=lambda _: tickets)
+    clocks = SimpleNamespace(now=lambda: now)
+    line.traffic = SimpleNamespace(clocks=clocks, domain=SimpleNamespace(resources=holders))
+    Line._apply(line, tickets[1], lambda now: goals[1].on(Event.ACCEPTED, now), None)
+    assert told == ["a"]
+
+
+@pytest.mark.parametrize(("suspect", "closed"), [(False, [0, 1, 2]), (True, [])])
+def test_the_oldest_of_many_lost_goals_are_given_up(suspect: bool, closed: list[int]) -> None:
+    """But none that its server may still be deciding on."""
+    given_up = list[int]()
+    goal = SimpleNamespace(
+        end=End.NEVER_STARTED, outcome=Outcome.ACCEPT_TIMEOUT, suspect=suspect, lost=True
+    )
+    tickets = {n: SimpleNamespace(number=n, goal=goal) for n in range(LOST_KEPT + 3)}
+    line: Any = SimpleNamespace(goals=tickets)
+    line.tell = lambda ticket, _event: given_up.append(ticket.number)
+    Line._bound_the_lost(line)
+    assert given_up == closed
+
+
+def test_probes_of_long_ago_are_forgotten() -> None:
+    forgotten = list[int]()
+    client = SimpleNamespace(forget=forgotten.append, probe=lambda *_: None)
+    line: Any = SimpleNamespace(watch=ServerWatch(), _last_probes=deque(), client=client)
+    for _ in range(PROBES_KEPT + 10):
+        Line.probe(line)
+    assert len(forgotten) == 10
+
+
+def test_a_paused_goal_whose_deadline_has_passed_does_not_keep_the_alarm_awake() -> None:
+    goal = SimpleNamespace(due_in=lambda _: 0.0)
+    ticket = SimpleNamespace(goal=goal, paused_at=1.0, accounted_for=True)
+    line: Any = SimpleNamespace(_look_at=10.0, orphaned=False, way=SimpleNamespace(sight=None))
+    line.goals, line.traffic = {b"1": ticket}, SimpleNamespace(clocks=SimpleNamespace(now=list))
+    line.mind, line._bound_the_lost = (lambda _: None), (lambda: None)
+    assert Line.attend(line, 9.9) == pytest.approx(0.1)
+
+
+def test_a_pause_begins_anew_for_a_goal_whose_turn_comes_in_it() -> None:
+    line: Any = SimpleNamespace(is_parents=False, _apply=lambda *_: None)
+    ticket: Any = SimpleNamespace(paused_at=1.0)
+    Line.tell(line, ticket, Event.GRANTED)
+    assert ticket.paused_at > 1.0
+
+
+def test_what_holds_its_resource_is_not_left_to_whoever_comes_next() -> None:
+    told = list[Event]()
+    goal = SimpleNamespace(outcome=Outcome.CANCELED, holding=True, lost=False)
+    line: Any = SimpleNamespace(goals={b"1": SimpleNamespace(goal=goal)})
+    line.tell = lambda _ticket, event: told.append(event)
+    Line.put_away(line)
+    assert not told
+
+
+def test_who_has_just_come_in_sight_may_be_followed_by_a_server_that_was_lost() -> None:
+    line: Any = SimpleNamespace(in_sight_since=0.0)
+    line.shares_server_with, line.has_lost = (lambda _: False), (lambda _: True)
+    goal, of_ticket = SimpleNamespace(busy=Busy.WAIT), SimpleNamespace(in_sight_since=9.5)
+    ticket: Any = SimpleNamespace(goal=goal, line=of_ticket)
+    assert Line.may_come_back_for(line, ticket, 9.4 + BESIDE)
+    assert not Line.may_come_back_for(line, ticket, 9.6 + BESIDE)
+
+
+def test_who_is_alone_is_not_settled_where_this_process_stood_still(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Though the look itself is in time."""
+    monkeypatch.setattr(module, "is_valid", lambda _: True)
+    still = Standstill()
+    still.lives(time.monotonic() - 2.0)
+    monkeypatch.setattr(alarm, "standstill", still)
+    seen = watch(OURS, NEW)
+    seen.probe_answered(0.5, 1)
+    look(SimpleNamespace(_look_at=3.0, pump=lambda: None), seen, 3.0)
+    assert not seen.alone
+
+
+class Orphan(Line):
+    """A line whose node is gone, with a goal that drains within 100 s; `put`: it was put away."""
+
+    def __init__(self, silent: float) -> None:
+        goal = SimpleNamespace(outcome=Outcome.CANCELED, drains_within=100.0)
+        said: Any = SimpleNamespace(servers=frozenset({OURS}))
+        for kind in ("canceled", "finished", "shown", "lives", "answered"):
+            setattr(said, kind, lambda *_: [])
+        self.goals: Any = {b"1": SimpleNamespace(goal=goal, testimony=said, keeps_feedback=False)}
+        self.watch = ServerWatch()
+        self.orphaned, self.put = True, False
+        self._ran_at = time.monotonic() - silent
+
+    def put_away(self, *, all_of_them: bool = False) -> None:
+        self.put = all_of_them
+
+    def tell(self, ticket: Any, event: Event, detail: Any = None, message: Any = None) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("silent", "put"), [(SILENT_FOR + 20.0, False), (101.0, True)])
+def test_what_an_orphan_drains_it_waits_for(
+    monkeypatch: pytest.MonkeyPatch, silent: float, put: bool
+) -> None:
+    monkeypatch.setattr(alarm, "standstill", Standstill())
+    line = Orphan(silent)
+    line._orphan()
+    assert line.put is put
+
+
+@pytest.mark.parametrize(
+    ("word", "runs"),
+    [
+        (lambda line: line.cancel_answered(b"1", 0.0, (2,)), False),
+        (lambda line: line.result_came(b"1", 0.0, ((0, None),)), False),
+        (lambda line: line.cancel_answered(b"1", 0.0, (0,)), True),
+        (lambda line: line.result_came(b"1", 0.0, ((2, None),)), True),
+        (lambda line: line.statuses_came({b"1": 2}), True),
+        (lambda line: line.feedback_came(b"1", None), True),
+        (lambda line: line.goal_answered(b"1", (True,)), True),
+    ],
+    ids=["denies", "knows none", "agrees to cancel", "a result", "a status", "feedback", "accepts"],
+)
+def test_a_denial_does_not_make_an_orphan_wait_on(
+    monkeypatch: pytest.MonkeyPatch, word: Callable[[Line], None], runs: bool
+) -> None:
+    """It may be the successor's, which goes on denying what its predecessor had."""
+    monkeypatch.setattr(alarm, "standstill", Standstill())
+    line = Orphan(101.0)
+    word(line)
+    line._orphan()
+    assert line.put is not runs

@@ -5,17 +5,25 @@ With stand-ins for client, watch and node; tests/scenarios/test_server.py does i
 
 from __future__ import annotations
 
+import gc
+import weakref
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
 
-from bt_actions.goal_terms import Event
+from bt_actions.goal import Goal
+from bt_actions.goal_terms import Event, Now
+from bt_actions.policy import Timeouts
+from bt_actions.ros import line as line_module
 from bt_actions.ros import past as module
 from bt_actions.ros import shared
+from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line
 from bt_actions.ros.past import QUESTIONS, STALE, Ended, Past
+from bt_actions.ros.shared import Ticket
+from bt_actions.server import ServerWatch
 
 GOAL, ONE, OTHER = b"goal", b"one", b"other"
 AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3
@@ -111,6 +119,25 @@ def test_the_child_of_a_fork_asks_nothing(line: OfPast) -> None:
     assert not line.asked
 
 
+def test_a_late_word_of_the_only_server_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = OfPast(monkeypatch, ONE)
+    line.now = 10.0 + STALE + 0.1
+    line.statuses_came({GOAL: EXECUTING})
+    assert not line.found
+
+
+def test_a_refusal_is_no_second_server_that_runs_it(line: OfPast) -> None:
+    line.goal_answered(GOAL, (False,))
+    assert not line.found
+
+
+def test_who_has_it_too_lives(line: OfPast) -> None:
+    told = list[bool]()
+    line.watch.two_answered = lambda: told.append(True)
+    line.goal_answered(GOAL, (True,))
+    assert told
+
+
 def test_a_word_long_after_the_end_is_no_older_one(line: OfPast) -> None:
     line.now = 10.0 + STALE + 0.1
     line.statuses_came({GOAL: EXECUTING})
@@ -134,3 +161,76 @@ def test_who_agrees_to_cancel_it_or_refuses_runs_it(
 ) -> None:
     line.cancel_answered(GOAL, asked, (ENDED, answer))
     assert bool(line.found) is found
+
+
+class Leaf:
+    """Whose goals these are."""
+
+
+NOW = Now(0.0, 0.0)
+
+
+def ended(line: OfPast, goal_id: bytes, *events: Any, owner: Any = None) -> Ticket:
+    """Let a goal that was sent have these events, and its line close the book on it."""
+    goal = Goal(goal_id, "m", Timeouts(), NOW)
+    for event in (Event.GRANTED, Event.SERVER_READY):
+        goal.on(event, NOW)
+    ticket = Ticket(goal, line, line.traffic, owner, "leaf")
+    ticket.testimony.sent_to = frozenset({ONE})
+    for event, detail in events:
+        goal.on(event, NOW, detail)
+    line.goals[goal_id] = ticket
+    line.close_book(ticket)
+    return ticket
+
+
+@pytest.fixture
+def keeper(monkeypatch: pytest.MonkeyPatch) -> OfPast:
+    """A line on which nothing has ended yet."""
+    line = OfPast(monkeypatch, ONE)
+    line.past = Past(line)
+    line.watch = ServerWatch()
+    line.watch.observe(0.0, True, frozenset({ONE}))
+    clocks = SimpleNamespace(now=lambda: NOW)
+    line.traffic = SimpleNamespace(clocks=clocks, drop_if_unused=lambda _: None)  # type: ignore[assignment]
+    line.client.forget = lambda _: None
+    monkeypatch.setattr(line_module.alarm, "forget", lambda _: None)
+    return line
+
+
+SUCCESS = ((Event.ACCEPTED, None), (Event.RESULT, (SUCCEEDED, None)))
+
+
+def test_only_the_newest_goals_are_kept_in_mind(keeper: OfPast) -> None:
+    for number in range(GOALS_KEPT + 30):
+        ended(keeper, b"%d" % number, *SUCCESS)
+    assert len(keeper.past._ended) == GOALS_KEPT
+
+
+def test_what_has_not_ended_is_not_kept_as_past(keeper: OfPast) -> None:
+    ended(keeper, GOAL, (Event.ACCEPTED, None))
+    assert not keeper.past._ended
+
+
+def test_what_is_kept_in_mind_keeps_no_leaf_alive_and_finds_it_if_it_lives(keeper: OfPast) -> None:
+    leaf, lives = Leaf(), Leaf()
+    gone = weakref.ref(leaf)
+    ended(keeper, b"1", *SUCCESS, owner=leaf)
+    ended(keeper, b"2", *SUCCESS, owner=lives)
+    del leaf
+    gc.collect()
+    assert gone() is None
+    keeper.comes_in_sight = frozenset({OTHER})
+    keeper.goal_answered(b"2", (True, True))
+    assert keeper.goals[b"2"].owner is lives
+
+
+def test_of_a_lost_goal_that_is_given_up_nothing_is_waited_for(keeper: OfPast) -> None:
+    ticket = ended(keeper, GOAL, (Event.SERVER_LOST, "gone"))
+    ticket.testimony.sent_to = frozenset({ONE, OTHER})
+    ticket.testimony._fresh_since = 1.0
+    ticket.goal.on(Event.CLOSED, NOW)
+    assert ticket.testimony.may_run_at(keeper.watch), "one of them is out of sight"
+    keeper.goals[GOAL] = ticket
+    keeper.close_book(ticket)
+    assert not keeper.goals
