@@ -18,7 +18,7 @@ from py_trees.composites import Selector
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
-from bt_actions.goal import State
+from bt_actions.goal import ASK_LESS, State
 from bt_actions.ros.shared import Change, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.ros.way import Way
@@ -510,6 +510,51 @@ class TestStopped:
         assert first.end is End.SERVER_GONE
         assert journal.ends() == ["succeeded"]
         record.outcome = "the other server of the arm is used as soon as nobody has it"
+
+    @pytest.mark.chaos
+    def test_a_node_that_is_destroyed_does_not_wait_for_what_the_successor_denies(
+        self,
+        new_host: HostFactory,
+        name: str,
+        node: Any,
+        domain: int,
+        record: Record,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """SIGKILL, a successor at once, and the node is destroyed while both are shown"""
+        from rclpy.context import Context
+        from rclpy.node import Node
+
+        monkeypatch.setattr("bt_actions.ros.line.SILENT_FOR", 1.2 * ASK_LESS)
+        victim, successor = new_host(), new_host()
+        victim.open(name)
+        Traffic.of(node)
+        until_shown(node, name, 1)
+        monkeypatch.setattr("bt_actions.ros.line.TOO_NEW", 0.0)  # it has seen the victim
+        first = MoveRobot("first", 40.0, action_name=name, timeout=Timeouts(cancel=0.5))
+        context = Context()
+        context.init(domain_id=domain)
+        gone = Node("gone", context=context)
+        first.setup(node=gone)
+        line = first._line
+        assert line is not None
+        ticking = lambda: (line.pump(), first.tick_once())  # noqa: E731
+        until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
+        killed = victim.kill()
+        journal = successor.open(name)
+        until(lambda: line.watch.is_crowded)
+        first.shutdown()
+        assert first.end is End.UNKNOWN
+        gone.destroy_node()
+        second = MoveRobot("second", 0.3, action_name=name)
+        second.timeouts = Timeouts(server=20.0, queue=None)
+        with TreeRunner(second, node=node) as runner:
+            assert runner.run(50.0) is Status.SUCCESS
+        context.shutdown()
+        record.took(time.monotonic() - killed, 30.0)
+        assert first.end is End.SERVER_GONE
+        assert of_process(journal, successor.pid) == ["received", "accepted", "succeeded"]
+        record.outcome = "SERVER_GONE; the successor is used"
 
     @pytest.mark.chaos
     def test_stopped_and_back_while_another_server_has_its_resource(
