@@ -20,6 +20,7 @@ set and destruction; it uses the low-level handle, whose methods are checked for
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections import deque
@@ -289,7 +290,8 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                 except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
                     log.error(f"{self._action_name}: {kind} was not taken in: {error!r}")
             if any_came:
-                self._listener.all_delivered()
+                with contextlib.suppress(Exception):  # nothing was lost by that
+                    self._listener.all_delivered()
             return any_came
 
     def _tell(self, kind: str, about: Any, detail: Any) -> None:

@@ -46,8 +46,8 @@ its return would matter. The last: between two takes of answers by the alarm, wh
 LATE = 0.5
 """Seconds by which a look is so late that answers may have come in between, unseen."""
 SILENT_FOR = 40.0
-"""Seconds without a word of them until goals whose node is gone are left to whoever can see whether
-their server is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
+"""Seconds without a word of their server until goals whose node is gone are left to whoever can see
+whether it is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
 BESIDE = 1.0
 """Seconds for which a server may be in sight before another one that was there all the time, or
 that came back with it; 0.5 measured."""
@@ -69,7 +69,7 @@ class Line:
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
         self.orphaned = False
-        self._ran_at = time.monotonic()  # of an orphan: when last heard of a goal that may run
+        self._heard_at = time.monotonic()  # of an orphan: when its servers were last heard of
         self.way = Way(self)
         self._look_at = 0.0
         self._looked_like = Server.ABSENT  # at the last look
@@ -105,7 +105,7 @@ class Line:
             if ticket is None:
                 self.past.runs(goal_id)
                 return
-            now = self._ran_at = time.monotonic()
+            now = self._heard_at = time.monotonic()
             self.watch.heard(now)
             self._pass_on(ticket, ticket.testimony.lives(self.watch, now))
             self.tell(ticket, Event.FEEDBACK, feedback)
@@ -116,7 +116,7 @@ class Line:
     def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         """Pass on an answer to a cancel request."""
         with lock:
-            ticket = self._heard_of(goal_id, runs=answers[-1] != CANCEL_UNKNOWN_GOAL)
+            ticket = self._heard_of(goal_id, denies=answers[-1] == CANCEL_UNKNOWN_GOAL)
             if ticket is not None:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.canceled(self.watch, now, asked, answers))
@@ -128,21 +128,21 @@ class Line:
     ) -> None:
         """Pass on a result."""
         with lock:
-            ticket = self._heard_of(goal_id, runs=answers[-1][0] != 0)
+            ticket = self._heard_of(goal_id, denies=answers[-1][0] == 0)
             if ticket is not None:
                 now, said = time.monotonic(), ticket.testimony
                 self._pass_on(ticket, said.finished(self.watch, now, asked, answers))
 
-    def _heard_of(self, goal_id: bytes, *, runs: bool = True) -> Ticket | None:
+    def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> Ticket | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight.
 
-        `runs`: it is no denial, which may be the word of another server.
+        One that denies it may be the word of another server than the goal's.
         """
         ticket = self.goals.get(goal_id)
         if ticket is not None:
             self.watch.heard(time.monotonic())
-            if runs:
-                self._ran_at = time.monotonic()
+            if not (denies and self.watch.changed(ticket.testimony.sent_to)):
+                self._heard_at = time.monotonic()
             if len(ticket.testimony.servers) > 1:
                 self.see()
         return ticket
@@ -482,14 +482,11 @@ class Line:
         """Observe the server, tell the goals what that means for them, and return its state."""
         if not is_valid(self.traffic.node):
             self._orphan()
+            self._look_blindly(now)
             return Server.ABSENT
-        if self.watch.is_crowded:  # what answers came in time count, though nobody spun the node
-            late = self._look_at and now - self._look_at > LATE
-            if late or alarm.standstill.answers_take(time.monotonic()):
-                self.watch.stood_still(now)
-            self.pump()
-            if self.client.closed:  # by what came, and nobody used the line
-                return Server.ABSENT
+        self._take_in(now)
+        if self.client.closed:  # by what came, and nobody used the line
+            return Server.ABSENT
         before = self._looked_like
         try:
             self._observe(now)
@@ -532,6 +529,26 @@ class Line:
             self._warned_crowd = False
         return state
 
+    def _take_in(self, now: float) -> None:
+        """What answers of several came in time count, though nobody spun the node."""
+        if self.watch.is_crowded:
+            late = self._look_at and now - self._look_at > LATE
+            if late or alarm.standstill.answers_take(time.monotonic()):
+                self.watch.stood_still(now)
+            self.pump()
+
+    def _look_blindly(self, now: float) -> None:
+        """Of the servers that were shown when the node went, find out by asking who lives."""
+        self._take_in(now)
+        if not self.watch.is_crowded or self.client.closed:
+            return
+        self.watch.observe(now, True, self.watch.gids)
+        if self.watch.wants_probe(now):
+            self.probe()
+        for ticket in list(self.goals.values()):
+            if ticket.goal.sent:
+                self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
+
     def _is_hidden(self, ticket: Ticket) -> bool:
         """Whether a server of this goal may be out of sight because this process stood still.
 
@@ -554,14 +571,14 @@ class Line:
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""
         if not self.orphaned:
-            self.orphaned, self._ran_at = True, time.monotonic()
+            self.orphaned, self._heard_at = True, time.monotonic()
             if any(not ticket.accounted_for for ticket in self.goals.values()):
                 log.warning(f"{self.name}: the node is gone; canceling what it left")
         for ticket in list(self.goals.values()):  # also one that was begun since
             if ticket.goal.outcome is None:
                 self.tell(ticket, Event.INTERRUPTED)
         patience = max((each.goal.drains_within for each in self.goals.values()), default=0.0)
-        silent = time.monotonic() - self._ran_at > max(SILENT_FOR, patience)
+        silent = time.monotonic() - self._heard_at > max(SILENT_FOR, patience)
         if silent and not alarm.standstill.answers_take(time.monotonic()):
             self.put_away(all_of_them=True)  # from here nobody can see whether the server is gone
 

@@ -296,8 +296,11 @@ class Judge:
             if other.goal.lost and self.caller.out_of_sight(other, ticket):
                 ticket.ledger.beside += (other,)
             elif other.line.name == ticket.line.name and other.goal.outcome is not None:
+                taken_for_ghosts = other.goal.end is End.SERVER_GONE  # as they answer nothing
                 runs = not other.goal.holding and any(
-                    job.live and self.caller.world.in_sight(job.server, ticket.node)
+                    job.live
+                    and self.caller.world.in_sight(job.server, ticket.node)
+                    and not (taken_for_ghosts and job.server.cut)
                     for job in other.ledger.jobs
                 )
                 excused: str | bool = other.ledger.excuse

@@ -16,7 +16,14 @@ import pytest
 
 from bt_actions import End, Outcome
 from bt_actions.goal import Goal
-from bt_actions.goal_terms import STATUS_ABORTED, STATUS_SUCCEEDED, Event, Now, State
+from bt_actions.goal_terms import (
+    CANCEL_UNKNOWN_GOAL,
+    STATUS_ABORTED,
+    STATUS_SUCCEEDED,
+    Event,
+    Now,
+    State,
+)
 from bt_actions.policy import Busy, Timeouts
 from bt_actions.ros import alarm, traffic
 from bt_actions.ros import line as module
@@ -106,6 +113,7 @@ def look(line: Any, seen: ServerWatch, now: float) -> None:
 
     line._looked_like, line._was_away = Server.ABSENT, False
     line.watch, line._observe = seen, observe
+    line._take_in = lambda now: Line._take_in(line, now)
     line.traffic, line.way = SimpleNamespace(node=None), SimpleNamespace(come_home=lambda: True)
     line.client = SimpleNamespace(closed=False)
     Line.look(line, now)
@@ -429,15 +437,15 @@ def test_who_is_alone_is_not_settled_where_this_process_stood_still(
 class Orphan(Line):
     """A line whose node is gone, with a goal that drains within 100 s; `put`: it was put away."""
 
-    def __init__(self, silent: float) -> None:
+    def __init__(self, silent: float, *shown: bytes) -> None:
         goal = SimpleNamespace(outcome=Outcome.CANCELED, drains_within=100.0)
-        said: Any = SimpleNamespace(servers=frozenset({OURS}))
+        said: Any = SimpleNamespace(servers=frozenset({OURS}), sent_to=frozenset({OURS}))
         for kind in ("canceled", "finished", "shown", "lives", "answered"):
             setattr(said, kind, lambda *_: [])
         self.goals: Any = {b"1": SimpleNamespace(goal=goal, testimony=said, keeps_feedback=False)}
-        self.watch = ServerWatch()
+        self.watch = watch(OURS, *shown)
         self.orphaned, self.put = True, False
-        self._ran_at = time.monotonic() - silent
+        self._heard_at = time.monotonic() - silent
 
     def put_away(self, *, all_of_them: bool = False) -> None:
         self.put = all_of_them
@@ -474,7 +482,42 @@ def test_a_denial_does_not_make_an_orphan_wait_on(
 ) -> None:
     """It may be the successor's, which goes on denying what its predecessor had."""
     monkeypatch.setattr(alarm, "standstill", Standstill())
-    line = Orphan(101.0)
+    line = Orphan(101.0, NEW)
     word(line)
     line._orphan()
     assert line.put is not runs
+    line = Orphan(101.0)
+    word(line)
+    line._orphan()
+    assert not line.put, "where there is no other"
+
+
+def test_an_orphan_finds_out_by_asking_who_lives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was shown when its node went does not change any more."""
+    monkeypatch.setattr(module, "is_valid", lambda _: False)
+    monkeypatch.setattr(alarm, "standstill", SimpleNamespace(answers_take=lambda _: 0.0))
+    line: Any = object.__new__(Line)
+    line.watch, line.orphaned = watch(OURS), True
+    line.traffic = SimpleNamespace(node=None, notify=lambda _: None)
+    line.watch.observe(2.0, True, frozenset({OURS, NEW}))
+    line._heard_at, line._look_at, line._last_probes = time.monotonic(), 0.0, deque()
+    line.client = SimpleNamespace(closed=False, probe=lambda probe, _: asked.append(probe))
+    line.pump = lambda: None
+    asked, told = list[int](), list[Event]()
+    line.tell = lambda _ticket, event, _detail=None: told.append(event)
+    goal = Goal(b"1", "m", Timeouts(), Now(0.0, 0.0))
+    for event in (Event.GRANTED, Event.SERVER_READY, Event.INTERRUPTED):
+        goal.on(event, Now(0.0, 0.0))
+    ticket = Ticket(goal, line, line.traffic, None, "leaf")
+    ticket.testimony.sent_to = frozenset({OURS})
+    line.goals = {b"1": ticket}
+    denied = (CANCEL_UNKNOWN_GOAL,)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now))
+    now = 2.0
+    line.look(now)
+    line.cancel_answered(b"1", now, denied)
+    for now in (2.5, 3.5, 5.0):
+        assert Event.SERVER_LOST not in told
+        line.probe_answered(asked[-1])
+        line.look(now)
+    assert Event.SERVER_LOST in told
