@@ -118,7 +118,7 @@ class CrowdPlay(Play):
         for _ in range(80):
             for leaf in caller.leaves:
                 caller.interrupt(leaf)
-            if self._loses:
+            if self._loses or world.was_full:
                 world.publish_status()
             for message in list(world.air):
                 if message in world.air:

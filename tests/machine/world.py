@@ -134,6 +134,8 @@ class World:
         """Servers that one of the nodes is not shown."""
         self.air: list[Message] = []
         self.room = IN_THE_AIR
+        self.was_full = False
+        """Something was lost, as there was too much in the air."""
         self.actions = actions
         self.client: Client
         self.kinds: dict[str, tuple[Callable[[], Options], Callable[[Any], object]]] = {
@@ -221,6 +223,8 @@ class World:
     def _add(self, message: Message) -> None:
         if len(self.air) < self.room:
             self.air.append(replace(message))
+        else:
+            self.was_full = True
 
     # The network
 
