@@ -319,7 +319,7 @@ class Judge:
         known = [job for job in ticket.ledger.jobs if job.server.gid in ticket.ledger.heard]
         runs = any(job.live and world.in_sight(job.server, ticket.node) for job in known)
         rule = "an end is known when it has ended everywhere, or a twin is kept in mind"
-        minded = ticket.goal.id in ticket.line.goals or not self._may_be_several(ticket)
+        minded = self._is_minded(ticket) or not self._may_be_several(ticket)
         self._hold(not runs or minded, rule)
 
     def twin_is_done(self, twin: Goal) -> None:
@@ -338,8 +338,12 @@ class Judge:
         runs = any(job.live and job.server is server for job in ledger.jobs)
         several = self._may_be_several(ticket)
         if news and runs and ticket.goal.state is State.DONE and several:
-            minded = ledger.closed or ticket.goal.id in ticket.line.goals
+            minded = ledger.closed or self._is_minded(ticket)
             self._hold(minded, "what a second server accepts of a goal that has ended is minded")
+
+    def _is_minded(self, ticket: Ticket) -> bool:
+        """Whether the goal, or its twin, is on a line; of another node, where that took it over."""
+        return any(ticket.goal.id in line.goals for line in self.caller.lines)
 
     @staticmethod
     def _may_be_several(ticket: Ticket) -> bool:

@@ -359,7 +359,8 @@ def test_a_goal_that_is_accepted_replaces_the_older_ones_and_no_newer() -> None:
     holders = SimpleNamespace(holders=lambda _: tickets)
     clocks = SimpleNamespace(now=lambda: now)
     line.traffic = SimpleNamespace(clocks=clocks, domain=SimpleNamespace(resources=holders))
-    Line._apply(line, tickets[1], lambda now: goals[1].on(Event.ACCEPTED, now), None)
+    with lock:
+        Line._apply(line, tickets[1], lambda now: goals[1].on(Event.ACCEPTED, now), None)
     assert told == ["a"]
 
 
