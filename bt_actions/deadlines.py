@@ -21,6 +21,7 @@ class Deadlines:
         self._ros_seen = now.ros
         self._not_before = float("-inf")
         self._held: dict[Event, float] = {}  # seconds in all, since it was armed
+        self._at_most = HELD_AT_MOST
 
     def arm(self, event: Event, seconds: float | None, now: Now) -> None:
         """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
@@ -60,18 +61,20 @@ class Deadlines:
         for event in self._due:
             self._due[event] += seconds
 
-    def hold(self, seconds: float, now: Now) -> None:
+    def hold(self, seconds: float, now: Now, at_most: float = HELD_AT_MOST) -> None:
         """Let none take effect within so many seconds of the steady clock.
 
-        For one that has passed it is `HELD_AT_MOST` in all, until it is armed anew.
+        One that has passed, and was held for `at_most` seconds in all, is not held any more until
+        it is armed anew.
         """
+        self._at_most = at_most
         for event in self._due:
             if self._left(event, now) <= 0.0:
                 self._held[event] = self._held.get(event, 0.0) + seconds
         self._not_before = now.steady + seconds
 
     def _may_hold(self, event: Event) -> bool:
-        return self._held.get(event, 0.0) <= HELD_AT_MOST
+        return self._held.get(event, 0.0) <= self._at_most
 
     def follow(self, now: Now) -> None:
         """Where the ROS clock has jumped back, let the deadlines on it jump with it."""

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bt_actions.deadlines import Deadlines
+from bt_actions.deadlines import HELD_AT_MOST, Deadlines
 from bt_actions.goal_terms import (
     CANCEL_ACCEPTED,
     CANCEL_REJECTED,
@@ -239,9 +239,12 @@ class Goal:
         if self.state in (State.QUEUED, State.WAITING_FOR_SERVER):
             self._deadlines.postpone(seconds)
 
-    def hold(self, seconds: float, now: Now) -> None:
-        """Let no deadline take effect for so many seconds: what is awaited may be on its way."""
-        self._deadlines.hold(seconds, now)
+    def hold(self, seconds: float, now: Now, at_most: float = HELD_AT_MOST) -> None:
+        """Let no deadline take effect for so many seconds: what is awaited may be on its way.
+
+        None is held for more than `at_most` seconds in all.
+        """
+        self._deadlines.hold(seconds, now, at_most)
 
     # Steps of the table: each decides, acts on the goal, and returns the next state
 

@@ -13,6 +13,9 @@ STOOD_STILL = 0.3
 ANSWERS_TAKE = 1.0
 """and seconds, at most, until what was sent meanwhile has come in: twice as long as it stood still,
 if that is less."""
+ANSWERS_TAKE_IN_ALL = 3.0
+"""Seconds for which one deadline waits for that, where standstills follow each other closely: in a
+large process each full garbage collection is one, and there may be one a second."""
 OUT_OF_SIGHT = 1.5
 """Seconds without a sign of life from which on a lease may have run out: none that is useful is
 shorter than 3 s, and each is renewed long before its end;"""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import faulthandler
 import fcntl
+import gc
 import itertools
 import os
 import signal
@@ -39,6 +40,12 @@ _STDERR = pytest.StashKey[int]()
 def pytest_configure(config: pytest.Config) -> None:
     assert sys.__stderr__ is not None
     config.stash[_STDERR] = os.dup(sys.__stderr__.fileno())  # the real one, while none is captured
+
+
+def pytest_collection_finish() -> None:
+    """Take what pytest knows of all tests out of each garbage collection, which stops everybody."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True)

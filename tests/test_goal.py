@@ -730,6 +730,20 @@ def test_what_is_held_again_and_again_takes_effect_in_the_end_unless_there_is_ne
     assert not is_held()
 
 
+def test_who_holds_a_deadline_says_for_how_long_in_all() -> None:
+    life = executing(Timeouts(result=5.0))
+    life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
+    for _ in range(3):
+        life.goal.hold(1.0, life.now, 3.0)
+        assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 1.0)
+        assert CANCEL not in life.pass_time(0.9)
+        life.now = Now(life.now.steady + 0.1, life.now.ros + 0.1)
+    life.goal.hold(1.0, life.now, 3.0)
+    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 0.0)
+    life.goal.hold(1.0, life.now, HELD_AT_MOST)
+    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 1.0), "there is more to wait for now"
+
+
 def test_no_feedback_puts_off_a_result_that_is_held_again_and_again() -> None:
     life = executing(Timeouts(result=5.0, feedback=2.0))
     life.pass_time(1.0)

@@ -14,11 +14,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from bt_actions.deadlines import HELD_AT_MOST
 from bt_actions.goal_terms import (
     CANCEL_UNKNOWN_GOAL,
     STATUS_SUCCEEDED,
     Command,
     Event,
+    Now,
     State,
 )
 from bt_actions.policy import Busy, End, Outcome
@@ -31,10 +33,12 @@ from bt_actions.ros.past import Past
 from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
+from bt_actions.standstill import ANSWERS_TAKE_IN_ALL
 from bt_actions.suggest import did_you_mean
 from bt_actions.testimony import Told
 
 if TYPE_CHECKING:
+    from bt_actions.goal import Goal
     from bt_actions.ros.traffic import Traffic
 
 LOOK_WHILE_WAITING = 0.05
@@ -221,13 +225,17 @@ class Line:
                 if goal.due_in(now) == 0.0:
                     self.pump()
                     now = self.traffic.clocks.now()
-                    held = alarm.standstill.answers_take(now.steady)
-                    if goal.state is State.WAITING_FOR_SERVER:
-                        held = max(held, alarm.standstill.servers_take(now.steady))
-                    if self.way.in_doubt(now.steady):
-                        held = max(held, LOOK_WHILE_RUNNING)
-                    goal.hold(held, now)
+                    self._bear_with(goal, now)
                 self._apply(ticket, lambda _: goal.poll(now), None)
+
+    def _bear_with(self, goal: Goal, now: Now) -> None:
+        """Hold deadlines that have passed while a standstill may be why nothing has come in."""
+        answers = alarm.standstill.answers_take(now.steady)
+        in_doubt = LOOK_WHILE_RUNNING if self.way.in_doubt(now.steady) else 0.0
+        if goal.state is State.WAITING_FOR_SERVER:
+            in_doubt = max(in_doubt, alarm.standstill.servers_take(now.steady))
+        in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
+        goal.hold(max(answers, in_doubt), now, in_all)
 
     @staticmethod
     def given_up(ticket: Ticket) -> bool:

@@ -9,12 +9,14 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bt_actions import End, Outcome
+from bt_actions.deadlines import HELD_AT_MOST
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import (
     CANCEL_UNKNOWN_GOAL,
@@ -31,7 +33,7 @@ from bt_actions.ros.line import BESIDE, LEASE, LOOK_WHILE_RUNNING, SILENT_FOR, L
 from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.server import PROBES_KEPT, Server, ServerWatch
-from bt_actions.standstill import AT_MOST, Leniency, Standstill
+from bt_actions.standstill import ANSWERS_TAKE_IN_ALL, AT_MOST, Leniency, Standstill
 
 OURS, NEW = b"ours", b"new"
 
@@ -198,13 +200,13 @@ LONG.lives(1.2)
 
 
 @pytest.mark.parametrize(
-    ("state", "still", "doubt", "seconds"),
+    ("state", "still", "doubt", "seconds", "in_all"),
     [
-        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.8),
-        (State.EXECUTING, STILL, 0.0, 0.8),
-        (State.WAITING_FOR_SERVER, LONG, 0.0, 4.0),
-        (State.EXECUTING, LONG, 0.0, 1.0),
-        (State.EXECUTING, Standstill(), 5.0, LOOK_WHILE_RUNNING),
+        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
+        (State.EXECUTING, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
+        (State.WAITING_FOR_SERVER, LONG, 0.0, 4.0, HELD_AT_MOST),
+        (State.EXECUTING, LONG, 0.0, 1.0, ANSWERS_TAKE_IN_ALL),
+        (State.EXECUTING, Standstill(), 5.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
     ],
     ids=["a server", "an answer", "a hidden server", "an answer, long", "who may not hear us"],
 )
@@ -214,10 +216,13 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
     still: Standstill,
     doubt: float,
     seconds: float,
+    in_all: float,
 ) -> None:
     monkeypatch.setattr(alarm, "standstill", still)
-    held: list[float] = []
-    goal = SimpleNamespace(state=state, due_in=lambda _: 0.0, hold=lambda s, _: held.append(s))
+    held: list[tuple[float, float]] = []
+    goal = SimpleNamespace(
+        state=state, due_in=lambda _: 0.0, hold=lambda s, _, in_all: held.append((s, in_all))
+    )
     clocks = SimpleNamespace(now=lambda: Now(1.2, 1.2))
     line: Any = SimpleNamespace(
         is_parents=False,
@@ -226,9 +231,10 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         way=SimpleNamespace(in_doubt=lambda _: doubt),
         _apply=lambda *_: None,
     )
+    line._bear_with = partial(Line._bear_with, line)
     ticket: Any = SimpleNamespace(goal=goal, paused_at=None)
     Line.poll(line, ticket)
-    assert held == [pytest.approx(seconds)]
+    assert held == [(pytest.approx(seconds), in_all)]
 
 
 def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(

@@ -19,10 +19,11 @@ from py_trees.composites import Selector
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.attempts import AttemptRecord
 from bt_actions.goal import State
+from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Change, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.ros.way import Way
-from bt_actions.server import NOT_READY_FOR, SLOWEST_START, Server, ServerWatch
+from bt_actions.server import NOT_READY_FOR, PROBE_EVERY, SLOWEST_START, Server, ServerWatch
 from tests.support.middleware import AS_IT_COMES
 from tests.support.processes import Host, HostFactory, Journal
 from tests.support.reliability import Record
@@ -61,7 +62,32 @@ def until_both_hear(leaf: MoveRobot, node: Any) -> None:
             return line.look(time.monotonic())
 
     until(lambda: state_now() is Server.AMBIGUOUS, 9.0, meanwhile=line.pump)
-    with lock:  # and then it is as if they were seen for the first time, and nothing was asked
+    as_if_nothing_was_asked(line)
+
+
+def until_heard(leaf: MoveRobot, node: Any) -> None:
+    """Set the leaf up, and wait until its server answers its client: so neither is in any doubt."""
+    leaf.setup(node=node)
+    line = leaf._line
+    assert line is not None
+    asked_at = float("-inf")
+
+    def is_heard() -> bool:
+        nonlocal asked_at
+        with lock:
+            now = time.monotonic()
+            if line.look(now) is Server.READY and now - asked_at > PROBE_EVERY:
+                asked_at = now
+                line.probe()
+            return line.client.hearing.heard
+
+    until(is_heard, 9.0, meanwhile=line.pump)
+    as_if_nothing_was_asked(line)
+
+
+def as_if_nothing_was_asked(line: Line) -> None:
+    """Have the line begin anew with the servers that it sees."""
+    with lock:
         line.pump()
         line.watch = ServerWatch()
         for probe in line._last_probes:
@@ -859,8 +885,7 @@ class TestTwice:
         journal = one.open(name, "*:slow=100")
         again = Retry(3, outcomes=["ACCEPT_TIMEOUT"])
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=1.5), retry=again)
-        leaf.setup(node=node)
-        until_shown(node, name, 1)
+        until_heard(leaf, node)
         one.freeze()
         with TreeRunner(leaf, node=node) as runner:
             runner.start()

@@ -7,7 +7,9 @@ imported before a test asks for a bench.
 from __future__ import annotations
 
 import threading
+import time
 import traceback
+import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -94,9 +96,27 @@ class Client:
         self.bench = bench
         self.action_type = action_type
         self.rclpy_client = ActionClient(bench.client_node, action_type, name)
+        self._questions: list[Any] = []
+        self._ask_at = 0.0
 
     def until_ready(self) -> Client:
-        return self.until(self.rclpy_client.server_is_ready, 10.0, "the server is there") and self
+        """Wait for the server, and for its answer to a question: it may see this client later."""
+        self.until(self.rclpy_client.server_is_ready, 10.0, "the server is there")
+        self.until(self._is_answered, 10.0, "the server answers")
+        return self
+
+    def _is_answered(self) -> bool:
+        """Whether it was answered; asks for a goal that nobody knows, now and then."""
+        from rclpy.action.client import ClientGoalHandle
+        from unique_identifier_msgs.msg import UUID
+
+        if any(question.done() for question in self._questions):
+            return True
+        if time.monotonic() >= self._ask_at:
+            self._ask_at = time.monotonic() + 0.5
+            nobody = ClientGoalHandle(self.rclpy_client, UUID(uuid=list(uuid.uuid4().bytes)), None)
+            self._questions.append(nobody.get_result_async())
+        return False
 
     def until(self, condition: Callable[[], Any], within: float = 5.0, what: str = "") -> Any:
         return self.bench.until(condition, within, what)
