@@ -12,7 +12,7 @@ Value = TypeVar("Value")
 
 def until(
     condition: Callable[[], Value],
-    within: float = 5.0,
+    within: float = 10.0,
     *,
     what: str = "",
     meanwhile: Callable[[], object] = lambda: None,
