@@ -40,6 +40,9 @@ ASK_AGAIN = 1.0
 ASK_LESS = 10.0
 """The same, after it was asked `OFTEN` times: a server that refuses to cancel keeps each question
 for the result until the goal ends, and answers them all."""
+UNHEARD = 3
+"""The same, after it was asked so often and nothing at all has come of the goal: the requests wait
+in the queue of a server that is busy, which holds ten, those of other clients among them."""
 OFTEN = 20
 ASK_IN_ANY_CASE = 30.0
 """Seconds between two questions to a server that need not have an answer yet: should the result
@@ -54,6 +57,18 @@ DENIED_FOR_GOOD = 30.0
 the tree need not wait for it: it has not got it. Should it turn up all the same, it is canceled."""
 PATIENCE = 5.0
 """Seconds for an answer that nobody wants any more, where the user gave no deadline."""
+_WORDS = frozenset(
+    {
+        Event.ACCEPTED,
+        Event.REJECTED,
+        Event.FEEDBACK,
+        Event.STATUS,
+        Event.RESULT,
+        Event.RESULT_UNKNOWN,
+        Event.CANCEL_ANSWERED,
+    }
+)
+"""What comes from a server."""
 _NEVER_DONE = (Outcome.CANCELED, Outcome.SERVER_AMBIGUOUS)
 """Outcomes that a goal was canceled for and that stand, should it succeed all the same."""
 
@@ -113,6 +128,7 @@ class Goal:
         self._cancel_sent = False
         self._cancel_code: int | None = None  # what was answered to a cancel request
         self._asked = 0  # in a row, of a server that has it and does not say that it has ended
+        self._unheard = 0  # so often was it asked to cancel since anything was heard of the goal
         self._commands: list[Command] = []
         self._deadlines = Deadlines(now)
         self._deadlines.arm(Event.QUEUE_DUE, timeouts.queue, now)
@@ -214,6 +230,8 @@ class Goal:
         if now.steady != now.steady or now.ros != now.ros:
             raise ValueError(f"not a moment: {now}")
         self._deadlines.follow(now)
+        if event in _WORDS:
+            self._is_heard_of(now)
         row = TABLE[self.state, event]
         state = row.step(self, now, detail)
         assert state in row.to, f"{event} took {self!r} to {state}"
@@ -224,6 +242,12 @@ class Goal:
         commands, self._commands = tuple(self._commands), []
         self._cancel_sent |= Command.CANCEL in commands
         return commands
+
+    def _is_heard_of(self, now: Now) -> None:
+        """Whoever may have it speaks, and so can be asked again."""
+        if self._unheard > UNHEARD:
+            self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
+        self._unheard = 0
 
     def poll(self, now: Now) -> tuple[Command, ...]:
         """Let every deadline that has passed take effect, the earliest first."""
@@ -587,7 +611,7 @@ class Goal:
         self._settle(Outcome.SERVER_LOST, str(detail))
         if self._seen_status is not None:
             return self._finished_by_status()
-        self.lost, self._was_left = True, False
+        self.lost, self._was_left, self._unheard = True, False, 0
         if not self._never_came:  # else it was denied for good; for less, it may have come
             self.end = End.SERVER_GONE
         self._deadlines.clear()
@@ -601,8 +625,10 @@ class Goal:
         self.lost = False
         if not (self._was_left and self._denied_lately(now)):
             self._denied_since = None
-        self._never_came, self._asked = False, 0
-        self._cancel_code = None
+        self._asked, self._cancel_code = 0, None
+        if self._never_came:  # nor will it; to ask does no harm
+            self._commands.append(Command.CANCEL)
+            return State.CANCELING
         if self.end is End.NEVER_STARTED:  # and this is the question whether that still holds
             self._ask(now)
             return State.CANCELING
@@ -719,7 +745,7 @@ class Goal:
             return self._finished_by_status()
         if self.suspect:
             self.end = End.UNKNOWN
-        self.lost = self._was_left = True
+        self.lost, self._was_left, self._unheard = True, True, 0
         self._deadlines.clear()
         self._release()
         return State.CANCELING
@@ -775,7 +801,8 @@ class Goal:
     def _ask(self, now: Now) -> None:
         """Ask to cancel and, where there will be one, for the result; again in a while."""
         self._commands.append(Command.CANCEL)
-        again = ASK_AGAIN
+        self._unheard += 1
+        again = ASK_LESS if self._unheard > UNHEARD else ASK_AGAIN
         if self._accepted:
             self._commands.append(Command.ASK_RESULT)
             self._asked += 1

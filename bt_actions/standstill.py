@@ -8,14 +8,15 @@ a machine is never in time, whoever asks must come to an end all the same (`AT_M
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 STOOD_STILL = 0.3
 """Seconds without a sign of life,"""
 ANSWERS_TAKE = 1.0
 """and seconds, at most, until what was sent meanwhile has come in: twice as long as it stood still,
 if that is less."""
 ANSWERS_TAKE_IN_ALL = 3.0
-"""Seconds for which one deadline waits for that, where standstills follow each other closely: in a
-large process each full garbage collection is one, and there may be one a second."""
+"""Seconds for which one deadline waits for that, where standstills follow each other closely."""
 OUT_OF_SIGHT = 1.5
 """Seconds without a sign of life from which on a lease may have run out: none that is useful is
 shorter than 3 s, and each is renewed long before its end;"""
@@ -32,7 +33,12 @@ class Standstill:
     Who asks lives: a question is a sign of life, too.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, take_busy: Callable[[], float] = lambda: 0.0) -> None:
+        """`take_busy` returns for how many seconds, since its last call, Python alone stood still.
+
+        The rest of the process ran then, and has taken in what was sent to it.
+        """
+        self._take_busy = take_busy
         self.times = 0
         """How often this process stood still;"""
         self.long_times = 0
@@ -42,7 +48,8 @@ class Standstill:
 
     def lives(self, now: float) -> None:
         """Take a sign of life; there are to be several a second."""
-        still = 0.0 if self._lived_at is None else now - self._lived_at
+        busy = self._take_busy()
+        still = 0.0 if self._lived_at is None else now - self._lived_at - busy
         self._lived_at = now
         if still > STOOD_STILL:
             self.times += 1

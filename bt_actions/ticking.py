@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
 
 from py_trees.behaviour import Behaviour
@@ -98,12 +99,12 @@ class ChangeVisitor(VisitorBase):
         super().__init__(full=False)
         self.running: list[Behaviour] = []
         self._visited: list[Behaviour] = []
-        self._known: dict[Behaviour, Status] = {}
+        self._known = weakref.WeakKeyDictionary[Behaviour, Status]()
 
     def forget(self) -> None:
         """Begin a run."""
         self.running = []
-        self._known = {}
+        self._known.clear()
 
     def begin(self) -> None:
         """Begin a tick."""

@@ -23,6 +23,7 @@ from bt_actions.goal import (
     PATIENCE,
     RESULT_QUESTIONS,
     TABLE,
+    UNHEARD,
     Goal,
 )
 from bt_actions.goal_terms import (
@@ -530,6 +531,7 @@ def test_a_server_that_refuses_for_long_is_asked_less_often() -> None:
     life = executing(Timeouts(cancel=2.0))
     life.on(Event.INTERRUPTED)
     for _ in range(OFTEN):
+        life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED)
         assert life.pass_time(ASK_AGAIN)
     assert life.pass_time(ASK_LESS - 0.5) == []
     assert life.pass_time(0.5) == [CANCEL, ASK]
@@ -537,6 +539,35 @@ def test_a_server_that_refuses_for_long_is_asked_less_often() -> None:
     assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK], "it has ended: its result is due"
     life.on(Event.SERVER_LOST, "gone")
     life.ended(Outcome.CANCELED, End.CANCELED)
+
+
+def test_a_server_that_says_nothing_is_asked_less_often_until_it_speaks() -> None:
+    """What it was asked waits in its queue, in the way of other clients."""
+    life = executing(Timeouts(cancel=2.0))
+    life.on(Event.INTERRUPTED)
+    for _ in range(UNHEARD):
+        assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
+    assert life.pass_time(ASK_LESS - 0.5) == []
+    assert life.pass_time(0.5) == [CANCEL, ASK]
+    assert life.pass_time(5.0) == []
+    life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED)
+    assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
+    assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
+
+
+def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_server() -> None:
+    life = suspect()
+    for _ in range(int(DENIED_FOR_GOOD) + 5):
+        life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+        life.pass_time(1.0)
+    assert not life.goal.suspect
+    for goes in (Event.SERVER_LOST, Event.LEFT):
+        life.on(goes, "gone")
+        assert life.on(Event.SERVER_RETURNED) == [CANCEL], "to ask does no harm"
+        life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
+        assert life.pass_time(60.0) == []
+        assert (life.goal.end, life.goal.suspect) == (End.NEVER_STARTED, False)
+    assert life.on(Event.ACCEPTED) == [CANCEL, ASK], "it came after all"
 
 
 def test_a_server_that_is_back_is_asked_often_again() -> None:

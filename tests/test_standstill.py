@@ -6,9 +6,11 @@ import pytest
 
 from bt_actions.standstill import (
     ANSWERS_TAKE,
+    AT_MOST,
     BACK_IN_SIGHT,
     OUT_OF_SIGHT,
     STOOD_STILL,
+    Leniency,
     Standstill,
 )
 
@@ -62,6 +64,37 @@ def test_a_rest_is_no_standstill(standstill: Standstill) -> None:
     assert standstill.answers_take(99.0) == 0.0
     assert not standstill.servers_take(99.0)
     assert standstill.times == 0
+
+
+def test_a_time_in_which_python_alone_stood_still_does_not_count(standstill: Standstill) -> None:
+    standstill._take_busy = lambda: 2.0
+    assert standstill.answers_take(12.0 + STOOD_STILL / 2) == 0.0
+    standstill._take_busy = lambda: 0.1
+    assert standstill.answers_take(12.2 + STOOD_STILL) == 0.0
+    assert standstill.answers_take(15.0) == ANSWERS_TAKE, "it was stopped as well"
+    assert (standstill.times, standstill.long_times) == (1, 1)
+
+
+def test_leniency_bears_with_so_many_in_a_row_and_no_more(standstill: Standstill) -> None:
+    leniency, moment = Leniency(), 10.0
+    for _ in range(AT_MOST):
+        assert leniency.bears(standstill, cause=True)
+        standstill.lives(moment := moment + 1.0)
+    assert not leniency.bears(standstill, cause=True)
+    assert not leniency.bears(standstill, cause=True)
+
+
+def test_leniency_begins_anew_where_there_was_no_cause_for_it(standstill: Standstill) -> None:
+    leniency, moment = Leniency(), 10.0
+    assert not leniency.bears(standstill, cause=False)
+    for _ in range(2 * AT_MOST):
+        standstill.lives(moment := moment + 1.0)
+    assert leniency.bears(standstill, cause=True), "what was before it does not count"
+    for _ in range(AT_MOST):
+        standstill.lives(moment := moment + 1.0)
+    assert not leniency.bears(standstill, cause=True)
+    assert not leniency.bears(standstill, cause=False)
+    assert leniency.bears(standstill, cause=True)
 
 
 def test_many_of_them_use_up_nothing_of_what_the_next_one_is_granted(

@@ -267,7 +267,7 @@ class ActionBehaviour(Behaviour):
                     return Status.FAILURE
             if self._is_over():
                 return Status.FAILURE
-            if ticket.goal.outcome is None:
+            if not traffic.is_settled(ticket):
                 self.feedback_message = self._in_words(ticket)
                 return Status.RUNNING
             record = self._judge(ticket)

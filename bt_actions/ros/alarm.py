@@ -7,16 +7,20 @@ It knows lines only by their `attend`.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import Protocol
 
+from bt_actions.ros.collector import Collector
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 from bt_actions.standstill import Standstill
 
 AT_LEAST_EVERY = 0.2
 """Seconds; a clock that is not the steady one may run faster than the alarm can know."""
+SHORTEST = 0.001
+"""Seconds that it sleeps in any case, should what is due stay due."""
 LINGER = 5.0
 """Seconds without an open goal until the thread ends; to start one for each goal costs more."""
 
@@ -28,7 +32,8 @@ class Attended(Protocol):
         """Do what is due and return the seconds until there is more."""
 
 
-standstill = Standstill()
+_collector = Collector()
+standstill = Standstill(_collector.take)
 """Of this process while a goal is open; under the lock."""
 _open: set[Attended] = set()
 _bell = threading.Condition(lock)
@@ -73,11 +78,19 @@ def wake_by(moment: float) -> None:
 
 
 def _attend() -> None:
+    _collector.watch()
+    try:
+        _attend_until_idle()
+    finally:
+        _collector.unwatch()
+
+
+def _attend_until_idle() -> None:
     global _thread, _wakes_at
     with lock:
         busy_at = time.monotonic()
         while _open or time.monotonic() - busy_at < LINGER:
-            wait = AT_LEAST_EVERY
+            wait, _wakes_at = AT_LEAST_EVERY, math.inf  # who asks to be woken meanwhile is heard
             if _open:
                 busy_at = time.monotonic()
             for line in list(_open):
@@ -86,9 +99,10 @@ def _attend() -> None:
                     wait = min(wait, line.attend(time.monotonic()))
                 except Exception as error:  # noqa: BLE001 - the last guard of every deadline
                     log.error(f"{line!r}: {error!r}")
-            _wakes_at = time.monotonic() + wait
-            standstill.lives(time.monotonic())
-            _bell.wait(wait)
+            now = time.monotonic()
+            _wakes_at = min(now + wait, _wakes_at)
+            standstill.lives(now)
+            _bell.wait(max(SHORTEST, _wakes_at - now))
             standstill.lives(time.monotonic())
         standstill.rests()
         _thread = None

@@ -27,6 +27,7 @@ from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
+from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.past import Past
@@ -72,6 +73,7 @@ class Line:
         self.goals: dict[bytes, Ticket] = {}
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
+        self.cancels = Cancels(self._send_cancel, self._cancels_under_way)
         self.orphaned = False
         self._heard_at = time.monotonic()  # of an orphan: when its servers were last heard of
         self.way = Way(self)
@@ -120,6 +122,7 @@ class Line:
     def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         """Pass on an answer to a cancel request."""
         with lock:
+            self.cancels.answered(goal_id, time.monotonic())
             ticket = self._heard_of(goal_id, denies=answers[-1] == CANCEL_UNKNOWN_GOAL)
             if ticket is not None:
                 now, said = time.monotonic(), ticket.testimony
@@ -270,6 +273,7 @@ class Line:
             goal.reason += self._in_use(ticket)
         if before != (goal.state, goal.outcome, goal.end):
             ticket.traffic.note(ticket)
+            self._tell_who_waits()
         for command in commands:
             self._carry_out(ticket, command, message)
         if goal.state is State.DONE:
@@ -296,15 +300,33 @@ class Line:
                 self.client.send(goal.id, message)
                 self.see()
                 ticket.testimony.sent(self.watch)  # who opened since got it, too
-            elif command is Command.CANCEL:
-                self.client.cancel(goal.id)
-            else:
+            elif command is Command.ASK_RESULT:
                 self.client.ask_result(goal.id)
+            elif goal.state is State.DONE:  # and nothing is sent after that
+                self._send_cancel(goal.id)
+            else:
+                self.cancels.ask(goal.id, time.monotonic())
         except Exception as error:  # noqa: BLE001 - InvalidHandle, RCLError, or TypeError of a wrong message
             if command is Command.SEND:
                 self.tell(ticket, Event.SEND_FAILED, error)
             else:
                 self._warn_once(f"{command.name} could not be sent", error)
+
+    def _tell_who_waits(self) -> None:
+        """Wake those of other nodes whose goals a change here may have let go on."""
+        for line in self.neighbors():
+            if line.traffic is not self.traffic and line.way.is_waited_for():
+                line.traffic.notify(None)
+
+    def _send_cancel(self, goal_id: bytes) -> None:
+        try:
+            self.client.cancel(goal_id)
+        except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
+            self._warn_once("CANCEL could not be sent", error)
+
+    def _cancels_under_way(self, now: float) -> int:
+        lines = {self, *(line for line in self.neighbors() if line.shares_server_with(self))}
+        return sum(line.cancels.under_way(now) for line in lines)
 
     def pump(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
@@ -314,6 +336,7 @@ class Line:
             self.client.pump()
         except Exception as error:  # noqa: BLE001 - the middleware's: any
             self._warn_once("something that arrived could not be taken", error)
+        self.cancels.go_on(time.monotonic())
 
     def _warn_once(self, what: str, error: Exception) -> None:
         if what not in self._warned_of:
@@ -326,6 +349,7 @@ class Line:
         if self.goals.get(goal.id) is ticket:  # and not its twin
             del self.goals[goal.id]
             self.client.forget(goal.id)
+            self.cancels.forget(goal.id)
             if goal.sent and goal.state is State.DONE:
                 self.past.keep(ticket)
         if not self.goals:
@@ -334,8 +358,10 @@ class Line:
             self.traffic.drop_if_unused(self)
 
     def _in_use(self, ticket: Ticket) -> str:
-        """Say who has what the goal waited for, where that is a goal that was given up."""
+        """Say who has what the goal waited for, where that is not a goal that just runs."""
         for other in self.traffic.domain.resources.holders(ticket.goal.resources):
+            if other.paused_at is not None and not other.goal.sent:
+                return f": it is the turn of {other.name}, whose tree is paused"
             if other.goal.outcome is not None and not other.accounted_for:
                 told = other.goal.cancel_said
                 return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
@@ -367,6 +393,7 @@ class Line:
 
     def open(self, client: ActionClient) -> None:
         """Go on with another client, of which nothing is known yet."""
+        self.cancels.forget_answers()
         self.client, self.watch = client, ServerWatch()
         self._looked_like = Server.ABSENT
         self._look_at = 0.0
@@ -602,6 +629,7 @@ class Line:
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
+        self.cancels.go_on(now)
         if self.orphaned or self.way.sight is not None:
             self.pump()
             if not all(ticket.accounted_for for ticket in self.goals.values()):

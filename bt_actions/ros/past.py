@@ -7,7 +7,6 @@ one. What is believed of what servers say of that is twin.py's. All under the on
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import time
 import weakref
@@ -118,8 +117,7 @@ class Past:
         """Ask whoever has it to cancel: whoever has ended it will deny it."""
         if ended.questions < QUESTIONS:
             ended.questions += 1
-            with contextlib.suppress(Exception):  # our node is gone; the next look tells
-                self._line.client.cancel(ended.twin.goal.id)
+            self._line.cancels.ask(ended.twin.goal.id, time.monotonic())
 
     def _get(self, goal_id: bytes) -> Ended | None:
         """Return what has ended; in the child of a fork nothing has, it is the parent's."""

@@ -179,6 +179,8 @@ class Traffic:
         """
         line = ticket.line
         with lock:
+            if ticket.goal.state is State.DONE:
+                return
             line.poll(ticket)
             if _closing or line.given_up(ticket):
                 line.tell(ticket, Event.INTERRUPTED)
@@ -196,6 +198,12 @@ class Traffic:
         with lock:
             if self._may_send(ticket):
                 line.tell(ticket, Event.SERVER_READY, message=message)
+
+    @staticmethod
+    def is_settled(ticket: Ticket) -> bool:
+        """Whether its outcome is decided, and what is known of its end then is, too."""
+        with lock:  # a goal takes one step at a time
+            return ticket.goal.outcome is not None
 
     def _may_send(self, ticket: Ticket) -> bool:
         line = ticket.line

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import time
+import weakref
 from pathlib import Path
 
 import py_trees
@@ -302,6 +304,29 @@ def test_who_failed_is_named_and_nobody_who_did_not_run(
     assert list(named) == list(culprits)
     for name, message in culprits.items():
         assert named[name].startswith(message)
+
+
+def test_what_was_pruned_in_a_run_is_not_kept() -> None:
+    root = Sequence("root", memory=False)
+    ticking, visitor = py_trees.trees.BehaviourTree(root), ChangeVisitor()
+    ticking.visitors.append(visitor)
+
+    def tick() -> None:
+        visitor.begin()
+        ticking.tick()
+        visitor.finish()
+
+    pruned = []
+    for number in range(5):
+        leaf = py_trees.behaviours.Running(f"leaf {number}")
+        ticking.insert_subtree(leaf, root.id, 0)
+        tick()
+        ticking.prune_subtree(leaf.id)
+        tick()
+        pruned.append(weakref.ref(leaf))
+        del leaf
+    gc.collect()
+    assert [each() for each in pruned] == [None] * 5
 
 
 def test_a_tree_that_succeeded_has_no_culprits_though_a_leaf_failed(story: Story) -> None:

@@ -6,6 +6,7 @@ real servers, and tests/machine with whole histories.
 
 from __future__ import annotations
 
+import copy
 import time
 from collections import deque
 from collections.abc import Callable
@@ -29,6 +30,7 @@ from bt_actions.goal_terms import (
 from bt_actions.policy import Busy, Timeouts
 from bt_actions.ros import alarm, traffic
 from bt_actions.ros import line as module
+from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.line import BESIDE, LEASE, LOOK_WHILE_RUNNING, SILENT_FOR, Line
 from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
 from bt_actions.ros.traffic import Traffic
@@ -218,7 +220,6 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
     seconds: float,
     in_all: float,
 ) -> None:
-    monkeypatch.setattr(alarm, "standstill", still)
     held: list[tuple[float, float]] = []
     goal = SimpleNamespace(
         state=state, due_in=lambda _: 0.0, hold=lambda s, _, in_all: held.append((s, in_all))
@@ -233,7 +234,9 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
     )
     line._bear_with = partial(Line._bear_with, line)
     ticket: Any = SimpleNamespace(goal=goal, paused_at=None)
-    Line.poll(line, ticket)
+    with lock:  # an alarm that is still awake would live in it
+        monkeypatch.setattr(alarm, "standstill", copy.copy(still))
+        Line.poll(line, ticket)
     assert held == [(pytest.approx(seconds), in_all)]
 
 
@@ -355,6 +358,7 @@ def test_a_goal_that_is_accepted_replaces_the_older_ones_and_no_newer() -> None:
     now, told = Now(0.0, 0.0), list[str]()
     goals = [Goal(name.encode(), "m", Timeouts(), now, busy=Busy.REPLACE) for name in "abc"]
     line: Any = SimpleNamespace(goals={}, _carry_out=lambda *_: None)
+    line._tell_who_waits = lambda: None
     line.tell = lambda ticket, _event, _detail: told.append(ticket.name)
     tickets = []
     for goal in goals:
@@ -368,6 +372,33 @@ def test_a_goal_that_is_accepted_replaces_the_older_ones_and_no_newer() -> None:
     with lock:
         Line._apply(line, tickets[1], lambda now: goals[1].on(Event.ACCEPTED, now), None)
     assert told == ["a"]
+
+
+@pytest.mark.parametrize("changes", [True, False])
+def test_who_waits_on_another_node_is_told_when_a_goal_changes(changes: bool) -> None:
+    """It may have room at the server now; nobody else would tell it, without a heartbeat."""
+    now, woken = Now(0.0, 0.0), list[str]()
+
+    def line_of(traffic: Any, *, waits: bool = True) -> Any:
+        return SimpleNamespace(traffic=traffic, way=SimpleNamespace(is_waited_for=lambda: waits))
+
+    def traffic_of(name: str) -> Any:
+        return SimpleNamespace(notify=lambda _: woken.append(name), note=lambda _: None)
+
+    ours, other, idle = traffic_of("ours"), traffic_of("other"), traffic_of("idle")
+    ours.clocks = SimpleNamespace(now=lambda: now)
+    line: Any = line_of(ours)
+    line.goals, line._carry_out = {}, lambda *_: None
+    line._tell_who_waits = partial(Line._tell_who_waits, line)
+    line.neighbors = lambda: [line, line_of(other), line_of(idle, waits=False)]
+    goal = Goal(b"1", "m", Timeouts(), now)
+    events = (Event.GRANTED, Event.SERVER_READY, Event.ACCEPTED if changes else Event.DRAINED)
+    for event in events[:-1]:
+        goal.on(event, now)
+    with lock:
+        step = partial(goal.on, events[-1], now)
+        Line._apply(line, Ticket(goal, line, ours, None, "m"), lambda _: step(), None)
+    assert woken == (["other"] if changes else [])
 
 
 @pytest.mark.parametrize(("suspect", "closed"), [(False, [0, 1, 2]), (True, [])])
@@ -399,6 +430,7 @@ def test_a_paused_goal_whose_deadline_has_passed_does_not_keep_the_alarm_awake()
     line: Any = SimpleNamespace(_look_at=10.0, orphaned=False, way=SimpleNamespace(sight=None))
     line.goals, line.traffic = {b"1": ticket}, SimpleNamespace(clocks=SimpleNamespace(now=list))
     line.mind, line._bound_the_lost = (lambda _: None), (lambda: None)
+    line.cancels = Cancels(lambda _: None, lambda _: 0)
     assert Line.attend(line, 9.9) == pytest.approx(0.1)
 
 
@@ -451,6 +483,7 @@ class Orphan(Line):
             setattr(said, kind, lambda *_: [])
         self.goals: Any = {b"1": SimpleNamespace(goal=goal, testimony=said, keeps_feedback=False)}
         self.watch = watch(OURS, *shown)
+        self.cancels = Cancels(lambda _: None, lambda _: 0)
         self.orphaned, self.put = True, False
         self._heard_at = time.monotonic() - silent
 
@@ -509,7 +542,7 @@ def test_an_orphan_finds_out_by_asking_who_lives(monkeypatch: pytest.MonkeyPatch
     line.watch.observe(2.0, True, frozenset({OURS, NEW}))
     line._heard_at, line._look_at, line._last_probes = time.monotonic(), 0.0, deque()
     line.client = SimpleNamespace(closed=False, probe=lambda probe, _: asked.append(probe))
-    line.pump = lambda: None
+    line.pump, line.cancels = (lambda: None), Cancels(lambda _: None, lambda _: 0)
     asked, told = list[int](), list[Event]()
     line.tell = lambda _ticket, event, _detail=None: told.append(event)
     goal = Goal(b"1", "m", Timeouts(), Now(0.0, 0.0))

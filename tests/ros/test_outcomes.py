@@ -399,6 +399,28 @@ class TestBusy:
         assert [leaf.outcome for leaf in leaves] == [Outcome.SUCCEEDED] * 3
         assert journal.max_live == 1
 
+    def test_who_waits_for_the_turn_of_a_paused_tree_is_told(
+        self, serve: Any, name: str, node: Any
+    ) -> None:
+        serve()
+        first = MoveRobot("first", 0.5, action_name=name)
+        second = MoveRobot("second", 0.1, action_name=name)
+        third = MoveRobot("third", 0.1, action_name=name, timeout=Timeouts(queue=1.5))
+        runners = [TreeRunner(each, node=node) for each in (first, second, third)]
+        try:
+            for leaf, runner, is_now in zip(
+                (first, second), runners[:2], ("EXECUTING", "QUEUED"), strict=True
+            ):
+                runner.start()
+                until(lambda: leaf.progress().state == is_now)  # noqa: B023 - called at once
+            runners[1].pause()
+            assert runners[2].run(9.0) is Status.FAILURE
+        finally:
+            for runner in runners:
+                runner.shutdown()
+        assert third.outcome is Outcome.SERVER_BUSY
+        assert third.reason.endswith(": it is the turn of second, whose tree is paused")
+
     def test_share_sends_beside_the_others(self, serve: Any, name: str, run: Run) -> None:
         journal = serve()
         leaves = [MoveRobot(f"m{i}", 0.5, action_name=name, busy="share") for i in range(3)]

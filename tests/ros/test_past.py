@@ -20,6 +20,7 @@ from bt_actions.ros import line as line_module
 from bt_actions.ros import past as module
 from bt_actions.ros import shared
 from bt_actions.ros.action_client import GOALS_KEPT
+from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.line import Line
 from bt_actions.ros.past import QUESTIONS, STALE, Ended, Past
 from bt_actions.ros.shared import Ticket
@@ -44,7 +45,8 @@ class OfPast(Line):
         self.watch: Any = SimpleNamespace(gids=frozenset({ONE}), two_answered=lambda: None)
         self.watch.heard = lambda _: None
         self.asked: list[bytes] = []
-        self.client: Any = SimpleNamespace(cancel=self.asked.append)
+        self.client: Any = SimpleNamespace()
+        self.cancels = Cancels(self.asked.append, lambda _: 0)
         self._generation = shared.generation
         self.comes_in_sight: frozenset[bytes] = frozenset()
         self.found: list[Event] = []

@@ -22,7 +22,7 @@ from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.simulation.journal import live_intervals
 from tests.support.processes import Journal
 from tests.support.reliability import Record
-from tests.support.trees import Gate, together
+from tests.support.trees import Gate, state, together
 from tests.support.waiting import until
 
 Serve = Callable[..., Journal]
@@ -243,3 +243,27 @@ def test_twenty_goals_over_their_deadline_at_a_server_that_answers_wrong(
     assert journal.max_live == 1
     assert journal.executed_twice == []
     record.outcome = "every goal accounted for, never two at once"
+
+
+def test_sixty_goals_that_are_interrupted_at_once_are_all_canceled(
+    serve: Serve, name: str, node: Any, record: Record
+) -> None:
+    """Six times as many cancel requests as the queue of the server's service holds"""
+    journal = serve()
+    limits = Timeouts(server=20.0, accept=20.0, cancel=1.0)
+    leaves = [
+        MoveRobot(f"m{i}", 90.0, action_name=name, busy="share", timeout=limits) for i in range(60)
+    ]
+    with TreeRunner(together(*leaves), node=node) as runner:
+        runner.start()
+        journal.wait_for("accepted", 60, 20.0)
+        until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
+        interrupted = time.monotonic()
+        runner.interrupt()
+        runner.wait(20.0)
+        record.took(time.monotonic() - interrupted, 2.0)
+        assert runner.unaccounted == []
+    assert {(leaf.outcome, leaf.end) for leaf in leaves} == {(Outcome.CANCELED, End.CANCELED)}
+    assert journal.ends() == ["canceled"] * 60
+    assert journal.count("cancel_requested") == 60
+    record.outcome = "all CANCELED, each asked for once"

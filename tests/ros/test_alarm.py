@@ -1,0 +1,94 @@
+"""The alarm is awake when it was asked to be, and knows a standstill from Python's own work."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from bt_actions.ros import alarm
+from bt_actions.ros.shared import lock
+from bt_actions.standstill import STOOD_STILL
+from tests.support.waiting import until
+
+
+class Attended:
+    """A line that wants nothing, but that the next look comes when it says so."""
+
+    def __init__(self) -> None:
+        self.looks: list[float] = []
+        self.wants = 10.0
+        """Seconds of its own, told by `attend`;"""
+        self.asks: float | None = None
+        """and seconds for which it calls `wake_by` in its next look."""
+        self.asked: list[float] = []
+
+    def attend(self, now: float) -> float:
+        self.looks.append(now)
+        if self.asks is not None:
+            self.asked.append(now + self.asks)
+            alarm.wake_by(now + self.asks)
+            self.asks = None
+        return self.wants
+
+
+@pytest.fixture
+def attended() -> Iterator[Attended]:
+    each = Attended()
+    with lock:
+        alarm.mind(each)
+    until(lambda: len(each.looks) > 1)
+    yield each
+    with lock:
+        alarm.forget(each)
+
+
+def test_who_asks_to_be_woken_while_it_is_attended_is_heard(attended: Attended) -> None:
+    """The alarm would otherwise look again after 0.2 s."""
+    lateness = []
+    for _ in range(10):  # one of them may be late because the machine is
+        attended.asks = 0.02
+        until(lambda: attended.asks is None)
+        until(lambda: attended.looks[-1] >= attended.asked[-1])
+        lateness.append(next(at for at in attended.looks if at >= attended.asked[-1]))
+        lateness[-1] -= attended.asked[-1]
+    assert min(lateness) < alarm.AT_LEAST_EVERY / 4
+
+
+def test_the_garbage_collector_is_no_standstill(attended: Attended) -> None:
+    """Python's threads wait for it, and those that take in what is sent do not."""
+    times = alarm.standstill.times
+    work = threading.Event()
+
+    def as_long_as(phase: str, info: dict[str, int]) -> None:
+        if phase == "start" and info["generation"] == 2 and work.is_set():
+            end = time.thread_time() + 2 * STOOD_STILL
+            while time.thread_time() < end:
+                pass
+
+    gc.callbacks.append(as_long_as)
+    try:
+        work.set()
+        with lock:  # the alarm waits for it, as it does for a collector
+            gc.collect()
+        work.clear()
+        looks = len(attended.looks)
+        until(lambda: len(attended.looks) > looks + 1)
+    finally:
+        gc.callbacks.remove(as_long_as)
+    assert alarm.standstill.times == times
+
+
+def test_a_wait_without_work_is_one(attended: Attended) -> None:
+    times = alarm.standstill.times
+    with lock:
+        threading.Event().wait(2 * STOOD_STILL)
+    until(lambda: alarm.standstill.times > times)
+
+
+def test_an_alarm_that_ends_leaves_no_hook_behind() -> None:
+    until(lambda: alarm._thread is None, alarm.LINGER + 10.0)
+    until(lambda: alarm._collector._note not in gc.callbacks)
