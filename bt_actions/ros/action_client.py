@@ -154,7 +154,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
             self.hearing.asked(question.asked)
 
     def ask_result(self, goal_id: bytes) -> None:
-        """Ask for the result; every accepted goal must be asked for, or the server keeps it."""
+        """Ask for the result, which the server answers when the goal has ended."""
         self._ask_result(goal_id, goal_id)
 
     def cancel(self, goal_id: bytes) -> None:
