@@ -20,7 +20,7 @@ class Deadlines:
         self._due: dict[Event, float] = {}
         self._ros_seen = now.ros
         self._not_before = float("-inf")
-        self._held: dict[Event, float] = {}  # seconds in all, since it was armed
+        self._held: dict[Event, dict[float, float]] = {}  # at most, seconds in all since armed
         self._at_most = HELD_AT_MOST
 
     def arm(self, event: Event, seconds: float | None, now: Now) -> None:
@@ -64,17 +64,22 @@ class Deadlines:
     def hold(self, seconds: float, now: Now, at_most: float = HELD_AT_MOST) -> None:
         """Let none take effect within so many seconds of the steady clock.
 
-        One that has passed, and was held for `at_most` seconds in all, is not held any more until
-        it is armed anew.
+        One that has passed, and was held so for `at_most` seconds in all, is not held any more
+        until it is armed anew. Each reason to hold has a time of its own.
         """
         self._at_most = at_most
         for event in self._due:
             if self._left(event, now) <= 0.0:
-                self._held[event] = self._held.get(event, 0.0) + seconds
+                held = self._held.setdefault(event, {})
+                held[at_most] = held.get(at_most, 0.0) + seconds
         self._not_before = now.steady + seconds
 
     def _may_hold(self, event: Event) -> bool:
-        return self._held.get(event, 0.0) <= self._at_most
+        return self.held(event, self._at_most) <= self._at_most
+
+    def held(self, event: Event, at_most: float) -> float:
+        """Return for how many seconds this one, which has passed, was held with that limit."""
+        return self._held.get(event, {}).get(at_most, 0.0)
 
     def follow(self, now: Now) -> None:
         """Where the ROS clock has jumped back, let the deadlines on it jump with it."""

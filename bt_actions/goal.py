@@ -2,7 +2,8 @@
 
 The rules this file lives by:
 - No ROS, no thread, no clock of its own: a method is told what happened and when, and returns
-  what to do (`Command`). The caller carries it out, in order, and tells what came of it.
+  what to do (`Command`). The caller carries it out, in order, but may have a cancel wait for its
+  turn, and tells what came of it.
 - Every (state, event) pair is decided in one table, `TABLE`; docs/goal.md is made from it.
 - An outcome is decided once. An end that is UNKNOWN may still become known.
 - After what comes with DONE nothing is sent.
@@ -128,7 +129,8 @@ class Goal:
         self._cancel_sent = False
         self._cancel_code: int | None = None  # what was answered to a cancel request
         self._asked = 0  # in a row, of a server that has it and does not say that it has ended
-        self._unheard = 0  # so often was it asked to cancel since anything was heard of the goal
+        self._unheard = 0  # so often was it asked to cancel since anything was heard of the goal,
+        self._asked_at = 0.0  # and when the last time
         self._commands: list[Command] = []
         self._deadlines = Deadlines(now)
         self._deadlines.arm(Event.QUEUE_DUE, timeouts.queue, now)
@@ -245,7 +247,7 @@ class Goal:
 
     def _is_heard_of(self, now: Now) -> None:
         """Whoever may have it speaks, and so can be asked again."""
-        if self._unheard > UNHEARD:
+        if self._unheard > UNHEARD and self.state is not State.DONE:
             self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
         self._unheard = 0
 
@@ -707,6 +709,9 @@ class Goal:
 
     def _interrupted_while_canceling(self, now: Now, detail: Any) -> State:
         """Whatever it was canceled for, its outcome will be CANCELED."""
+        long_ago = self._unheard > UNHEARD and now.steady - self._asked_at >= ASK_AGAIN
+        if long_ago and not self.lost:
+            self._ask(now)  # now somebody waits for it
         if self.outcome is None and self._why is not Outcome.CANCELED:
             self._plan(Outcome.CANCELED, f"interrupted by the tree ({self.reason})")
         return State.CANCELING
@@ -801,8 +806,10 @@ class Goal:
     def _ask(self, now: Now) -> None:
         """Ask to cancel and, where there will be one, for the result; again in a while."""
         self._commands.append(Command.CANCEL)
-        self._unheard += 1
-        again = ASK_LESS if self._unheard > UNHEARD else ASK_AGAIN
+        self._unheard, self._asked_at = self._unheard + 1, now.steady
+        again = ASK_AGAIN
+        if self._unheard > UNHEARD:  # of a suspect it is to be known when timeout.accept passes
+            again = ASK_LESS if self._accepted else min(ASK_LESS, max(again, self._patience))
         if self._accepted:
             self._commands.append(Command.ASK_RESULT)
             self._asked += 1

@@ -212,7 +212,12 @@ class TreeRunner:
         return self._patience.is_over
 
     def start(self) -> None:
-        """Run the tree on a thread of its own; see `wait`. For use inside a running node."""
+        """Run the tree on a thread of its own; see `wait`. For use inside a running node.
+
+        A signal that ends the process while neither `wait` nor `shutdown` is on the main thread
+        ends it at once, as it does any program, and its goals run on: only SIGINT, which Python
+        turns into an exception, and what ends the main thread in good order, drains them.
+        """
         if self._thread is not None:
             raise RuntimeError("this tree has been started already; wait() for it first")
         if not self._running.acquire(blocking=False):

@@ -555,6 +555,35 @@ def test_a_server_that_says_nothing_is_asked_less_often_until_it_speaks() -> Non
     assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
 
 
+def test_who_is_asked_less_often_is_asked_when_somebody_waits_for_the_answer() -> None:
+    life = executing(Timeouts(cancel=2.0))
+    life.on(Event.INTERRUPTED)
+    for _ in range(UNHEARD):
+        life.pass_time(ASK_AGAIN)
+    life.pass_time(2.0)
+    assert life.on(Event.INTERRUPTED) == [CANCEL, ASK], "a drain begins"
+    assert life.on(Event.INTERRUPTED) == []
+
+
+def test_a_suspect_that_says_nothing_is_asked_once_in_each_timeout_accept() -> None:
+    life = suspect(Timeouts(accept=4.0))
+    for _ in range(UNHEARD):
+        life.pass_time(ASK_AGAIN)
+    for _ in range(5):
+        assert life.pass_time(3.9) == []
+        assert CANCEL in life.pass_time(0.1)
+
+
+def test_a_word_about_a_goal_that_is_done_wakes_nobody() -> None:
+    life = executing(Timeouts(cancel=2.0))
+    life.on(Event.INTERRUPTED)
+    for _ in range(UNHEARD):
+        life.pass_time(ASK_AGAIN)
+    life.on(Event.CLOSED)
+    life.on(Event.STATUS, STATUS_CANCELED)
+    assert life.due_in is None
+
+
 def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_server() -> None:
     life = suspect()
     for _ in range(int(DENIED_FOR_GOOD) + 5):
@@ -773,6 +802,15 @@ def test_who_holds_a_deadline_says_for_how_long_in_all() -> None:
     assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 0.0)
     life.goal.hold(1.0, life.now, HELD_AT_MOST)
     assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 1.0), "there is more to wait for now"
+
+
+def test_what_was_held_for_one_reason_may_still_be_for_another() -> None:
+    life = executing(Timeouts(result=5.0))
+    life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
+    for _ in range(10):
+        life.goal.hold(1.0, life.now, HELD_AT_MOST)
+    life.goal.hold(1.0, life.now, 3.0)
+    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 1.0)
 
 
 def test_no_feedback_puts_off_a_result_that_is_held_again_and_again() -> None:

@@ -66,6 +66,7 @@ def disown() -> None:
     global _thread
     _open.clear()
     _thread = None
+    _collector.unwatch()
     standstill.rests()
 
 

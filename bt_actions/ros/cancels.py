@@ -1,4 +1,4 @@
-"""The cancel requests of one line, of which only so many are under way at a time.
+"""The cancel requests to one server, of which only so many are under way at a time.
 
 A server keeps the last ten requests of all its clients together and drops the others silently:
 sixty goals that are interrupted in one moment would go on for a second, until they are canceled
@@ -8,27 +8,27 @@ nothing: who is to be canceled, and when again, is goal.py's. All under the one 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 AT_MOST = 8
 """Requests of this process without an answer at one server: two places are left to others."""
 ANSWERED_WITHIN = 1.0
 """Seconds until a request counts as lost, or its server as busy, and the next one is sent."""
 
+Send = Callable[[bytes], bool]
+"""Sends one request, and says whether it has left."""
+
 
 class Cancels:
-    """Whom to ask a server to cancel, first come first served."""
+    """Whom to ask a server to cancel, of all lines to it, first come first served."""
 
-    def __init__(self, send: Callable[[bytes], None], under_way: Callable[[float], int]) -> None:
-        """`send` sends one request; `under_way` counts those of all lines to the same server."""
-        self._send = send
-        self._all_under_way = under_way
-        self._waiting: dict[bytes, None] = {}
+    def __init__(self) -> None:
+        self._waiting: dict[bytes, Send] = {}
         self._asked: dict[bytes, float] = {}  # when, without an answer since
 
-    def ask(self, goal_id: bytes, now: float) -> None:
+    def ask(self, goal_id: bytes, send: Send, now: float) -> None:
         """Ask to cancel this goal as soon as there is room (seconds, steady clock)."""
-        self._waiting[goal_id] = None
+        self._waiting[goal_id] = send
         self.go_on(now)
 
     def answered(self, goal_id: bytes, now: float) -> None:
@@ -41,20 +41,25 @@ class Cancels:
         self._waiting.pop(goal_id, None)
         self._asked.pop(goal_id, None)
 
-    def forget_answers(self) -> None:
-        """There will be none to what was asked so far."""
-        self._asked.clear()
+    def forget_answers(self, goal_ids: Iterable[bytes]) -> None:
+        """There will be none to what was asked for these so far."""
+        for goal_id in goal_ids:
+            self._asked.pop(goal_id, None)
 
-    def under_way(self, now: float) -> int:
-        """Count the requests that may lie in the server's queue."""
-        for goal_id in [each for each, at in self._asked.items() if now - at >= ANSWERED_WITHIN]:
-            del self._asked[goal_id]
-        return len(self._asked)
+    def send_now(self, goal_id: bytes) -> None:
+        """Send what waits for this goal, room or not: there may be no other time."""
+        send = self._waiting.pop(goal_id, None)
+        if send is not None:
+            send(goal_id)
 
     def go_on(self, now: float) -> None:
         """Send what there is room for."""
-        while self._waiting and self._all_under_way(now) < AT_MOST:
+        while self._waiting and self._under_way(now) < AT_MOST:
             goal_id = next(iter(self._waiting))
-            del self._waiting[goal_id]
-            self._asked[goal_id] = now
-            self._send(goal_id)
+            if self._waiting.pop(goal_id)(goal_id):
+                self._asked[goal_id] = now
+
+    def _under_way(self, now: float) -> int:
+        for goal_id in [each for each, at in self._asked.items() if now - at >= ANSWERED_WITHIN]:
+            del self._asked[goal_id]
+        return len(self._asked)

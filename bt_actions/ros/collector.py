@@ -7,6 +7,7 @@ own threads run, and take in what is sent. Judges nothing (standstill.py).
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import threading
 import time
@@ -29,20 +30,22 @@ class Collector:
 
     def watch(self) -> None:
         """Count from now on."""
-        self._took = 0.0
+        self._took, self._clock = 0.0, None
         gc.callbacks.append(self._note)
 
     def unwatch(self) -> None:
         """Count no more."""
-        gc.callbacks.remove(self._note)
+        with contextlib.suppress(ValueError):  # in the child of a fork it may not watch
+            gc.callbacks.remove(self._note)
 
     def take(self) -> float:
         """Return the seconds since the last call, also of a collection that has not ended yet.
 
         Python may go on in another thread before the one that collected can say that it is done.
         """
-        if self._clock is not None:
-            self._count(self._clock)
+        clock = self._clock
+        if clock is not None:
+            self._count(clock)
         took, self._took = self._took, 0.0
         return took
 
@@ -57,6 +60,10 @@ class Collector:
             self._clock = None
 
     def _count(self, clock: int) -> None:
-        now = time.clock_gettime(clock)
+        try:
+            now = time.clock_gettime(clock)
+        except OSError:  # that thread has gone, or was left behind by a fork
+            self._clock = None
+            return
         self._took += now - self._since
         self._since = now

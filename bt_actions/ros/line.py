@@ -27,7 +27,6 @@ from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
-from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.past import Past
@@ -73,7 +72,7 @@ class Line:
         self.goals: dict[bytes, Ticket] = {}
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
-        self.cancels = Cancels(self._send_cancel, self._cancels_under_way)
+        self.cancels = traffic.domain.cancels_at(name, action_type)
         self.orphaned = False
         self._heard_at = time.monotonic()  # of an orphan: when its servers were last heard of
         self.way = Way(self)
@@ -122,6 +121,8 @@ class Line:
     def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         """Pass on an answer to a cancel request."""
         with lock:
+            if self.is_parents:
+                return
             self.cancels.answered(goal_id, time.monotonic())
             ticket = self._heard_of(goal_id, denies=answers[-1] == CANCEL_UNKNOWN_GOAL)
             if ticket is not None:
@@ -264,7 +265,7 @@ class Line:
     ) -> None:
         goal = ticket.goal
         before = (goal.state, goal.outcome, goal.end)
-        was_accepted = goal.accepted
+        was_accepted, was_in_the_way = goal.accepted, _in_the_way(goal)
         now = self.traffic.clocks.now()
         commands = step(now)
         if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
@@ -273,6 +274,7 @@ class Line:
             goal.reason += self._in_use(ticket)
         if before != (goal.state, goal.outcome, goal.end):
             ticket.traffic.note(ticket)
+        if _in_the_way(goal) != was_in_the_way:
             self._tell_who_waits()
         for command in commands:
             self._carry_out(ticket, command, message)
@@ -305,7 +307,7 @@ class Line:
             elif goal.state is State.DONE:  # and nothing is sent after that
                 self._send_cancel(goal.id)
             else:
-                self.cancels.ask(goal.id, time.monotonic())
+                self.ask_to_cancel(goal.id)
         except Exception as error:  # noqa: BLE001 - InvalidHandle, RCLError, or TypeError of a wrong message
             if command is Command.SEND:
                 self.tell(ticket, Event.SEND_FAILED, error)
@@ -313,20 +315,21 @@ class Line:
                 self._warn_once(f"{command.name} could not be sent", error)
 
     def _tell_who_waits(self) -> None:
-        """Wake those of other nodes whose goals a change here may have let go on."""
-        for line in self.neighbors():
-            if line.traffic is not self.traffic and line.way.is_waited_for():
-                line.traffic.notify(None)
+        """Wake those of all nodes whose goals a change here may have let go on."""
+        for traffic in {line.traffic for line in self.neighbors() if line.way.is_waited_for()}:
+            traffic.notify(None)
 
-    def _send_cancel(self, goal_id: bytes) -> None:
+    def ask_to_cancel(self, goal_id: bytes) -> None:
+        """Ask the server to cancel a goal, as soon as its queue has room."""
+        self.cancels.ask(goal_id, self._send_cancel, time.monotonic())
+
+    def _send_cancel(self, goal_id: bytes) -> bool:
         try:
             self.client.cancel(goal_id)
         except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
             self._warn_once("CANCEL could not be sent", error)
-
-    def _cancels_under_way(self, now: float) -> int:
-        lines = {self, *(line for line in self.neighbors() if line.shares_server_with(self))}
-        return sum(line.cancels.under_way(now) for line in lines)
+            return False
+        return True
 
     def pump(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
@@ -349,6 +352,8 @@ class Line:
         if self.goals.get(goal.id) is ticket:  # and not its twin
             del self.goals[goal.id]
             self.client.forget(goal.id)
+            if goal.end is End.UNKNOWN:
+                self.cancels.send_now(goal.id)  # nobody will ask again
             self.cancels.forget(goal.id)
             if goal.sent and goal.state is State.DONE:
                 self.past.keep(ticket)
@@ -393,7 +398,7 @@ class Line:
 
     def open(self, client: ActionClient) -> None:
         """Go on with another client, of which nothing is known yet."""
-        self.cancels.forget_answers()
+        self.cancels.forget_answers(self.goals)
         self.client, self.watch = client, ServerWatch()
         self._looked_like = Server.ABSENT
         self._look_at = 0.0
@@ -641,3 +646,8 @@ class Line:
                 wait = min(wait, due)
         self._bound_the_lost()
         return max(wait, 0.001)
+
+
+def _in_the_way(goal: Goal) -> tuple[bool, ...]:
+    """What of a goal others may wait for: room at its server, or its end."""
+    return goal.in_flight, goal.owed, goal.lost, goal.holding

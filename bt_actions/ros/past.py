@@ -117,7 +117,7 @@ class Past:
         """Ask whoever has it to cancel: whoever has ended it will deny it."""
         if ended.questions < QUESTIONS:
             ended.questions += 1
-            self._line.cancels.ask(ended.twin.goal.id, time.monotonic())
+            self._line.ask_to_cancel(ended.twin.goal.id)
 
     def _get(self, goal_id: bytes) -> Ended | None:
         """Return what has ended; in the child of a fork nothing has, it is the parent's."""

@@ -16,6 +16,7 @@ from bt_actions.goal import Goal
 from bt_actions.goal_terms import State
 from bt_actions.policy import End, Outcome
 from bt_actions.resources import Resources
+from bt_actions.ros.cancels import Cancels
 from bt_actions.standstill import Leniency
 from bt_actions.testimony import Testimony
 
@@ -45,6 +46,11 @@ class Domain:
         self.known: set[tuple[str, Any]] = set()
         """Names and types of the actions that had a server once."""
         self._lost: dict[tuple[str, Any], list[Ticket]] = {}
+        self._cancels: dict[tuple[str, Any], Cancels] = {}
+
+    def cancels_at(self, action: str, action_type: Any) -> Cancels:
+        """Return the cancel requests of this process to an action."""
+        return self._cancels.setdefault((action, action_type), Cancels())
 
     def keep_lost(self, action: str, action_type: Any, ticket: Ticket) -> None:
         """Remember a lost goal whose line goes: its server may be back for the next one."""

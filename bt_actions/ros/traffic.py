@@ -356,7 +356,9 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
             if waits:
                 changed.wait(0.005)
     for ticket in waits:
-        ticket.line.tell(ticket, Event.DRAINED)
+        with lock:
+            ticket.line.cancels.send_now(ticket.goal.id)  # whoever waits may end the process now
+            ticket.line.tell(ticket, Event.DRAINED)
     return [ticket for ticket in wanted if not ticket.accounted_for]
 
 

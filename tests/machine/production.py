@@ -22,7 +22,7 @@ from bt_actions.ros import alarm, line, past, shared, traffic, way
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line
 from bt_actions.ros.traffic import Traffic
-from bt_actions.standstill import Standstill
+from bt_actions.standstill import ANSWERS_TAKE, ANSWERS_TAKE_IN_ALL, Standstill
 from tests.machine.judge import Judge, Violation
 from tests.machine.parts import Leaf, LeafPlan, Ticket
 from tests.machine.world import NODES, Job, Message, World
@@ -404,7 +404,7 @@ class Caller:
             ticket: ticket.goal.state
             for ticket in self.tickets
             if ticket.goal.state in (State.WAITING_FOR_SERVER, State.SENDING, State.EXECUTING)
-            and not (ticket.ledger.crowded or self._falters(ticket))
+            and not (ticket.ledger.crowded or self._falters(ticket) or self._was_patient(ticket))
         }
         world, hidden = self.world, set[tuple[bytes, int]]()
         if seconds > LEASE:
@@ -426,6 +426,12 @@ class Caller:
         """Whether its server is in sight without its services, which no standstill does."""
         where = ticket.line.name, ticket.node
         return bool(self.world.shown(*where)) and not self.world.ready(*where)
+
+    @staticmethod
+    def _was_patient(ticket: Ticket) -> bool:
+        """Whether a deadline of it was held for as long as standstills in a row are borne with."""
+        deadlines, longest = ticket.goal._deadlines, ANSWERS_TAKE_IN_ALL - ANSWERS_TAKE
+        return any(deadlines.held(event, ANSWERS_TAKE_IN_ALL) > longest for event in Event)
 
     def due_in(self) -> float:
         """Return the seconds until something is due (half a second where nothing is)."""

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from bt_actions.ros import alarm
+from bt_actions.ros.collector import FULL, Collector
 from bt_actions.ros.shared import lock
 from bt_actions.standstill import STOOD_STILL
 from tests.support.waiting import until
@@ -89,6 +90,27 @@ def test_a_wait_without_work_is_one(attended: Attended) -> None:
     until(lambda: alarm.standstill.times > times)
 
 
-def test_an_alarm_that_ends_leaves_no_hook_behind() -> None:
-    until(lambda: alarm._thread is None, alarm.LINGER + 10.0)
-    until(lambda: alarm._collector._note not in gc.callbacks)
+def test_a_collector_counts_what_full_collections_took_and_only_while_it_watches() -> None:
+    collector = Collector()
+    gc.collect()
+    assert collector.take() == 0.0
+    collector.watch()
+    gc.collect(1)
+    assert collector.take() == 0.0
+    gc.collect()
+    assert collector.take() > 0.0
+    assert collector.take() == 0.0
+    collector.unwatch()
+    assert collector._note not in gc.callbacks
+    collector.unwatch()
+
+
+def test_a_collection_whose_thread_has_gone_is_forgotten() -> None:
+    """A fork in the middle of it, say, or an alarm that ended."""
+    collector = Collector()
+    thread = threading.Thread(target=collector._note, args=("start", {"generation": FULL}))
+    thread.start()
+    thread.join()
+    assert collector.take() == 0.0
+    collector._note("stop", {"generation": FULL})
+    assert collector.take() == 0.0

@@ -46,7 +46,7 @@ class OfPast(Line):
         self.watch.heard = lambda _: None
         self.asked: list[bytes] = []
         self.client: Any = SimpleNamespace()
-        self.cancels = Cancels(self.asked.append, lambda _: 0)
+        self.cancels = Cancels()
         self._generation = shared.generation
         self.comes_in_sight: frozenset[bytes] = frozenset()
         self.found: list[Event] = []
@@ -56,6 +56,9 @@ class OfPast(Line):
 
     def _observe(self, now: float, *, concludes: bool = True) -> None:
         self.watch.gids |= self.comes_in_sight
+
+    def ask_to_cancel(self, goal_id: bytes) -> None:
+        self.asked.append(goal_id)
 
     def tell(self, ticket: Any, event: Event, detail: Any = None, message: Any = None) -> None:
         self.found.append(event)

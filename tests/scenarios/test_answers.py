@@ -20,7 +20,7 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.simulation.journal import live_intervals
-from tests.support.processes import Journal
+from tests.support.processes import HostFactory, Journal, Process
 from tests.support.reliability import Record
 from tests.support.trees import Gate, state, together
 from tests.support.waiting import until
@@ -267,3 +267,43 @@ def test_sixty_goals_that_are_interrupted_at_once_are_all_canceled(
     assert journal.ends() == ["canceled"] * 60
     assert journal.count("cancel_requested") == 60
     record.outcome = "all CANCELED, each asked for once"
+
+
+GIVES_UP = """
+import os, sys, time
+from bt_actions import MoveRobot, Timeouts, TreeRunner
+from tests.support.trees import state, together
+
+limits = Timeouts(server=20.0, accept=20.0, cancel=0.3)
+leaves = [
+    MoveRobot(f"m{i}", 90.0, action_name=sys.argv[1], busy="share", timeout=limits)
+    for i in range(10)
+]
+with TreeRunner(together(*leaves)) as runner:
+    runner.start()
+    while any(state(leaf) != "EXECUTING" for leaf in leaves):
+        time.sleep(0.01)
+    print("all run", flush=True)
+    sys.stdin.readline()
+    runner.interrupt()
+    runner.wait()
+    print("left:", len(runner.unaccounted), flush=True)
+    os._exit(0)
+"""
+
+
+def test_who_gives_up_waiting_has_asked_for_each_goal(
+    new_host: HostFactory, start_program: Callable[..., Process], name: str, record: Record
+) -> None:
+    """Ten goals, a server that answers nothing for now; a program that waits for 0.3 s, and ends"""
+    host = new_host()
+    journal = host.open(name)
+    program = start_program("-c", GIVES_UP, name)
+    program.line("all run")
+    host.freeze()
+    program.tell("")
+    assert program.line("left: ") == "left: 10"
+    program.wait()
+    host.thaw()
+    journal.wait_for("canceled", 10)
+    record.outcome = "end UNKNOWN and said so; all canceled when the server goes on"
