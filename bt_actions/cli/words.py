@@ -72,6 +72,12 @@ def outputs_of(report: Report) -> dict[str, object]:
 def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     lines = summary(report)
+    rows = [culprit.row for culprit in report.culprits()]
+    if any(row and row.end is End.SERVER_GONE for row in rows) and not closing.verdict:
+        lines.append(
+            "A server that only stood still, or was cut off, may go on with its goal; once it is"
+            " back, `bt-actions cleanup` cancels that."
+        )
     lines += [line for line in (closing.complaint, closing.error) if line]
     if report.unaccounted and not closing.verdict:  # of a simulation, which ends with us
         lines.append("`bt-actions cleanup` asks again to cancel what may still be running:")

@@ -564,7 +564,7 @@ class Line:
         self.way.seek(now)
         if state is Server.AMBIGUOUS and not self._warned_crowd:
             self._warned_crowd = True
-            log.warning(f"{self.name}: two action servers answer to this name; none is sent to")
+            log.warning(f"{self.name}: two action servers answer to this name; no more is sent")
         elif state is Server.READY:
             self._warned_crowd = False
         return state

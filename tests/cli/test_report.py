@@ -54,6 +54,23 @@ def test_a_tree_that_never_started_took_no_time(leaf: FakeAction) -> None:
     assert any(" after 0.00 s" in line for line in words), words
 
 
+@pytest.mark.parametrize("end", [End.SERVER_GONE, End.ABORTED])
+def test_what_a_server_may_go_on_with_is_said_and_what_to_do(
+    leaf: FakeAction, story: Story, end: End
+) -> None:
+    """But not of a simulation, which ends with the run."""
+    lost = story.goal(leaf, "CANCELING", outcome=Outcome.SERVER_LOST, end=end)
+    leaf.status = Status.FAILURE
+    failed = story.node(leaf, Status.FAILURE), story.finish(Status.FAILURE)
+    report = told(leaf, story.start(), lost, *failed)
+
+    def hints(closing: Closing) -> int:
+        return sum("`bt-actions cleanup`" in line for line in last_words(report, closing))
+
+    assert hints(Closing(Exit.FAILURE)) == (end is End.SERVER_GONE)
+    assert not hints(Closing(Exit.FAILURE, verdict="The part lies there."))
+
+
 def test_attempts_are_counted_over_the_retries_of_a_visit(leaf: FakeAction, story: Story) -> None:
     row = row_of(
         leaf,

@@ -774,7 +774,7 @@ class TestTwice:
     def test_two_servers_under_one_name_execute_nothing(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
-        """Two live servers, in two processes, under one name"""
+        """Two live servers, in two processes, under one name, and both are in sight"""
         one, other = new_host(), new_host()
         one.open(name)
         journal = other.open(name)
