@@ -284,9 +284,9 @@ def test_an_answer_in_time_counts_however_late_it_is_taken(
 def simulated(context: Any, no_leaks: None) -> Iterator[tuple[SimulatedTime, Any]]:
     """A node on simulated time that has begun, and the clock.
 
-    Just after many servers were closed, calls into the middleware keep all Python threads of this
-    process waiting for half a second at a time, again and again: its deadlines may be late by
-    `ANSWERS_TAKE_IN_ALL`.
+    In a run of all scenarios all Python threads of this process were seen to stand still for half a
+    second at a time here, again and again (why is not known; not for the garbage collector): its
+    deadlines may be late by `ANSWERS_TAKE_IN_ALL`.
     """
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
