@@ -20,11 +20,11 @@ from rclpy.context import Context
 from rclpy.executors import (
     Executor,
     ExternalShutdownException,
-    MultiThreadedExecutor,
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
 
+from bt_actions.ros.executor import OnceExecutor
 from bt_actions.ros.log import log
 from bt_actions.ros.traffic import Traffic
 
@@ -224,7 +224,7 @@ def _nothing() -> None:
 def _make(kind: Executor | str | None, context: Context) -> Executor:
     if kind == "single":
         return SingleThreadedExecutor(context=context)
-    return MultiThreadedExecutor(num_threads=THREADS, context=context)
+    return OnceExecutor(THREADS, context=context)
 
 
 def node_beside(node: Node, name: str) -> Node:

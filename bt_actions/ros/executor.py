@@ -1,0 +1,64 @@
+"""rclpy's MultiThreadedExecutor, whose pool gets each piece of work once.
+
+rclpy's hands a piece of work that waits for a thread of the pool to the pool again, in a loop that
+holds the interpreter's lock, until a thread has begun with it; the pool's threads need that lock.
+Measured, with /clock at 100 Hz: 7,000 hand-overs a second, 2,000 of them queued at a time, and all
+Python threads of the process still for 0.2 s again and again. Here whoever spins waits for the pool
+instead. What is called, in which order and on how many threads is as it was: rclpy's looks at
+nothing new either while work waits for a thread.
+"""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+from rclpy.executors import MultiThreadedExecutor, TimeoutException
+
+AT_MOST = 0.01
+"""Seconds for which a spin waits for the pool, and does not notice that it is to end."""
+
+
+class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
+    """A MultiThreadedExecutor that does not run in circles while its threads are busy."""
+
+    _executor: ThreadPoolExecutor  # rclpy's name of it
+
+    def __init__(self, num_threads: int, *, context: Any = None) -> None:
+        super().__init__(num_threads, context=context)
+        self._executor.shutdown()  # it has no thread yet
+        self._executor = self._pool = _Pool(num_threads)
+
+    def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
+        """Return what is to be run next, as rclpy's does; TimeoutException: nothing, as yet."""
+        ready = super().wait_for_ready_callbacks(*args, **options)
+        if self._pool.holds(ready[0]):
+            raise TimeoutException
+        return ready
+
+
+class _Pool(ThreadPoolExecutor):
+    """Knows which work it was given and has not begun."""
+
+    def __init__(self, num_threads: int) -> None:
+        super().__init__(num_threads)
+        self._held: set[Any] = set()
+        self._begun = threading.Event()
+
+    def submit(self, task: Any, /, *args: Any, **options: Any) -> Future[Any]:
+        self._held.add(task)
+        return super().submit(self._run, task, *args, **options)
+
+    def _run(self, task: Any, *args: Any, **options: Any) -> Any:
+        self._held.discard(task)
+        self._begun.set()
+        return task(*args, **options)
+
+    def holds(self, task: Any) -> bool:
+        """Whether `task` waits for a thread; waits a moment for one that begins with any."""
+        self._begun.clear()
+        if task not in self._held:
+            return False
+        self._begun.wait(AT_MOST)
+        return True
