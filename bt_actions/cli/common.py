@@ -13,6 +13,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from enum import IntEnum
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TextIO
 
@@ -216,7 +217,9 @@ def load(
             raise BadInput(f"--set {name} is given twice: {texts[name]!r} and {text!r}")
         texts[name] = text
     try:
-        find_tree(tree)
+        found = find_tree(tree)
+        if Path(tree).suffix and found != Path(tree) and "://" not in tree:
+            note(f"bt-actions: there is no {tree} in this folder; taking the installed {found}")
         declared = tree_inputs(tree) if texts or parameters else {}
         inputs = as_inputs(parameters, declared, tree)
         for name, text in texts.items():

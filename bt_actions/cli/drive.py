@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import math
 import os
 import queue
 import stat
@@ -26,7 +27,7 @@ from bt_actions.cli.patient_output import PatientOutput
 from bt_actions.cli.report import Report
 from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import QuietView, View
-from bt_actions.cli.words import Closing
+from bt_actions.cli.words import Closing, waiting_text
 
 if TYPE_CHECKING:
     from bt_actions.events import Event
@@ -36,6 +37,8 @@ FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
 PATIENCE_WHEN_LEFT = 1.0
 """Seconds for the output to be written where the user did not wait for the goals."""
+SOON = 1.0
+"""Seconds after the end of the tree for which nothing is said of goals that have not ended."""
 _LOOK = 0.02
 """Seconds between two looks for signals while only the output is waited for."""
 
@@ -115,6 +118,8 @@ class Drive:
         self._error: BaseException | None = None
         self._stop: _Stop | None = None
         self._abandoned = False
+        self._waits_since: float | None = None
+        """When the tree was first seen to have ended; NaN once it is said what is waited for."""
         self._lost = False
         """Whether something could not be shown."""
         self._watched = _pipe_of_stdout()
@@ -139,6 +144,7 @@ class Drive:
                 deadline = None  # there is nothing left to end
             if deadline is not None and now >= deadline:
                 self._end(Exit.TIMEOUT, f"--timeout {self._timeout:g} s expired", now)
+            self._say_what_is_waited_for(now)
             if now - drawn >= FRAME:
                 self._show(self._view.frame)
                 drawn = now
@@ -187,13 +193,26 @@ class Drive:
         elif now - self._stop.at > SAME_WISH:
             self._abandoned = True
 
+    def _say_what_is_waited_for(self, now: float) -> None:
+        """Say once why a tree that has ended is not over."""
+        if not self._report.decided or self._report.finished or self._stop is not None:
+            return
+        if self._waits_since is None:
+            self._waits_since = now
+        if now - self._waits_since >= SOON and (text := waiting_text(self._report)):
+            self._waits_since = math.nan
+            self._show(lambda: self._view.say(f"{text}; Ctrl-C twice leaves without waiting"))
+
     def _end(self, code: Exit, cause: str, now: float) -> None:
         """End the run from outside; the first reason stands."""
         self._stop = _Stop(code, cause, now)
         self._runner.interrupt()
         live = len(self._report.live)
         goals = "1 goal" if live == 1 else f"{live} goals"
-        more = f": canceling {goals}; Ctrl-C again leaves without waiting" if live else ""
+        again = "Ctrl-C again leaves without waiting"
+        more = f": canceling {goals}; {again}" if live else ""
+        if not live and (waiting := waiting_text(self._report)):
+            more = f": {waiting}; {again}"
         self._show(lambda: self._view.say(f"{cause}{more}"))
 
     def _show(self, draw: Callable[[], None]) -> None:

@@ -63,6 +63,7 @@ class Row:
     duration: float = 0.0
     """Seconds from the first wish to the last outcome of each visit, summed up."""
     _open: dict[str, str] = field(default_factory=dict)  # goals without a known end: states
+    _doubtful: set[str] = field(default_factory=set)  # not begun, as far as their server knows
     _recent: deque[str] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
 
     @property
@@ -80,8 +81,20 @@ class Row:
         """Whether a goal of this leaf has no known end, be it that it was not sent yet."""
         return bool(self._open)
 
+    @property
+    def in_doubt(self) -> bool:
+        """Whether the latest goal has not begun as far as its server knows, which may change."""
+        return bool(self._recent) and self._recent[-1] in self._doubtful
+
+    @property
+    def waited_for(self) -> int:
+        """How many goals of this leaf a run that is over waits for."""
+        return len(self.live_goals) + len(self._doubtful)
+
     def observe(self, event: GoalChanged) -> None:
         """Take in one event of a goal of this leaf."""
+        doubtful = event.state != DONE and event.outcome and event.end is End.NEVER_STARTED
+        (self._doubtful.add if doubtful else self._doubtful.discard)(event.goal_id)
         told = event.outcome is not None and event.end not in (None, End.UNKNOWN)
         if event.state == DONE or told:
             self._open.pop(event.goal_id, None)
@@ -218,6 +231,11 @@ class Report:
     def live(self) -> list[Row]:
         """The actions whose goal may be running now."""
         return [row for row in self._rows.values() if row.live]
+
+    @property
+    def decided(self) -> bool:
+        """Whether the tree has come to its end, be it that goals of it have not."""
+        return self.status_of(self.root) in (Status.SUCCESS, Status.FAILURE)
 
     @property
     def unaccounted(self) -> list[str]:

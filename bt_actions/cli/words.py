@@ -29,6 +29,9 @@ _USUAL_ENDS = {
     Outcome.SERVER_LOST: End.SERVER_GONE,
 }
 """Ends that go without saying."""
+MOST = 3
+"""Actions that are named where many are waited for."""
+CLEAN_UP = "`bt-actions cleanup` asks again to cancel what may still be running:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +83,7 @@ def troubles(report: Report, closing: Closing) -> list[str]:
         )
     lines += [line for line in (closing.complaint, closing.error) if line]
     if report.unaccounted and not closing.verdict:  # of a simulation, which ends with us
-        lines.append("`bt-actions cleanup` asks again to cancel what may still be running:")
+        lines.append(CLEAN_UP)
     lines += [f"not accounted for: {line}" for line in report.unaccounted]
     return lines
 
@@ -100,9 +103,24 @@ def goal_text(row: Row) -> str:
     text = f"{row.outcome}{attempt}"
     if row.end is End.UNKNOWN:
         text += ", end not known" if not row.live else ", end not known yet"
+    elif row.in_doubt:
+        text += ", not started as far as its server knows"
     elif row.end is not None and row.end is not _USUAL_ENDS.get(row.outcome):
         text += f", ended {row.end}"
     return text + (f": {row.reason}" if row.reason and row.outcome is not Outcome.SUCCEEDED else "")
+
+
+def waiting_text(report: Report) -> str:
+    """Say for which goals a run waits whose tree has ended; "" where there are none."""
+    rows = [row for row in report.rows if row.waited_for]
+    if not rows:
+        return ""
+    which = ", ".join(f"{row.name} on {row.server}" for row in rows[:MOST])
+    more = f" and {len(rows) - MOST} more" if len(rows) > MOST else ""
+    goals = sum(row.waited_for for row in rows)
+    return (
+        f"waiting to know the end of {'1 goal' if goals == 1 else f'{goals} goals'}: {which}{more}"
+    )
 
 
 def feedback_text(row: Row) -> str:

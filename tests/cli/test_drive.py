@@ -24,6 +24,7 @@ from bt_actions.events import Event
 from bt_actions.policy import End, Outcome
 from bt_actions.runner import GoalReport
 from tests.cli.fakes import FakeAction, FakeRunner, Story
+from tests.support.waiting import until
 
 
 class Run:
@@ -96,6 +97,24 @@ def test_a_signal_interrupts_and_the_drained_run_has_its_code(
     assert run.runner.interrupted.is_set()
     assert f"interrupted by {number.name}: canceling 1 goal; Ctrl-C again" in run.out.getvalue()
     assert f"STOPPED after 1.50 s, interrupted by {number.name}" in run.out.getvalue()
+
+
+def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(story: Story) -> None:
+    run = Run(FakeRunner(waits=True))
+    late = story.goal(run.leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.NEVER_STARTED)
+    run.runner.before = [story.start(), late, story.node(run.leaf, Status.FAILURE)]
+    unknown = story.goal(run.leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.UNKNOWN)
+    run.runner.after = [unknown, story.finish(Status.FAILURE)]
+    said = "waiting to know the end of 1 goal: Move on move_robot; Ctrl-C twice leaves"
+    thread = threading.Thread(target=lambda: until(lambda: said in run.out.getvalue()))
+    done = threading.Thread(target=lambda: (thread.join(), run.runner.interrupted.set()))
+    for each in (thread, done):
+        each.start()
+    assert run.go().code is Exit.FAILURE
+    done.join()
+    text = run.out.getvalue()
+    assert text.count(said) == 1
+    assert "ACCEPT_TIMEOUT, not started as far as its server knows" in text
 
 
 @contextlib.contextmanager

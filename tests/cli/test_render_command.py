@@ -40,6 +40,16 @@ def test_a_file_has_the_format_of_its_suffix(suffix: str, start: bytes, tmp_path
     assert path.read_bytes().startswith(start)
 
 
+def test_a_file_that_is_not_there_is_told_where_an_installed_tree_is_taken(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["render", "patrol.yaml"]) == 0
+    assert "there is no patrol.yaml in this folder; taking the installed" in capsys.readouterr().err
+    assert main(["render", "patrol"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_an_installed_tree_is_found_by_its_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["render", "pick_and_place"]) == 0
     assert "Deliver the part" in capsys.readouterr().out
