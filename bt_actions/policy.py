@@ -32,7 +32,10 @@ class Outcome(StrEnum):
     SERVER_UNAVAILABLE = "SERVER_UNAVAILABLE"
     """No server within ``Timeouts.server``."""
     SERVER_AMBIGUOUS = "SERVER_AMBIGUOUS"
-    """Two live servers under the name: a goal would be, or may be, executed twice."""
+    """Two live servers under the name: a goal would be, or may be, executed twice.
+
+    A process that has just begun may see one of them, and send its first goal.
+    """
     SERVER_BUSY = "SERVER_BUSY"
     """The resource was not free within ``Timeouts.queue``."""
     ACCEPT_TIMEOUT = "ACCEPT_TIMEOUT"

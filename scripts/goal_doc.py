@@ -37,7 +37,8 @@ OUTCOMES = {
     Outcome.CANCELED: "this process stopped it, or replaced it, whatever status it ended with",
     Outcome.CANCELED_BY_OTHER: "it ended as canceled, and this process had not asked for it",
     Outcome.SERVER_UNAVAILABLE: "no server within `timeout.server`",
-    Outcome.SERVER_AMBIGUOUS: "two live servers under the name: not sent, or canceled at both",
+    Outcome.SERVER_AMBIGUOUS: "two live servers under the name: not sent, or canceled at both; a "
+    "process that has just begun may see one of them, and send its first goal",
     Outcome.SERVER_BUSY: "the resource was not free within `timeout.queue`, or `busy: fail`",
     Outcome.ACCEPT_TIMEOUT: "no answer within `timeout.accept`; it may have been executed",
     Outcome.RESULT_TIMEOUT: "not finished within `timeout.result`, and canceled",

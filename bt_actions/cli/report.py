@@ -63,6 +63,7 @@ class Row:
     duration: float = 0.0
     """Seconds from the first wish to the last outcome of each visit, summed up."""
     _open: dict[str, str] = field(default_factory=dict)  # goals without a known end: states
+    _gone: set[str] = field(default_factory=set)  # whose server went away
     _doubtful: set[str] = field(default_factory=set)  # not begun, as far as their server knows
     _recent: deque[str] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
 
@@ -82,6 +83,11 @@ class Row:
         return bool(self._open)
 
     @property
+    def left_at_server(self) -> bool:
+        """Whether a goal of this leaf had a server that went away, and may be back with it."""
+        return bool(self._gone)
+
+    @property
     def in_doubt(self) -> bool:
         """Whether the latest goal has not begun as far as its server knows, which may change."""
         return bool(self._recent) and self._recent[-1] in self._doubtful
@@ -95,6 +101,7 @@ class Row:
         """Take in one event of a goal of this leaf."""
         doubtful = event.state != DONE and event.outcome and event.end is End.NEVER_STARTED
         (self._doubtful.add if doubtful else self._doubtful.discard)(event.goal_id)
+        (self._gone.add if event.end is End.SERVER_GONE else self._gone.discard)(event.goal_id)
         told = event.outcome is not None and event.end not in (None, End.UNKNOWN)
         if event.state == DONE or told:
             self._open.pop(event.goal_id, None)
@@ -231,6 +238,11 @@ class Report:
     def live(self) -> list[Row]:
         """The actions whose goal may be running now."""
         return [row for row in self._rows.values() if row.live]
+
+    @property
+    def servers_gone(self) -> list[str]:
+        """The actions with a goal whose server went away; one that only stood still goes on."""
+        return [f"{row.name} on {row.server}" for row in self._rows.values() if row.left_at_server]
 
     @property
     def decided(self) -> bool:

@@ -147,7 +147,7 @@ class GoalView:
 
     def finish(self, closing: Closing) -> None:
         """Write the result and the outcome."""
-        from bt_actions.cli.words import CLEAN_UP, goal_text, result_lines
+        from bt_actions.cli.words import CLEAN_UP, STOOD_STILL, goal_text, result_lines
         from bt_actions.policy import End, Outcome
 
         if self._leaf.end in (End.SUCCEEDED, End.ABORTED):  # only these have a result of their own
@@ -159,6 +159,8 @@ class GoalView:
             self._line(f"{goal_text(row)}, after {self._report.seconds(row):.2f} s")
         if closing.error:
             self._line(closing.error)
+        if self._report.servers_gone:
+            self._line(STOOD_STILL)
         if self._report.unaccounted:
             self._line(CLEAN_UP)
         for line in self._report.unaccounted:

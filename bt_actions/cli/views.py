@@ -273,6 +273,7 @@ class JsonView:
                     for culprit in report.culprits()
                 ],
                 "unaccounted": report.unaccounted,
+                "servers_gone": report.servers_gone,
                 "world": closing.verdict or None,
                 "complaint": closing.complaint or None,
             }

@@ -31,6 +31,10 @@ _USUAL_ENDS = {
 """Ends that go without saying."""
 MOST = 3
 """Actions that are named where many are waited for."""
+STOOD_STILL = (
+    "A server that only stood still, or was cut off, may go on with its goal; once it is back,"
+    " `bt-actions cleanup` cancels that."
+)
 CLEAN_UP = "`bt-actions cleanup` asks again to cancel what may still be running:"
 
 
@@ -75,12 +79,8 @@ def outputs_of(report: Report) -> dict[str, object]:
 def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     lines = summary(report)
-    rows = [culprit.row for culprit in report.culprits()]
-    if any(row and row.end is End.SERVER_GONE for row in rows) and not closing.verdict:
-        lines.append(
-            "A server that only stood still, or was cut off, may go on with its goal; once it is"
-            " back, `bt-actions cleanup` cancels that."
-        )
+    if report.servers_gone and not closing.verdict:
+        lines.append(STOOD_STILL)
     lines += [line for line in (closing.complaint, closing.error) if line]
     if report.unaccounted and not closing.verdict:  # of a simulation, which ends with us
         lines.append(CLEAN_UP)

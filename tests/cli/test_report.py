@@ -68,6 +68,8 @@ def test_what_a_server_may_go_on_with_is_said_and_what_to_do(
         return sum("`bt-actions cleanup`" in line for line in last_words(report, closing))
 
     assert hints(Closing(Exit.FAILURE)) == (end is End.SERVER_GONE)
+    assert hints(Closing(Exit.SIGINT, "interrupted by SIGINT")) == (end is End.SERVER_GONE)
+    assert report.servers_gone == (["Move on move_robot"] if end is End.SERVER_GONE else [])
     assert not hints(Closing(Exit.FAILURE, verdict="The part lies there."))
 
 
