@@ -33,23 +33,32 @@ class Standstill:
     Who asks lives: a question is a sign of life, too.
     """
 
-    def __init__(self, take_busy: Callable[[], float] = lambda: 0.0) -> None:
+    def __init__(
+        self,
+        take_busy: Callable[[], float] = lambda: 0.0,
+        take_asleep: Callable[[], float] = lambda: 0.0,
+    ) -> None:
         """`take_busy` returns for how many seconds, since its last call, Python alone stood still.
 
-        The rest of the process ran then, and has taken in what was sent to it.
+        The rest of the process ran then, and has taken in what was sent to it. `take_asleep` does
+        so for the whole machine: it was suspended, and the steady clock stood still with it.
         """
-        self._take_busy = take_busy
+        self._take_busy, self._take_asleep = take_busy, take_asleep
         self.times = 0
         """How often this process stood still;"""
         self.long_times = 0
         """and how often for so long that who sees it may have lost sight of it, too."""
         self._lived_at: float | None = None
+        self._rested_at: float | None = None
         self._answers_by = self._servers_by = NEVER
 
     def lives(self, now: float) -> None:
         """Take a sign of life; there are to be several a second."""
-        busy = self._take_busy()
-        still = 0.0 if self._lived_at is None else now - self._lived_at - busy
+        busy, asleep = self._take_busy(), self._take_asleep()
+        if self._rested_at is not None:
+            self.long_times += now - self._rested_at + asleep > OUT_OF_SIGHT
+            self._rested_at = None
+        still = 0.0 if self._lived_at is None else now - self._lived_at - busy + asleep
         self._lived_at = now
         if still > STOOD_STILL:
             self.times += 1
@@ -58,9 +67,13 @@ class Standstill:
             self.long_times += 1
             self._servers_by = now + BACK_IN_SIGHT
 
-    def rests(self) -> None:
-        """There will be no sign of life for a while, which means nothing."""
-        self._lived_at = None
+    def rests(self, now: float) -> None:
+        """There will be no sign of life for a while, of which nobody will know why.
+
+        Where it is long enough, it counts as one of the `long_times`: whoever goes on then is to ask
+        whether it is still heard. Nothing is held up for it, as nothing is under way.
+        """
+        self._lived_at, self._rested_at = None, now
 
     def answers_take(self, now: float) -> float:
         """Return for how many seconds answers may still be coming in that came in time; or 0."""

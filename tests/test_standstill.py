@@ -60,10 +60,32 @@ def test_servers_are_hidden_where_a_lease_may_have_run_out(standstill: Standstil
 
 
 def test_a_rest_is_no_standstill(standstill: Standstill) -> None:
-    standstill.rests()
+    standstill.rests(10.0)
     assert standstill.answers_take(99.0) == 0.0
     assert not standstill.servers_take(99.0)
     assert standstill.times == 0
+
+
+def test_after_a_rest_nobody_knows_whether_this_process_is_still_heard(
+    standstill: Standstill,
+) -> None:
+    standstill.rests(10.0)
+    standstill.lives(10.0 + OUT_OF_SIGHT)
+    assert standstill.long_times == 0, "no lease is so short"
+    standstill.rests(20.0)
+    standstill.lives(99.0)
+    standstill.lives(99.2)
+    assert standstill.long_times == 1
+
+
+def test_a_machine_that_was_suspended_stood_still_though_its_clock_did_not_go_on(
+    standstill: Standstill,
+) -> None:
+    asleep = [60.0]
+    standstill._take_asleep = lambda: asleep.pop() if asleep else 0.0
+    assert standstill.answers_take(10.1) == ANSWERS_TAKE
+    assert standstill.servers_take(10.2) > 0.0
+    assert (standstill.times, standstill.long_times) == (1, 1)
 
 
 def test_a_time_in_which_python_alone_stood_still_does_not_count(standstill: Standstill) -> None:

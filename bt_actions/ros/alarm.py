@@ -1,8 +1,8 @@
 """The alarm: one plain thread that minds every open goal's deadlines and servers, ticks or not.
 
 It sleeps until the earliest deadline, ends when no goal has been open for a while, and starts again
-with the next. As it never sleeps for long, it notices when the whole process stood still.
-It knows lines only by their `attend`.
+with the next. As it never sleeps for long, it notices when the whole process stood still; whether
+it did while no goal was open, nobody knows. It knows lines only by their `attend`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Protocol
 from bt_actions.ros.collector import Collector
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
+from bt_actions.ros.suspended import Suspended
 from bt_actions.standstill import Standstill
 
 AT_LEAST_EVERY = 0.2
@@ -33,7 +34,7 @@ class Attended(Protocol):
 
 
 _collector = Collector()
-standstill = Standstill(_collector.take)
+standstill = Standstill(_collector.take, Suspended().take)
 """Of this process while a goal is open; under the lock."""
 _open: set[Attended] = set()
 _bell = threading.Condition(lock)
@@ -46,6 +47,7 @@ def mind(line: Attended) -> None:
     global _thread
     _open.add(line)
     if _thread is None or not _thread.is_alive():
+        standstill.lives(time.monotonic())
         _thread = threading.Thread(target=_attend, name="bt_actions-alarm", daemon=True)
         _thread.start()
 
@@ -67,7 +69,13 @@ def disown() -> None:
     _open.clear()
     _thread = None
     _collector.unwatch()
-    standstill.rests()
+    standstill.rests(time.monotonic())
+
+
+def appears() -> None:
+    """Take note that this process begins to see others now; the caller holds the lock."""
+    if _thread is None:
+        standstill.rests(time.monotonic())
 
 
 def wake_by(moment: float) -> None:
@@ -105,5 +113,5 @@ def _attend_until_idle() -> None:
             standstill.lives(now)
             _bell.wait(max(SHORTEST, _wakes_at - now))
             standstill.lives(time.monotonic())
-        standstill.rests()
+        standstill.rests(time.monotonic())
         _thread = None

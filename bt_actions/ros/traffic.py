@@ -58,6 +58,8 @@ class Traffic:
         self.node = node
         self.clocks = Clocks(node)
         self.domain = domain_of(node.context.get_domain_id())
+        if node.context not in _contexts:
+            alarm.appears()
         since = time.monotonic(), alarm.standstill.long_times
         self.seen_since, self.long_standstills = _contexts.setdefault(node.context, since)
         """Since when the node's context is known here; a new one is blind to nothing. And how often

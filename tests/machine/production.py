@@ -377,7 +377,7 @@ class Caller:
 
     def attend(self) -> None:
         """What the alarm does, which is late where the process was frozen."""
-        alarm.standstill.rests()
+        alarm.standstill.rests(self.moment())
         self._attend()
         if self.takes("freezes"):
             self._freeze((0.9, 2.5, 6.0)[self._moments % 3])

@@ -12,6 +12,7 @@ import pytest
 from bt_actions.ros import alarm
 from bt_actions.ros.collector import FULL, Collector
 from bt_actions.ros.shared import lock
+from bt_actions.ros.suspended import Suspended
 from bt_actions.standstill import STOOD_STILL
 from tests.support.waiting import until
 
@@ -114,3 +115,27 @@ def test_a_collection_whose_thread_has_gone_is_forgotten() -> None:
     assert collector.take() == 0.0
     collector._note("stop", {"generation": FULL})
     assert collector.take() == 0.0
+
+
+def test_suspension_is_what_the_steady_clock_does_not_count() -> None:
+    clocks = {"steady": 100.0, "boot": 700.0}
+    suspended = Suspended(lambda: clocks["steady"], lambda: clocks["boot"])
+    clocks["steady"] += 5.0
+    clocks["boot"] += 5.0
+    assert suspended.take() == 0.0
+    clocks["steady"] += 1.0
+    clocks["boot"] += 61.0
+    assert suspended.take() == pytest.approx(60.0)
+    assert suspended.take() == 0.0
+
+
+def test_a_reading_that_took_long_is_worth_nothing() -> None:
+    moments = iter([0.0, 0.0, 10.0, 13.0, 20.0, 20.0])
+    boot = iter([500.0, 513.0, 580.0])
+    suspended = Suspended(lambda: next(moments), lambda: next(boot))
+    assert suspended.take() == 0.0, "stopped between the two"
+    assert suspended.take() == pytest.approx(60.0), "the next one tells"
+
+
+def test_this_machine_was_not_suspended_just_now() -> None:
+    assert Suspended().take() == 0.0

@@ -353,14 +353,39 @@ A_PUBLISHER_WHILE_A_GOAL_IS_MADE = """
 """
 
 
+A_PUBLISHER_BETWEEN_TWO_GOALS = """
+    import time
+    from std_msgs.msg import String
+    from bt_actions.ros.alarm import LINGER
+
+    class News(py_trees.behaviour.Behaviour):
+        def update(self):
+            global publisher
+            publisher = runner.node.create_publisher(String, "/news", 1)
+            time.sleep(0.2)
+            print("announced", flush=True)
+            return py_trees.common.Status.SUCCESS
+
+    first = MoveRobot("first", 0.2, action_name=name, timeout=T)
+    nobody_looks = py_trees.timers.Timer("t", LINGER + 3.0)
+    while_it_is_stopped = py_trees.timers.Timer("u", 3.0)
+    leaf = MoveRobot("m", 1.0, action_name=name, timeout=T)
+    each = [first, nobody_looks, News("n"), while_it_is_stopped, leaf]
+    with TreeRunner(py_trees.composites.Sequence("s", True, each)) as runner:
+        print(runner.run(90.0).name, leaf.outcome, leaf.end, flush=True)
+"""
+
+
 @pytest.mark.parametrize(
     ("lease", "body"),
     [
         ("stock", A_PUBLISHER_IN_MID_GOAL),
         pytest.param("short", A_PUBLISHER_IN_MID_GOAL, marks=pytest.mark.chaos),
         pytest.param("stock", A_PUBLISHER_WHILE_A_GOAL_IS_MADE, marks=pytest.mark.chaos),
+        ("short", A_PUBLISHER_BETWEEN_TWO_GOALS),
+        pytest.param("stock", A_PUBLISHER_BETWEEN_TWO_GOALS, marks=pytest.mark.chaos),
     ],
-    ids=["stock", "short", "while-a-goal-is-made"],
+    ids=["stock", "short", "while-a-goal-is-made", "between-two-goals", "between-stock"],
 )
 def test_who_was_stopped_beyond_its_lease_and_is_not_heard_any_more_finds_another_way(
     new_host: HostFactory,
@@ -379,5 +404,6 @@ def test_who_was_stopped_beyond_its_lease_and_is_not_heard_any_more_finds_anothe
     process.send(signal.SIGCONT)
     assert process.wait(60.0) == 0, process
     assert "SUCCESS SUCCEEDED SUCCEEDED" in str(process)
-    assert journal.events() == ["received", "accepted", "succeeded"]
+    goals = 2 if body is A_PUBLISHER_BETWEEN_TWO_GOALS else 1
+    assert journal.events() == goals * ["received", "accepted", "succeeded"]
     record.outcome = "SUCCEEDED, exit code 0"
