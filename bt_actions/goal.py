@@ -709,8 +709,9 @@ class Goal:
 
     def _interrupted_while_canceling(self, now: Now, detail: Any) -> State:
         """Whatever it was canceled for, its outcome will be CANCELED."""
+        is_news = self.outcome is not None or self._why is not Outcome.CANCELED
         long_ago = self._unheard > UNHEARD and now.steady - self._asked_at >= ASK_AGAIN
-        if long_ago and not self.lost:
+        if is_news and long_ago and not self.lost:
             self._ask(now)  # now somebody waits for it
         if self.outcome is None and self._why is not Outcome.CANCELED:
             self._plan(Outcome.CANCELED, f"interrupted by the tree ({self.reason})")

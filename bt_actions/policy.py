@@ -34,7 +34,7 @@ class Outcome(StrEnum):
     SERVER_AMBIGUOUS = "SERVER_AMBIGUOUS"
     """Two live servers under the name: a goal would be, or may be, executed twice.
 
-    A process that has just begun may see one of them, and send its first goal.
+    A process that has just begun may see one of them first: it sends no goal in its first second.
     """
     SERVER_BUSY = "SERVER_BUSY"
     """The resource was not free within ``Timeouts.queue``."""

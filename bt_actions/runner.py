@@ -270,7 +270,7 @@ class TreeRunner:
             goals = [
                 f"{ticket.name} on {ticket.goal.server} is {ticket.goal.state.value}"
                 for ticket in list(self._tickets)
-                if not ticket.accounted_for
+                if not ticket.is_over
             ]
             what = f"; {', '.join(goals)}" if goals else ""
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s{what}")
@@ -504,7 +504,7 @@ class TreeRunner:
         for node, changed in self._visitor.finish(interrupted=True):
             message = node.feedback_message
             self._emit(NodeChanged(time.monotonic(), path_of(node), node, changed, message))
-        self._tickets = {ticket for ticket in self._tickets if not ticket.accounted_for}
+        self._tickets = {ticket for ticket in self._tickets if not ticket.is_over}
         _flush_log()  # who tells of the end tells it last
         self._emit(TreeFinished(time.monotonic(), status))
 
@@ -557,9 +557,7 @@ class TreeRunner:
         self._wake()
 
     def _has_left(self, ticket: Ticket) -> bool:
-        return ticket in self._tickets or (
-            ticket.begun_by is self._patience and not ticket.accounted_for
-        )
+        return ticket in self._tickets or (ticket.begun_by is self._patience and not ticket.is_over)
 
     def _flush(self) -> None:
         while True:
@@ -584,8 +582,10 @@ class TreeRunner:
                         ticket.goal.id.hex(),
                     )
                 )
-            if ticket.accounted_for:
+            if ticket.is_over:
                 self._tickets.discard(ticket)
+            elif ticket.goal.lost:  # and what was lost longer ago is over by now
+                self._tickets = {each for each in self._tickets if not each.is_over}
 
     def _is_ours(self, ticket: Ticket) -> bool:
         """Whether the goal is this tree's: begun in a tick of it, wherever its leaf is by now."""
@@ -643,6 +643,6 @@ def _traffic_of(node: Any) -> Any:
 
 
 def _drain(tickets: set[Ticket], hurry: Any) -> None:
-    from bt_actions.ros.traffic import drain
+    from bt_actions.ros.draining import drain
 
     drain(list(tickets), hurry)

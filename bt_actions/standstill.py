@@ -70,8 +70,8 @@ class Standstill:
     def rests(self, now: float) -> None:
         """There will be no sign of life for a while, of which nobody will know why.
 
-        Where it is long enough, it counts as one of the `long_times`: whoever goes on then is to ask
-        whether it is still heard. Nothing is held up for it, as nothing is under way.
+        Where it is long enough, it counts as one of the `long_times`: whoever goes on then is to
+        ask whether it is still heard. Nothing is held up for it, as nothing is under way.
         """
         self._lived_at, self._rested_at = None, now
 

@@ -38,7 +38,7 @@ OUTCOMES = {
     Outcome.CANCELED_BY_OTHER: "it ended as canceled, and this process had not asked for it",
     Outcome.SERVER_UNAVAILABLE: "no server within `timeout.server`",
     Outcome.SERVER_AMBIGUOUS: "two live servers under the name: not sent, or canceled at both; a "
-    "process that has just begun may see one of them, and send its first goal",
+    "process sends no goal in its first second, in which it may see one of them only",
     Outcome.SERVER_BUSY: "the resource was not free within `timeout.queue`, or `busy: fail`",
     Outcome.ACCEPT_TIMEOUT: "no answer within `timeout.accept`; it may have been executed",
     Outcome.RESULT_TIMEOUT: "not finished within `timeout.result`, and canceled",

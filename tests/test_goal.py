@@ -565,6 +565,16 @@ def test_who_is_asked_less_often_is_asked_when_somebody_waits_for_the_answer() -
     assert life.on(Event.INTERRUPTED) == []
 
 
+def test_to_interrupt_again_what_is_waited_for_asks_no_more_often() -> None:
+    """As an alarm does at each look, whose node is gone."""
+    life = executing(Timeouts(cancel=60.0))
+    life.on(Event.INTERRUPTED)
+    for _ in range(UNHEARD):
+        life.pass_time(ASK_AGAIN)
+    life.pass_time(2.0)
+    assert life.on(Event.INTERRUPTED) == []
+
+
 def test_a_suspect_that_says_nothing_is_asked_once_in_each_timeout_accept() -> None:
     life = suspect(Timeouts(accept=4.0))
     for _ in range(UNHEARD):

@@ -196,7 +196,10 @@ class ActionBehaviour(Behaviour):
 
     @property
     def drained(self) -> bool:
-        """Whether every goal this leaf has sent so far is accounted for."""
+        """Whether every goal this leaf has sent so far is accounted for.
+
+        And no server is looked out for that went away with one a moment ago.
+        """
         return not self.open_tickets()
 
     @property
@@ -301,7 +304,7 @@ class ActionBehaviour(Behaviour):
         if self._traffic is None:
             return
         if not self._tree_closed:
-            from bt_actions.ros.traffic import drain
+            from bt_actions.ros.draining import drain
 
             leaves = list(_leaves_of_tree(self))
             drain([ticket for leaf in leaves for ticket in leaf.open_tickets()])
@@ -311,14 +314,14 @@ class ActionBehaviour(Behaviour):
         self._leave_line()
 
     def open_tickets(self) -> list[Ticket]:
-        """Return the goals of this leaf that nobody can account for yet, left behind ones too.
+        """Return the goals of this leaf that are not over, left behind ones too.
 
         Also those that a second server has taken when they had ended here.
         """
         tickets = [*self._left_behind, *([self._ticket] if self._ticket is not None else [])]
         if self._line is not None:
             tickets += [ticket for ticket in self._line.goals_of(self) if ticket not in tickets]
-        return [ticket for ticket in tickets if not ticket.accounted_for]
+        return [ticket for ticket in tickets if not ticket.is_over]
 
     def file_interrupted(self) -> None:
         """Record that the visit ended before its outcome: its goal was canceled, or is drained."""

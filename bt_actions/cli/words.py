@@ -111,16 +111,21 @@ def goal_text(row: Row) -> str:
 
 
 def waiting_text(report: Report) -> str:
-    """Say for which goals a run waits whose tree has ended; "" where there are none."""
+    """Say for what a run waits whose tree has ended; "" where it is over."""
     rows = [row for row in report.rows if row.waited_for]
-    if not rows:
-        return ""
+    if rows:
+        goals = sum(row.waited_for for row in rows)
+        count = "1 goal" if goals == 1 else f"{goals} goals"
+        return f"waiting to know the end of {count}: {_where(rows)}"
+    rows = [row for row in report.rows if row.left_at_server]
+    if rows:
+        return f"looking out for servers that may only stand still, to cancel there: {_where(rows)}"
+    return ""
+
+
+def _where(rows: list[Row]) -> str:
     which = ", ".join(f"{row.name} on {row.server}" for row in rows[:MOST])
-    more = f" and {len(rows) - MOST} more" if len(rows) > MOST else ""
-    goals = sum(row.waited_for for row in rows)
-    return (
-        f"waiting to know the end of {'1 goal' if goals == 1 else f'{goals} goals'}: {which}{more}"
-    )
+    return f"{which} and {len(rows) - MOST} more" if len(rows) > MOST else which
 
 
 def feedback_text(row: Row) -> str:

@@ -46,6 +46,10 @@ class Cancels:
         for goal_id in goal_ids:
             self._asked.pop(goal_id, None)
 
+    def has_request(self, goal_id: bytes) -> bool:
+        """Whether a request for this goal waits for room."""
+        return goal_id in self._waiting
+
     def send_now(self, goal_id: bytes) -> None:
         """Send what waits for this goal, room or not: there may be no other time."""
         send = self._waiting.pop(goal_id, None)

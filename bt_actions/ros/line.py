@@ -238,6 +238,8 @@ class Line:
         in_doubt = LOOK_WHILE_RUNNING if self.way.in_doubt(now.steady) else 0.0
         if goal.state is State.WAITING_FOR_SERVER:
             in_doubt = max(in_doubt, alarm.standstill.servers_take(now.steady))
+            if self.watch.state(now.steady) is not Server.ABSENT:
+                in_doubt = max(in_doubt, self.way.discovers(now.steady))
         in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
         goal.hold(max(answers, in_doubt), now, in_all)
 
@@ -265,13 +267,15 @@ class Line:
     ) -> None:
         goal = ticket.goal
         before = (goal.state, goal.outcome, goal.end)
-        was_accepted, was_in_the_way = goal.accepted, _in_the_way(goal)
+        was_accepted, was_in_the_way, was_lost = goal.accepted, _in_the_way(goal), goal.lost
         now = self.traffic.clocks.now()
         commands = step(now)
         if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
             goal.reason += self._instead(ticket)
         elif goal.outcome is Outcome.SERVER_BUSY and before[0] is State.QUEUED:
             goal.reason += self._in_use(ticket)
+        if goal.lost and not was_lost and not self.watch.spoke_lately(now.steady):
+            ticket.lost_at(now.steady)
         if before != (goal.state, goal.outcome, goal.end):
             ticket.traffic.note(ticket)
         if _in_the_way(goal) != was_in_the_way:
@@ -485,6 +489,7 @@ class Line:
             if all_of_them or (goal.outcome is not None and not goal.holding):
                 self.tell(ticket, Event.LEFT)
             if goal.lost:
+                ticket.looked_out_for_until = NEVER  # by nobody from now on
                 self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
                 self.close_book(ticket)
 
@@ -553,7 +558,7 @@ class Line:
         if before is Server.ABSENT or self._was_away:
             self.in_sight_since = now
         self._was_away = False
-        came = now - self.in_sight_since < BESIDE
+        came = now - self.in_sight_since < BESIDE or self.way.discovers(now) > 0.0
         if self._just_came and not came:
             self.traffic.notify(None)  # what was held up for it may be sent
         self._just_came = came
@@ -629,7 +634,7 @@ class Line:
             settling = self.watch.state(now) is Server.SETTLING
             if settling or self.way.is_waited_for():
                 self._look_at = now + LOOK_WHILE_WAITING
-            elif any(not ticket.accounted_for for ticket in self.goals.values()):
+            elif any(not ticket.is_over for ticket in self.goals.values()):
                 self._look_at = now + LOOK_WHILE_RUNNING
             else:
                 self._look_at = now + LOOK_WHILE_LOST

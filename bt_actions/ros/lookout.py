@@ -94,6 +94,7 @@ class Sight:
         except BaseException:
             context.try_shutdown()
             raise
+        self.made_at = time.monotonic()
         self.users: set[Seeker] = set()
         self.looking = True
         """A look goes on in it, which must not find it closed."""

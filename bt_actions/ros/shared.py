@@ -7,6 +7,7 @@ lock, never after. Nothing is decided or sent here.
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -31,6 +32,9 @@ FEEDBACK_KEPT = 100
 lock = threading.RLock()
 changed = threading.Condition(lock)
 """Notified at every change of any goal."""
+LOOKED_OUT_FOR = 3.0
+"""Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
+went away in silence: one that only stood still goes on with its goal."""
 LOST_KEPT = 100
 """Goals of one action remembered in case their server, or their request, turns up: the newest."""
 
@@ -124,6 +128,8 @@ class Ticket:
     told_unknown: bool = False
     """The log says that it is not accounted for; and later, on whatever node, that it is."""
     told_gone: bool = False
+    looked_out_for_until: float = NEVER
+    """Until when a server that went away with it in silence is looked out for (steady clock)."""
     paused_at: float | None = None
     begun_at: float = NEVER
     not_gone_before: float = NEVER
@@ -147,9 +153,20 @@ class Ticket:
 
     @property
     def accounted_for(self) -> bool:
-        """Whether the goal's end is known, so that nothing is left to wait for."""
+        """Whether the goal's end is known."""
         goal = self.goal
         return goal.outcome is not None and goal.end is not End.UNKNOWN and not goal.suspect
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is left to wait for: nor a server that may only have stood still."""
+        looks_out = self.goal.lost and time.monotonic() < self.looked_out_for_until
+        return self.accounted_for and not looks_out
+
+    def lost_at(self, now: float) -> None:
+        """Take note that its server went away in silence."""
+        if self.goal.end is End.SERVER_GONE:
+            self.looked_out_for_until = now + LOOKED_OUT_FOR
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ SHORTEST = 0.01
 
 
 def _boot_time() -> float:
-    """Return the seconds since the machine was started, suspended or not, where the system knows."""
+    """Return the seconds since the machine was started, also those in which it was suspended."""
     clock = getattr(time, "CLOCK_BOOTTIME", None)
     return time.monotonic() if clock is None else time.clock_gettime(clock)
 

@@ -24,7 +24,7 @@ from typing import Any
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
-from bt_actions.goal import ASK_AGAIN, Goal
+from bt_actions.goal import Goal
 from bt_actions.goal_ids import new_goal_id
 from bt_actions.goal_terms import Event, State
 from bt_actions.plain_text import in_words
@@ -33,15 +33,13 @@ from bt_actions.resources import Answer
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
+from bt_actions.ros.draining import drain
 from bt_actions.ros.line import Line
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import Beginner, Change, Observer, Ticket, changed, domain_of, lock
 from bt_actions.ros.signals import ended_by_signals, insists
 from bt_actions.server import Server
-from bt_actions.standstill import AT_MOST
 
-JUST_PAST = 0.1
-"""Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
 IN_FLIGHT = 8
 """Goal requests of this process under way at a server; its queue holds 10, and drops what is over
 silently."""
@@ -213,6 +211,7 @@ class Traffic:
             ticket.goal.state is State.WAITING_FOR_SERVER
             and not (_closing or line.given_up(ticket))
             and not line.way.in_doubt(time.monotonic())
+            and not line.way.discovers(time.monotonic())
             and not line.orphaned
             and is_valid(self.node)
             and line.watch.state(time.monotonic()) is Server.READY
@@ -306,7 +305,7 @@ class Traffic:
         """Drain what is still open and destroy the clients; nobody may spin the node any more."""
         with lock:
             left = [ticket for line in self._lines.values() for ticket in line.goals.values()]
-        drain(ticket for ticket in left if not ticket.accounted_for)
+        drain(left)
         with lock:
             lines, self._lines = list(self._lines.values()), {}
             for line in lines:
@@ -316,52 +315,6 @@ class Traffic:
                 line.close()
                 alarm.forget(line)
             setattr(self.node, _ON_NODE, None)
-
-
-def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) -> list[Ticket]:
-    """Cancel these goals and wait until each is accounted for, under one deadline.
-
-    The deadline is the largest `timeout.cancel` among them, plus `timeout.accept` (twice, if that
-    is more) where the acceptance is open. Where this process stood still, it leaves time for what
-    is about to arrive, and for one more question. Answers are taken here too, so it does not matter
-    whether anybody spins, whether the context is valid, or on which thread this runs. `hurry` is
-    called again and again without the lock, and ends the wait early when it says so. No goal is
-    waited for a second time. Returns the goals whose end is UNKNOWN.
-    """
-    with lock:
-        wanted = [
-            ticket
-            for ticket in tickets
-            if ticket.goal.state is not State.DONE and not ticket.line.is_parents
-        ]
-        for ticket in wanted:
-            ticket.line.tell(ticket, Event.INTERRUPTED)
-        waits = [t for t in wanted if not t.accounted_for and not t.goal.waited_for]
-        patience = max((ticket.goal.drains_within for ticket in waits), default=0.0)
-        deadline = time.monotonic() + patience + JUST_PAST
-        still = alarm.standstill
-        first = still.times
-    while waits and not hurry():
-        with lock:
-            now = time.monotonic()
-            doubts = (ticket.line.way.in_doubt(now) for ticket in waits)
-            held = max(still.answers_take(now), *doubts)
-            if held > 0.0 and still.times - first <= AT_MOST:
-                deadline = max(deadline, now + ASK_AGAIN)
-            if now >= deadline:
-                break
-            for line in {ticket.line for ticket in waits}:
-                line.pump()
-            for ticket in waits:
-                ticket.line.mind(ticket)
-            waits = [ticket for ticket in waits if not ticket.accounted_for]
-            if waits:
-                changed.wait(0.005)
-    for ticket in waits:
-        with lock:
-            ticket.line.cancels.send_now(ticket.goal.id)  # whoever waits may end the process now
-            ticket.line.tell(ticket, Event.DRAINED)
-    return [ticket for ticket in wanted if not ticket.accounted_for]
 
 
 def _who_begins() -> Beginner | None:
@@ -387,12 +340,12 @@ def close_process() -> None:
             _closing = True
             lines = [line for line in alarm.minded() if isinstance(line, Line)]
             tickets = [ticket for line in lines for ticket in line.goals.values()]
-        left = [ticket for ticket in tickets if not ticket.goal.lost]
+        left = [ticket for ticket in tickets if not ticket.goal.lost or not ticket.is_over]
         try:
             drain(left, lambda: hurried or insists())
         finally:
             for ticket in left:
-                if not ticket.accounted_for:
+                if not ticket.is_over:
                     log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
             log.flush()
 

@@ -33,6 +33,9 @@ TOO_NEW = 3.0
 """Seconds for which a participant has dropped nobody: no lease that is useful is shorter.
 
 After them it has discovered who was there."""
+DISCOVERS = 1.0
+"""Seconds that a participant, while it is new, takes to see all servers of a name: of two that had
+been up for long, the second was seen up to 0.6 s after the first, on one machine."""
 ON_TRIAL = 0
 """The number of a trial's probe, of which nobody is told."""
 
@@ -57,6 +60,14 @@ class Way:
         if self.sight is not None:
             return self.sight.shows(self.name)
         return servers(self._line.traffic.node, self.name)
+
+    def discovers(self, now: float) -> float:
+        """Return for how many seconds a second server may be there that is not in sight yet; or 0.
+
+        Nothing is sent to the first one meanwhile: it may be the wrong one, or both may move.
+        """
+        since = self._line.traffic.seen_since if self.sight is None else self.sight.made_at
+        return max(0.0, since + DISCOVERS - now)
 
     # Does the server hear us?
 

@@ -231,6 +231,7 @@ class Caller:
         clocks: Any = SimpleNamespace(now=lambda: self.world.now)
         made = Traffic(node)
         made.clocks = clocks
+        made.seen_since = float("-inf")  # it has discovered who is there
         return made
 
     def come(self, action: str, node: int) -> Line:
@@ -523,6 +524,7 @@ def installed() -> Iterator[None]:
         (past, "time", ModelTime),
         (way, "time", ModelTime),
         (traffic, "time", ModelTime),
+        (shared, "time", ModelTime),
         (line, "ActionClient", ModelClient),
         (way, "ActionClient", ModelClient),
         (way, "servers", lambda node, name: now().world.shown(name, node.number)),

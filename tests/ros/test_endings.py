@@ -10,8 +10,8 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions import End, MoveRobot, Outcome
 from bt_actions.goal_terms import Now, State
+from bt_actions.ros.draining import drain
 from bt_actions.ros.shared import lock
-from bt_actions.ros.traffic import drain
 from tests.support.processes import Host
 from tests.support.waiting import until
 

@@ -6,6 +6,7 @@ What a server can do wrong with a single goal is in tests/ros/test_outcomes.py; 
 from __future__ import annotations
 
 import gc
+import signal
 import threading
 import time
 import uuid
@@ -307,3 +308,41 @@ def test_who_gives_up_waiting_has_asked_for_each_goal(
     host.thaw()
     journal.wait_for("canceled", 10)
     record.outcome = "end UNKNOWN and said so; all canceled when the server goes on"
+
+
+INSISTS = """
+import sys, threading, time
+from bt_actions import MoveRobot, Timeouts, TreeRunner
+from tests.support.trees import state, together
+
+limits = Timeouts(server=20.0, accept=20.0, cancel=5.0)
+leaves = [
+    MoveRobot(f"m{i}", 90.0, action_name=sys.argv[1], busy="share", timeout=limits)
+    for i in range(60)
+]
+
+def watch():
+    while any(state(leaf) != "EXECUTING" for leaf in leaves):
+        time.sleep(0.01)
+    print("all run", flush=True)
+
+threading.Thread(target=watch, daemon=True).start()
+with TreeRunner(together(*leaves)) as runner:
+    runner.run()
+"""
+
+
+def test_who_will_not_wait_has_asked_for_more_goals_than_a_queue_holds(
+    new_host: HostFactory, start_program: Callable[..., Process], name: str, record: Record
+) -> None:
+    """Sixty goals; SIGINT, and 20 ms later another, which ends the wait for the answers"""
+    journal = new_host().open(name)
+    program = start_program("-c", INSISTS, name)
+    program.line("all run", 60.0)
+    program.send(signal.SIGINT)
+    time.sleep(0.02)  # less than the sixty answers take
+    program.send(signal.SIGINT)
+    assert program.wait() != 0
+    journal.wait_for("canceled", 60)
+    assert journal.count("cancel_requested") == 60
+    record.outcome = "all canceled, each asked for once"

@@ -126,8 +126,9 @@ class TestKilled:
             if phase == "CANCELING":
                 journal.wait_for("cancel_requested")
             killed = victim.kill()
-            assert runner.wait(9.0) is Status.FAILURE
+            until(lambda: leaf.outcome is not None, 9.0)
             record.took(time.monotonic() - killed, SHORT)
+            assert runner.wait(9.0) is Status.FAILURE
             assert runner.unaccounted == []
         wanted = Outcome.RESULT_TIMEOUT if phase == "CANCELING" else Outcome.SERVER_LOST
         assert stood(leaf) == (wanted, End.SERVER_GONE)
@@ -145,8 +146,9 @@ class TestKilled:
             runner.start()
             until(lambda: state(leaf) == "EXECUTING")
             killed = victim.kill()
-            assert runner.wait(40.0) is Status.FAILURE
+            until(lambda: leaf.outcome is not None, 40.0)
             record.took(time.monotonic() - killed, STOCK)
+            assert runner.wait(9.0) is Status.FAILURE
         assert stood(leaf) == (Outcome.SERVER_LOST, End.SERVER_GONE)
         record.outcome = f"{leaf.outcome}, end {leaf.end}"
 
@@ -275,6 +277,29 @@ class TestStopped:
         assert journal.ends() == ["canceled", "succeeded"]
         assert journal.max_live == 1
         record.outcome = "SERVER_LOST; back: canceled first, then the next goal SUCCEEDED"
+
+    @pytest.mark.parametrize("ends", ["by-itself", "interrupted"])
+    def test_stopped_for_a_little_longer_than_its_lease_when_nobody_wants_more(
+        self, new_host: HostFactory, name: str, node: Any, ends: str, record: Record
+    ) -> None:
+        """SIGSTOP until its lease is over, and the tree with it; SIGCONT 1 s later"""
+        host = new_host()
+        journal = host.open(name)
+        leaf = MoveRobot("m", 30.0, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: leaf.progress().feedback is not None)
+            host.send(signal.SIGSTOP)
+            if ends == "interrupted":
+                runner.interrupt()
+            until(lambda: leaf.end is End.SERVER_GONE, 9.0)
+            assert holds_for(lambda: leaf.end is End.SERVER_GONE, 1.0)
+            host.send(signal.SIGCONT)
+            runner.wait(9.0)
+            assert journal.ends() == ["canceled"]
+            assert leaf.end is End.CANCELED
+            assert runner.unaccounted == []
+        record.outcome = "SERVER_GONE; back: canceled before the run is over, end CANCELED"
 
     def test_stopped_while_it_decides_on_a_goal_that_it_denied(
         self, new_host: HostFactory, name: str, node: Any, record: Record
