@@ -238,8 +238,8 @@ class Line:
         in_doubt = LOOK_WHILE_RUNNING if self.way.in_doubt(now.steady) else 0.0
         if goal.state is State.WAITING_FOR_SERVER:
             in_doubt = max(in_doubt, alarm.standstill.servers_take(now.steady))
-            if self.watch.state(now.steady) is not Server.ABSENT:
-                in_doubt = max(in_doubt, self.way.discovers(now.steady))
+            if discovers := self.way.discovers(now.steady):
+                in_doubt = max(in_doubt, discovers + LOOK_WHILE_RUNNING)  # for a tick to send it
         in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
         goal.hold(max(answers, in_doubt), now, in_all)
 

@@ -66,6 +66,8 @@ class Way:
 
         Nothing is sent to the first one meanwhile: it may be the wrong one, or both may move.
         """
+        if self._is_absent(now):
+            return 0.0  # as with any server that comes later, too
         since = self._line.traffic.seen_since if self.sight is None else self.sight.made_at
         return max(0.0, since + DISCOVERS - now)
 

@@ -202,21 +202,30 @@ LONG.lives(1.2)
 
 
 @pytest.mark.parametrize(
-    ("state", "still", "doubt", "seconds", "in_all"),
+    ("state", "still", "doubt", "new", "seconds", "in_all"),
     [
-        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
-        (State.EXECUTING, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
-        (State.WAITING_FOR_SERVER, LONG, 0.0, 4.0, HELD_AT_MOST),
-        (State.EXECUTING, LONG, 0.0, 1.0, ANSWERS_TAKE_IN_ALL),
-        (State.EXECUTING, Standstill(), 5.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
+        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
+        (State.EXECUTING, STILL, 0.0, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
+        (State.WAITING_FOR_SERVER, LONG, 0.0, 0.0, 4.0, HELD_AT_MOST),
+        (State.EXECUTING, LONG, 0.0, 0.0, 1.0, ANSWERS_TAKE_IN_ALL),
+        (State.EXECUTING, Standstill(), 5.0, 0.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
+        (State.WAITING_FOR_SERVER, Standstill(), 0.0, 0.5, 0.5 + LOOK_WHILE_RUNNING, HELD_AT_MOST),
     ],
-    ids=["a server", "an answer", "a hidden server", "an answer, long", "who may not hear us"],
+    ids=[
+        "a server",
+        "an answer",
+        "a hidden server",
+        "an answer, long",
+        "who may not hear us",
+        "a second server",
+    ],
 )
 def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
     monkeypatch: pytest.MonkeyPatch,
     state: State,
     still: Standstill,
     doubt: float,
+    new: float,
     seconds: float,
     in_all: float,
 ) -> None:
@@ -229,7 +238,7 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         is_parents=False,
         traffic=SimpleNamespace(clocks=clocks),
         pump=lambda: None,
-        way=SimpleNamespace(in_doubt=lambda _: doubt),
+        way=SimpleNamespace(in_doubt=lambda _: doubt, discovers=lambda _: new),
         _apply=lambda *_: None,
     )
     line._bear_with = partial(Line._bear_with, line)

@@ -407,3 +407,26 @@ def test_who_was_stopped_beyond_its_lease_and_is_not_heard_any_more_finds_anothe
     goals = 2 if body is A_PUBLISHER_BETWEEN_TWO_GOALS else 1
     assert journal.events() == goals * ["received", "accepted", "succeeded"]
     record.outcome = "SUCCEEDED, exit code 0"
+
+
+FIRST_GOAL = """
+    leaf = MoveRobot("m", 0.1, action_name=name, timeout=T)
+    with TreeRunner(leaf) as runner:
+        print(runner.run(60.0).name, leaf.outcome, leaf.end, flush=True)
+"""
+
+
+@pytest.mark.parametrize("servers", [1, 2])
+def test_the_first_goal_of_a_process_waits_until_it_has_seen_who_is_there(
+    new_host: HostFactory, name: str, program: Start, servers: int, record: Record
+) -> None:
+    """Each of three new processes begins with a goal, as soon as it can"""
+    journals = [new_host().open(name) for _ in range(servers)]
+    for _ in range(3):
+        process = program(FIRST_GOAL)
+        assert process.wait(60.0) == 0, process
+        wanted = "SUCCESS SUCCEEDED" if servers == 1 else "FAILURE SERVER_AMBIGUOUS NEVER_STARTED"
+        assert wanted in str(process)
+    sent = [journal.count("received") for journal in journals]
+    assert sent == ([3] if servers == 1 else [0, 0])
+    record.outcome = "SUCCEEDED" if servers == 1 else "SERVER_AMBIGUOUS, and nothing is sent"
