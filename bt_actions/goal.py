@@ -515,6 +515,8 @@ class Goal:
         if status == STATUS_SUCCEEDED and self._why not in _NEVER_DONE:
             self.late = True
             self._settle(Outcome.SUCCEEDED, f"late: {self.reason}")
+        if self.outcome is None and self._cancel_code == CANCEL_REJECTED:
+            self.reason += self.cancel_said
         self._settle_as_planned()
         return State.DONE
 

@@ -541,6 +541,15 @@ def test_a_server_that_refuses_for_long_is_asked_less_often() -> None:
     life.ended(Outcome.CANCELED, End.CANCELED)
 
 
+def test_who_refused_to_cancel_is_named_where_the_goal_ends_all_the_same() -> None:
+    life = executing(Timeouts(cancel=9.0))
+    life.on(Event.INTERRUPTED)
+    life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED)
+    life.on(Event.RESULT, (STATUS_SUCCEEDED, None))
+    life.ended(Outcome.CANCELED, End.SUCCEEDED)
+    assert life.goal.reason.endswith("refuses to cancel it")
+
+
 def test_a_server_that_says_nothing_is_asked_less_often_until_it_speaks() -> None:
     """What it was asked waits in its queue, in the way of other clients."""
     life = executing(Timeouts(cancel=2.0))

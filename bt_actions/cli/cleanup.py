@@ -183,7 +183,7 @@ def _nothing(swept: Swept, nothing: str) -> str:
     where = "1 action" if seen == 1 else f"{seen} actions"
     if swept.unknown:
         where = f"{where} of {seen + len(swept.unknown)}"
-    return f"{nothing} was left behind on the {where} in sight in ROS domain {swept.domain}\n"
+    return f"{nothing} is left to cancel on the {where} in sight in ROS domain {swept.domain}\n"
 
 
 class _Stop:

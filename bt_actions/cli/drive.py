@@ -228,7 +228,7 @@ class Drive:
             self._lost = True
             if isinstance(error, OSError):
                 discard_stdout()
-            note(f"bt-actions: nothing more can be shown: {error}")
+            note(f"bt-actions: nothing more can be shown, and the run goes on: {error}")
 
     def _nobody_reads(self) -> None:
         """Standard output is closed: end the run, and write to nowhere from now on."""
@@ -311,6 +311,7 @@ class Drive:
         self._show(lambda: self._view.finish(closing))
         self._await_readers()
         if self._lost and code is Exit.SUCCESS:
+            note("bt-actions: the tree has succeeded; exit code 1, as that could not be shown")
             code = Exit.FAILURE
         if self._stop is not None and self._stop.code is Exit.SIGPIPE and code is not Exit.UNKNOWN:
             return Exit.SIGPIPE

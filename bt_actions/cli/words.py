@@ -61,6 +61,7 @@ def last_words(report: Report, closing: Closing, width: int | None = None) -> li
     lines += ["", closing.verdict] if closing.verdict else []
     word = report.status.value if report.status is not Status.INVALID else "STOPPED"
     cause = f", {closing.cause}" if closing.cause else ""
+    cause += ", but not as it should be" if closing.complaint and word == "SUCCESS" else ""
     lines += ["", f"{word} after {report.now - report.started:.2f} s{cause}"]
     wrong = troubles(report, closing)
     return [*lines, *(["", *wrong] if wrong else [])]

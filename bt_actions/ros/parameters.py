@@ -5,7 +5,9 @@ rcl reads the words: whatever it takes, finds in a file for this node, or refuse
 
 from __future__ import annotations
 
+import ast
 import os
+import shlex
 from collections.abc import Sequence
 
 from rclpy.context import Context
@@ -35,6 +37,10 @@ def parameters_in(words: Sequence[str], namespace: str = "") -> dict[str, object
         found = node.get_parameters_by_prefix("")
         node.destroy_node()
     except RuntimeError as error:  # rclpy's RCLError
+        if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
+            unknown = shlex.join(ast.literal_eval(str(error)))
+            why = f"ROS does not know {unknown}; options of bt-actions stand before --ros-args"
+            raise ValueError(why) from error
         raise ValueError(str(error).splitlines()[0]) from error
     finally:
         context.try_shutdown()

@@ -69,7 +69,7 @@ def test_where_no_server_is_in_sight_nobody_says_that_nothing_is_left(
     in_sight.append("/move")
     assert main(["cleanup"]) == 0
     assert capsys.readouterr().out == (
-        "nothing was left behind on the 1 action in sight in ROS domain 7\n"
+        "nothing is left to cancel on the 1 action in sight in ROS domain 7\n"
     )
 
 
@@ -96,7 +96,7 @@ def test_what_nobody_wants_is_not_counted_where_it_is_silent(
     assert sweep(0.1, 0.1, wanted=["/a"]) == 0
     said = capsys.readouterr()
     assert said.err == "no server of /b answers: nobody can see what was left there\n"
-    assert said.out == ("nothing was left behind on the 1 action of 2 in sight in ROS domain 7\n")
+    assert said.out == ("nothing is left to cancel on the 1 action of 2 in sight in ROS domain 7\n")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -79,6 +79,15 @@ def test_a_parameter_that_does_not_fit_is_told_by_its_name(
     assert message in str(raised.value)
 
 
+def test_an_option_of_ours_that_stands_behind_is_told_where_it_belongs() -> None:
+    with pytest.raises(BadInput) as raised:
+        parameters(["-p", "a:=1", "--check-part", "5.0"])
+    assert str(raised.value) == (
+        "--ros-args: ROS does not know --check-part 5.0; "
+        "options of bt-actions stand before --ros-args"
+    )
+
+
 def test_what_is_set_wins_over_parameters_and_they_over_defaults() -> None:
     given = {"pick_at": 4.0, "place_at": 6.0}
     root: Any = load("pick_and_place", ["place_at=7.0"], parameters=given)

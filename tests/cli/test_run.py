@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -174,6 +175,7 @@ class TestExitCode1:
         )
         assert run.wait() == 1, run
         assert run.lines[-1] == "The part should lie at 3.00 m (--check-part)."
+        assert re.fullmatch(r"SUCCESS after .* s, but not as it should be", run.lines[-3])
 
     def test_a_part_that_is_held_lies_nowhere(self, start: Start, tmp_path: Path) -> None:
         path = tmp_path / "pick.yaml"

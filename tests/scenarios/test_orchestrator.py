@@ -498,7 +498,7 @@ def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
         assert ours.outcome is None
         again = launch("cleanup")
         assert again.wait() == 0
-        assert again.lines[-1].startswith("nothing was left behind on the ")
+        assert again.lines[-1].startswith("nothing is left to cancel on the ")
     somebody.destroy()
     assert journal.events().count("canceled") == 2, "the dead one's, and ours when we stopped"
     record.shows = "three goals live; only the dead orchestrator's was asked to cancel, and was"
