@@ -17,7 +17,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Access, Status
 
 from bt_actions.attempts import AttemptRecord, Attempts
-from bt_actions.behaviours.conditions import condition_of, expression_of
+from bt_actions.behaviours.conditions import condition_of, expression_of, unknown_field
 from bt_actions.behaviours.node import node_in
 from bt_actions.behaviours.variables import key, read, resolve, variables_in, write
 from bt_actions.expression import Expression, ExpressionError
@@ -219,7 +219,8 @@ class ActionBehaviour(Behaviour):
         """Connect to the action, on the node given as ``node=``; again for the same node: fine.
 
         Raises TypeError without a node, or when the name is in use with another type; ValueError
-        for a name that ROS refuses; UnknownInterface (a LookupError) when the action type is not
+        for a name that ROS refuses, a goal of constants that is none of this action, and a field
+        that its result has not; UnknownInterface (a LookupError) when the action type is not
         installed.
         """
         node = node_in(kwargs, self)
@@ -228,6 +229,7 @@ class ActionBehaviour(Behaviour):
 
         if isinstance(self.action_type, str):
             self.action_type = interface(self.action_type, "action")
+        self._check_fields()
         traffic = Traffic.of(node)
         if traffic is self._traffic:
             return
@@ -379,6 +381,22 @@ class ActionBehaviour(Behaviour):
         clock = self._traffic.node.get_clock()
         goal_type: type[Any] = self.action_type.Goal  # type: ignore[attr-defined]
         return fill(goal_type, resolve(data), now=lambda: int(clock.now().nanoseconds))
+
+    def _check_fields(self) -> None:
+        """Find before anything moves what would be found when a goal is sent, or has ended."""
+        from bt_actions.ros.messages import MessageError, fill
+
+        action: Any = self.action_type
+        if isinstance(self.goal, Mapping) and not variables_in(self.goal):
+            try:
+                fill(action.Goal, self.goal)
+            except MessageError as error:
+                raise ValueError(f"{self.name}: goal: {error}") from error
+        texts = {"expect": self.expect, "retry.when": self.retry.when}
+        conditions = {each: Expression(text) for each, text in texts.items() if type(text) is str}
+        for what, place in [*conditions.items(), *(("save", each) for each in self._save.values())]:
+            if wrong := unknown_field(place, "result", action.Result):
+                raise ValueError(f"{self.name}: {what}: {wrong}")
 
     def _judge(self, ticket: Ticket) -> AttemptRecord:
         assert self._traffic is not None

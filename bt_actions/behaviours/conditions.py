@@ -5,11 +5,13 @@ In text, ``$x`` is a variable on the blackboard, and ``result`` what the server 
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable
 from typing import Any
 
 from bt_actions.behaviours.variables import read
 from bt_actions.expression import Expression, ExpressionError
+from bt_actions.suggest import did_you_mean
 
 
 def condition_of(
@@ -25,6 +27,17 @@ def condition_of(
         raise ValueError(f"{what} must be a callable on the result or an expression as text")
     expression = expression_of(given, what)
     return lambda result: expression.holds({"result": result}, read)
+
+
+def unknown_field(expression: Expression, root: str, message_type: Any) -> str:
+    """Say which field an expression reads of a message that has none of this name; or ""."""
+    fields = message_type.get_fields_and_field_types()
+    for node in ast.walk(expression.tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            known = node.attr in fields or hasattr(message_type, node.attr)  # as constants are
+            if node.value.id == root and not known:
+                return f"{root} has no field {node.attr!r}{did_you_mean(node.attr, fields)}"
+    return ""
 
 
 def expression_of(text: str | Expression, what: str) -> Expression:

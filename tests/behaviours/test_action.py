@@ -8,7 +8,7 @@ import pytest
 from py_trees.common import Status
 from rclpy.executors import SingleThreadedExecutor
 
-from bt_actions import MoveRobot, Outcome, Timeouts, TreeRunner
+from bt_actions import ActionBehaviour, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.behaviours import action
 from tests.support.trees import state, together
 from tests.support.waiting import until
@@ -23,6 +23,33 @@ def test_an_unexpected_result_says_what_was_expected_and_what_came(
     assert leaf.reason.startswith("result.final_pose > 4.0 was expected, but the result is: ")
     assert "final_pose 0.1" in leaf.reason
     host.close_server(name)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"goal": {"distanse": 1.0}}, "goal: distanse: MoveRobot.Goal has no field 'distanse'; "),
+        ({"goal": {"distance": "far"}}, "goal: distance: "),
+        ({"expect": "result.statsu == 0"}, "expect: result has no field 'statsu'; did you mean "),
+        ({"retry": Retry(2, when="result.statsu == 0")}, "retry.when: result has no field"),
+        ({"save": {"pose": "result.pose"}}, "save: result has no field 'pose'"),
+    ],
+)
+def test_what_does_not_fit_the_action_is_found_in_setup(
+    node: Any, name: str, settings: dict[str, Any], message: str
+) -> None:
+    """And not when a goal has moved the robot already."""
+    wanted = {"goal": {"distance": 1.0}, **settings}
+    leaf = ActionBehaviour("m", "robot_control_interfaces/MoveRobot", name, **wanted)
+    with pytest.raises(ValueError, match="m: ") as raised:
+        leaf.setup(node=node)
+    assert message in str(raised.value)
+
+
+def test_constants_of_a_result_are_known(node: Any, name: str) -> None:
+    leaf = MoveRobot("m", 1.0, action_name=name, expect="result.status != result.STATUS_FAULT")
+    leaf.setup(node=node)
+    leaf.shutdown()
 
 
 def test_the_first_leaf_that_is_shut_down_closes_for_the_whole_tree(

@@ -821,8 +821,8 @@ class TestInvalidGoal:
         "goal",
         [
             {"distance": Var("outcome_nobody_wrote_this")},
-            {"distance": "far"},
-            {"distanse": 1.0},
+            lambda: {"distance": "far"},
+            lambda: {"distanse": 1.0},
             lambda: 1 / 0,
             lambda: None,
         ],
