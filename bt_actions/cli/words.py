@@ -120,7 +120,8 @@ def waiting_text(report: Report) -> str:
         return f"waiting to know the end of {count}: {_where(rows)}"
     rows = [row for row in report.rows if row.left_at_server]
     if rows:
-        return f"looking out for servers that may only stand still, to cancel there: {_where(rows)}"
+        what = "looking out for a server that went away, to cancel its goal if it is back"
+        return f"{what}: {_where(rows)}"
     return ""
 
 

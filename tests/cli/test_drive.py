@@ -117,6 +117,21 @@ def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(story: Stor
     assert "ACCEPT_TIMEOUT, not started as far as its server knows" in text
 
 
+def test_who_waits_for_a_server_that_went_away_is_told(story: Story) -> None:
+    run = Run(FakeRunner(waits=True))
+    gone = story.goal(run.leaf, "CANCELING", outcome=Outcome.SERVER_LOST, end=End.SERVER_GONE)
+    run.runner.before = [story.start(), gone, story.node(run.leaf, Status.FAILURE)]
+    run.runner.after = [story.finish(Status.FAILURE)]
+    said = "to cancel its goal if it is back: Move on move_robot; Ctrl-C twice leaves"
+    thread = threading.Thread(target=lambda: until(lambda: said in run.out.getvalue()))
+    done = threading.Thread(target=lambda: (thread.join(), run.runner.interrupted.set()))
+    for each in (thread, done):
+        each.start()
+    assert run.go().code is Exit.FAILURE
+    done.join()
+    assert run.out.getvalue().count(said) == 1
+
+
 @contextlib.contextmanager
 def killed_when(event: threading.Event, number: signal.Signals) -> Iterator[None]:
     """Send a signal to this process at an event; one that is late does not hit the next test."""
