@@ -186,7 +186,7 @@ def test_the_last_line_is_what_went_wrong(
         "",
         "It lies there.",
         "",
-        "SUCCESS after 3.00 s",
+        "SUCCESS after 3.00 s, but not as it should be",
         "",
         "It should lie here.",
     ]

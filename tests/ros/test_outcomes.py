@@ -267,10 +267,12 @@ class TestNoServer:
             line.goal_answered(goal_id, (True,))
             line.goal_answered(uuid.uuid4().bytes, (True,))
             assert not line.goals
+            until(lambda: goal_id not in line.cancels._asked, what="asked, and answered")
             new_host().open(name)
             until_two_are_seen(node, name)
             with lock:
                 line.goal_answered(goal_id, (True, True))
+                assert goal_id in line.goals, (line.past._ended, line.watch.gids)
                 twin = line.goals[goal_id]
                 line.tell(ticket, Event.INTERRUPTED)
                 assert line.goals == {goal_id: twin}, "the goal that has ended is not its twin"
