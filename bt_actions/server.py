@@ -27,9 +27,6 @@ PROBES_KEPT = 20
 """Probes whose answers are counted; of those before, none is expected any more."""
 LEASE = 25.0
 """Seconds after which no ghost is left: a server that is still shown is there."""
-SAID_GOODBYE = 1.5
-"""Seconds; no lease that is useful is shorter than 3 s, so a server that was heard since, and is
-not shown any more, was closed in good order."""
 NOT_READY_FOR = 2.0
 """Seconds without readiness and without a word, though requests would be read, until the server
 counts as gone."""
@@ -143,10 +140,6 @@ class ServerWatch:
     def heard(self, now: float) -> None:
         """Take any word of a server: whoever speaks is there."""
         self._heard_at = now
-
-    def spoke_lately(self, now: float) -> bool:
-        """Whether a word has come within less than any lease: who is gone now has said goodbye."""
-        return now - self._heard_at < SAID_GOODBYE
 
     def two_answered(self, answers: int = 2) -> None:
         """Take note that two, or more, have answered one question, a probe or another."""

@@ -196,11 +196,8 @@ class ActionBehaviour(Behaviour):
 
     @property
     def drained(self) -> bool:
-        """Whether every goal this leaf has sent so far is accounted for.
-
-        And no server is looked out for that went away with one a moment ago.
-        """
-        return not self.open_tickets()
+        """Whether every goal this leaf has sent so far is accounted for."""
+        return all(ticket.accounted_for for ticket in self.open_tickets())
 
     @property
     def draining(self) -> bool:

@@ -75,6 +75,7 @@ def disown() -> None:
 def appears() -> None:
     """Take note that this process begins to see others now; the caller holds the lock."""
     if _thread is None:
+        standstill.lives(time.monotonic())  # who was there before has rested until now
         standstill.rests(time.monotonic())
 
 

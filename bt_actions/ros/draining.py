@@ -19,6 +19,8 @@ JUST_PAST = 0.1
 """Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
 LAST_REQUESTS = 0.4
 """Seconds, at most, in which cancel requests go out that waited for room when it was given up."""
+LOOKS_OUT_AT_MOST = 30.0
+"""Seconds for which servers are looked out for though this process stands still again and again."""
 LOOK = 0.005
 """Seconds between two looks, where nothing wakes it."""
 
@@ -71,8 +73,9 @@ class _Patience:
 
     def __init__(self, waits: list[Ticket]) -> None:
         self._deadline = 0.0
-        self._first = alarm.standstill.times
-        self._lost = {ticket for ticket in waits if ticket.goal.lost}
+        self._first, self._began = alarm.standstill.times, time.monotonic()
+        self._lost: set[Ticket] = set()
+        self._were_back: set[Ticket] = set()
         self._allow({ticket for ticket in waits if not ticket.goal.lost})
 
     def is_over(self, waits: list[Ticket]) -> bool:
@@ -82,11 +85,14 @@ class _Patience:
         held = max(still.answers_take(now), *doubts)
         if held > 0.0 and still.times - self._first <= AT_MOST:
             self._deadline = max(self._deadline, now + ASK_AGAIN)
+        self._lost.update(ticket for ticket in waits if ticket.goal.lost)
         back = {ticket for ticket in self._lost if not ticket.goal.lost}
-        self._lost -= back  # once: one that comes and goes is not waited for without end
-        self._allow(back)
-        until = [ticket.looked_out_for_until for ticket in waits if ticket.goal.lost]
-        return now >= max([self._deadline, *until])
+        self._allow(back - self._were_back)  # once: else one that comes and goes had no end
+        self._lost, self._were_back = self._lost - back, self._were_back | back
+        looks_out = any(ticket.goal.lost for ticket in waits)  # what is not over, that is
+        if looks_out and now < self._began + LOOKS_OUT_AT_MOST:
+            return False
+        return now >= self._deadline
 
     def _allow(self, tickets: set[Ticket]) -> None:
         """Give these goals the time that their cancel may take."""

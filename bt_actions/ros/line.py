@@ -30,7 +30,7 @@ from bt_actions.ros.alive import is_valid
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.past import Past
-from bt_actions.ros.shared import LOST_KEPT, NEVER, Ticket, lock
+from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, lock
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.standstill import ANSWERS_TAKE_IN_ALL
@@ -81,7 +81,8 @@ class Line:
         self._was_away = False  # seen between two looks
         self.in_sight_since = time.monotonic()
         """Since when a server of this name has been shown without a break that was seen."""
-        self._just_came = True
+        self._held_up = (True, True)  # by a server that has just come; by `Way.keeps`
+        self._looked_out_at = time.monotonic()
         self._last_probes: deque[int] = deque()
         self.past = Past(self)
         self._warned_crowd = False
@@ -225,12 +226,22 @@ class Line:
             goal, now = ticket.goal, self.traffic.clocks.now()
             if self.is_parents:
                 return
-            if ticket.paused_at is None or goal.sent:
+            if ticket.paused_at is not None and not goal.sent:
+                ticket.kept_since = None
+            else:
+                self._give_back_time(ticket, now.steady)
                 if goal.due_in(now) == 0.0:
                     self.pump()
                     now = self.traffic.clocks.now()
                     self._bear_with(goal, now)
                 self._apply(ticket, lambda _: goal.poll(now), None)
+
+    def _give_back_time(self, ticket: Ticket, now: float) -> None:
+        """See to it that no deadline counts the time in which a goal is not sent on our account."""
+        waits = ticket.goal.state is State.WAITING_FOR_SERVER
+        if waits and ticket.kept_since is not None:
+            ticket.goal.postpone(now - ticket.kept_since)
+        ticket.kept_since = now if waits and self.way.keeps(now) else None
 
     def _bear_with(self, goal: Goal, now: Now) -> None:
         """Hold deadlines that have passed while a standstill may be why nothing has come in."""
@@ -238,8 +249,6 @@ class Line:
         in_doubt = LOOK_WHILE_RUNNING if self.way.in_doubt(now.steady) else 0.0
         if goal.state is State.WAITING_FOR_SERVER:
             in_doubt = max(in_doubt, alarm.standstill.servers_take(now.steady))
-            if discovers := self.way.discovers(now.steady):
-                in_doubt = max(in_doubt, discovers + LOOK_WHILE_RUNNING)  # for a tick to send it
         in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
         goal.hold(max(answers, in_doubt), now, in_all)
 
@@ -274,8 +283,9 @@ class Line:
             goal.reason += self._instead(ticket)
         elif goal.outcome is Outcome.SERVER_BUSY and before[0] is State.QUEUED:
             goal.reason += self._in_use(ticket)
-        if goal.lost and not was_lost and not self.watch.spoke_lately(now.steady):
-            ticket.lost_at(now.steady)
+        newly_gone = goal.lost and not was_lost and goal.end is End.SERVER_GONE
+        if newly_gone and ticket.look_out_left is None:
+            ticket.look_out_left = LOOKED_OUT_FOR
         if before != (goal.state, goal.outcome, goal.end):
             ticket.traffic.note(ticket)
         if _in_the_way(goal) != was_in_the_way:
@@ -489,7 +499,7 @@ class Line:
             if all_of_them or (goal.outcome is not None and not goal.holding):
                 self.tell(ticket, Event.LEFT)
             if goal.lost:
-                ticket.looked_out_for_until = NEVER  # by nobody from now on
+                ticket.look_out_left = 0.0  # nobody does from now on
                 self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
                 self.close_book(ticket)
 
@@ -558,10 +568,10 @@ class Line:
         if before is Server.ABSENT or self._was_away:
             self.in_sight_since = now
         self._was_away = False
-        came = now - self.in_sight_since < BESIDE or self.way.discovers(now) > 0.0
-        if self._just_came and not came:
+        held_up = (now - self.in_sight_since < BESIDE, self.way.keeps(now))
+        if any(was and not still for was, still in zip(self._held_up, held_up, strict=True)):
             self.traffic.notify(None)  # what was held up for it may be sent
-        self._just_came = came
+        self._held_up = held_up
         if state is not before:
             self.traffic.notify(None)
             self.traffic.domain.lost_sight |= state is Server.ABSENT
@@ -573,6 +583,14 @@ class Line:
         elif state is Server.READY:
             self._warned_crowd = False
         return state
+
+    def _look_out(self, now: float) -> None:
+        """Count the time for which servers are looked out for; not that of a standstill."""
+        passed = min(now - self._looked_out_at, 2 * LOOK_WHILE_RUNNING)
+        self._looked_out_at = now
+        for ticket in self.goals.values():
+            if ticket.goal.lost and ticket.look_out_left:
+                ticket.look_out_left = max(0.0, ticket.look_out_left - passed)
 
     def _take_in(self, now: float) -> None:
         """What answers of several came in time count, though nobody spun the node."""
@@ -620,6 +638,7 @@ class Line:
             if any(not ticket.accounted_for for ticket in self.goals.values()):
                 log.warning(f"{self.name}: the node is gone; canceling what it left")
         for ticket in list(self.goals.values()):  # also one that was begun since
+            ticket.look_out_left = 0.0  # from here nobody sees it come back
             if ticket.goal.outcome is None:
                 self.tell(ticket, Event.INTERRUPTED)
         patience = max((each.goal.drains_within for each in self.goals.values()), default=0.0)
@@ -629,6 +648,7 @@ class Line:
 
     def attend(self, now: float) -> float:
         """Do what is due at this line, on the alarm; return the seconds until it wants to again."""
+        self._look_out(now)
         if now >= self._look_at:
             self.look(now)
             settling = self.watch.state(now) is Server.SETTLING

@@ -7,7 +7,6 @@ lock, never after. Nothing is decided or sent here.
 from __future__ import annotations
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -34,7 +33,7 @@ changed = threading.Condition(lock)
 """Notified at every change of any goal."""
 LOOKED_OUT_FOR = 3.0
 """Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
-went away in silence: one that only stood still goes on with its goal."""
+went away: one that only stood still goes on with its goal. Once for each goal."""
 LOST_KEPT = 100
 """Goals of one action remembered in case their server, or their request, turns up: the newest."""
 
@@ -128,8 +127,10 @@ class Ticket:
     told_unknown: bool = False
     """The log says that it is not accounted for; and later, on whatever node, that it is."""
     told_gone: bool = False
-    looked_out_for_until: float = NEVER
-    """Until when a server that went away with it in silence is looked out for (steady clock)."""
+    look_out_left: float | None = None
+    """Seconds for which a server that went away with it is looked out for yet; None: none did."""
+    kept_since: float | None = None
+    """Since when it is not sent though a server is in sight (way.Way.keeps), in steady seconds."""
     paused_at: float | None = None
     begun_at: float = NEVER
     not_gone_before: float = NEVER
@@ -160,13 +161,7 @@ class Ticket:
     @property
     def is_over(self) -> bool:
         """Whether nothing is left to wait for: nor a server that may only have stood still."""
-        looks_out = self.goal.lost and time.monotonic() < self.looked_out_for_until
-        return self.accounted_for and not looks_out
-
-    def lost_at(self, now: float) -> None:
-        """Take note that its server went away in silence."""
-        if self.goal.end is End.SERVER_GONE:
-            self.looked_out_for_until = now + LOOKED_OUT_FOR
+        return self.accounted_for and not (self.goal.lost and self.look_out_left)
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,8 +45,20 @@ IN_FLIGHT = 8
 silently."""
 _ON_NODE = "_bt_actions_traffic"
 _begins = threading.local()
-_contexts: weakref.WeakKeyDictionary[Any, tuple[float, int]] = weakref.WeakKeyDictionary()
+_contexts: weakref.WeakKeyDictionary[Any, _Participant] = weakref.WeakKeyDictionary()
 _closing = False  # the process ends: a tree that ticks on begins nothing any more
+
+
+class _Participant:
+    """That of a context, as long as any of its nodes is there: the next one gets a new one."""
+
+    def __init__(self) -> None:
+        self.since = time.monotonic()
+        """Since when it is known here; a new one is blind to nothing."""
+        self.long_standstills = alarm.standstill.long_times
+        """How often this process had stood still for long by then: it may be deaf where a line is
+        made after more of them."""
+        self.nodes: weakref.WeakSet[Node] = weakref.WeakSet()
 
 
 class Traffic:
@@ -56,12 +68,12 @@ class Traffic:
         self.node = node
         self.clocks = Clocks(node)
         self.domain = domain_of(node.context.get_domain_id())
-        if node.context not in _contexts:
+        seen = _contexts.get(node.context)
+        if seen is None or not any(is_valid(each) for each in seen.nodes):
             alarm.appears()
-        since = time.monotonic(), alarm.standstill.long_times
-        self.seen_since, self.long_standstills = _contexts.setdefault(node.context, since)
-        """Since when the node's context is known here; a new one is blind to nothing. And how often
-        this process had stood still for long by then: it may be deaf where a line is made later."""
+            seen = _contexts[node.context] = _Participant()
+        seen.nodes.add(node)
+        self.seen_since, self.long_standstills = seen.since, seen.long_standstills
         self.made_at = time.monotonic()
         self._namespace = node.get_namespace().rstrip("/")
         self._name = node.get_name()
@@ -210,8 +222,7 @@ class Traffic:
         return (
             ticket.goal.state is State.WAITING_FOR_SERVER
             and not (_closing or line.given_up(ticket))
-            and not line.way.in_doubt(time.monotonic())
-            and not line.way.discovers(time.monotonic())
+            and not line.way.keeps(time.monotonic())
             and not line.orphaned
             and is_valid(self.node)
             and line.watch.state(time.monotonic()) is Server.READY

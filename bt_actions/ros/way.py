@@ -61,15 +61,19 @@ class Way:
             return self.sight.shows(self.name)
         return servers(self._line.traffic.node, self.name)
 
-    def discovers(self, now: float) -> float:
-        """Return for how many seconds a second server may be there that is not in sight yet; or 0.
+    def keeps(self, now: float) -> bool:
+        """Whether nothing is sent though a server is in sight: it may not be heard, or be two."""
+        return self.in_doubt(now) > 0.0 or self._discovers(now)
 
-        Nothing is sent to the first one meanwhile: it may be the wrong one, or both may move.
+    def _discovers(self, now: float) -> bool:
+        """Whether a second server may be there that a new participant has not discovered yet.
+
+        The first one may be the wrong one, or both may move.
         """
-        if self._is_absent(now):
-            return 0.0  # as with any server that comes later, too
-        since = self._line.traffic.seen_since if self.sight is None else self.sight.made_at
-        return max(0.0, since + DISCOVERS - now)
+        made_at = self._line.traffic.seen_since if self.sight is None else self.sight.made_at
+        came_at = max(made_at, self._line.in_sight_since)
+        is_new = came_at - made_at < TOO_NEW and now - came_at < DISCOVERS
+        return is_new and not self._is_absent(now)
 
     # Does the server hear us?
 

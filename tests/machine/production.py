@@ -524,7 +524,6 @@ def installed() -> Iterator[None]:
         (past, "time", ModelTime),
         (way, "time", ModelTime),
         (traffic, "time", ModelTime),
-        (shared, "time", ModelTime),
         (line, "ActionClient", ModelClient),
         (way, "ActionClient", ModelClient),
         (way, "servers", lambda node, name: now().world.shown(name, node.number)),

@@ -158,12 +158,15 @@ def test_a_break_between_two_looks_is_one(monkeypatch: pytest.MonkeyPatch) -> No
     domain = SimpleNamespace(lost_sight=False, known=set(), number=1)
     line.traffic = SimpleNamespace(node=None, notify=lambda _: None, domain=domain)
     line.name, line.action_type, line.goals, line.watch = "x", None, {}, ServerWatch()
-    line._looked_like, line._was_away, line._just_came = Server.ABSENT, False, False
+    line._looked_like, line._was_away, line._held_up = Server.ABSENT, False, (False, False)
     line._look_at, line._warned_crowd = 0.0, False
     shown = frozenset({OURS})
     line.client = SimpleNamespace(closed=False, server_is_ready=lambda: bool(shown))
     line.way = SimpleNamespace(
-        shown=lambda: shown, wants_question=lambda _: False, seek=lambda _: None
+        shown=lambda: shown,
+        wants_question=lambda _: False,
+        seek=lambda _: None,
+        keeps=lambda _: False,
     )
     for now in (1.0, 1.2):
         line.look(now)
@@ -201,15 +204,32 @@ LONG.lives(-1.8)
 LONG.lives(1.2)
 
 
+def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -> None:
+    """Nor does it while the tree is paused, which gives that time back itself."""
+    given: list[float] = []
+    goal = SimpleNamespace(state=State.WAITING_FOR_SERVER, postpone=given.append)
+    ticket: Any = SimpleNamespace(goal=goal, kept_since=None)
+    keeps = True
+    line: Any = SimpleNamespace(way=SimpleNamespace(keeps=lambda _: keeps))
+    for now in (1.0, 1.2, 1.5):
+        Line._give_back_time(line, ticket, now)
+    keeps = False
+    Line._give_back_time(line, ticket, 1.6)
+    Line._give_back_time(line, ticket, 9.0)
+    assert given == pytest.approx([0.2, 0.3, 0.1])
+    keeps, goal.state = True, State.EXECUTING
+    Line._give_back_time(line, ticket, 9.1)
+    assert ticket.kept_since is None
+
+
 @pytest.mark.parametrize(
-    ("state", "still", "doubt", "new", "seconds", "in_all"),
+    ("state", "still", "doubt", "seconds", "in_all"),
     [
-        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
-        (State.EXECUTING, STILL, 0.0, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
-        (State.WAITING_FOR_SERVER, LONG, 0.0, 0.0, 4.0, HELD_AT_MOST),
-        (State.EXECUTING, LONG, 0.0, 0.0, 1.0, ANSWERS_TAKE_IN_ALL),
-        (State.EXECUTING, Standstill(), 5.0, 0.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
-        (State.WAITING_FOR_SERVER, Standstill(), 0.0, 0.5, 0.5 + LOOK_WHILE_RUNNING, HELD_AT_MOST),
+        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
+        (State.EXECUTING, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
+        (State.WAITING_FOR_SERVER, LONG, 0.0, 4.0, HELD_AT_MOST),
+        (State.EXECUTING, LONG, 0.0, 1.0, ANSWERS_TAKE_IN_ALL),
+        (State.EXECUTING, Standstill(), 5.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
     ],
     ids=[
         "a server",
@@ -217,7 +237,6 @@ LONG.lives(1.2)
         "a hidden server",
         "an answer, long",
         "who may not hear us",
-        "a second server",
     ],
 )
 def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
@@ -225,7 +244,6 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
     state: State,
     still: Standstill,
     doubt: float,
-    new: float,
     seconds: float,
     in_all: float,
 ) -> None:
@@ -238,11 +256,12 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         is_parents=False,
         traffic=SimpleNamespace(clocks=clocks),
         pump=lambda: None,
-        way=SimpleNamespace(in_doubt=lambda _: doubt, discovers=lambda _: new),
+        way=SimpleNamespace(in_doubt=lambda _: doubt, keeps=lambda _: False),
         _apply=lambda *_: None,
     )
     line._bear_with = partial(Line._bear_with, line)
-    ticket: Any = SimpleNamespace(goal=goal, paused_at=None)
+    line._give_back_time = partial(Line._give_back_time, line)
+    ticket: Any = SimpleNamespace(goal=goal, paused_at=None, kept_since=None)
     with lock:  # an alarm that is still awake would live in it
         monkeypatch.setattr(alarm, "standstill", copy.copy(still))
         Line.poll(line, ticket)
@@ -440,6 +459,7 @@ def test_a_paused_goal_whose_deadline_has_passed_does_not_keep_the_alarm_awake()
     goal = SimpleNamespace(due_in=lambda _: 0.0)
     ticket = SimpleNamespace(goal=goal, paused_at=1.0, accounted_for=True)
     line: Any = SimpleNamespace(_look_at=10.0, orphaned=False, way=SimpleNamespace(sight=None))
+    line._look_out = lambda _: None
     line.goals, line.traffic = {b"1": ticket}, SimpleNamespace(clocks=SimpleNamespace(now=list))
     line.mind, line._bound_the_lost = (lambda _: None), (lambda: None)
     line.cancels = Cancels()

@@ -366,13 +366,20 @@ A_PUBLISHER_BETWEEN_TWO_GOALS = """
             print("announced", flush=True)
             return py_trees.common.Status.SUCCESS
 
+    class Second(py_trees.behaviour.Behaviour):
+        def update(self):  # whoever comes now knows nothing of the time before
+            global other
+            other = TreeRunner(MoveRobot("o", 0.1, action_name=name + "_other", timeout=T))
+            return py_trees.common.Status.SUCCESS
+
     first = MoveRobot("first", 0.2, action_name=name, timeout=T)
     nobody_looks = py_trees.timers.Timer("t", LINGER + 3.0)
     while_it_is_stopped = py_trees.timers.Timer("u", 3.0)
     leaf = MoveRobot("m", 1.0, action_name=name, timeout=T)
-    each = [first, nobody_looks, News("n"), while_it_is_stopped, leaf]
+    each = [first, nobody_looks, News("n"), while_it_is_stopped, Second("s"), leaf]
     with TreeRunner(py_trees.composites.Sequence("s", True, each)) as runner:
         print(runner.run(90.0).name, leaf.outcome, leaf.end, flush=True)
+    other.shutdown()
 """
 
 
@@ -409,11 +416,89 @@ def test_who_was_stopped_beyond_its_lease_and_is_not_heard_any_more_finds_anothe
     record.outcome = "SUCCEEDED, exit code 0"
 
 
+LOOKS_OUT = """
+    def told(event):
+        said(event)
+        if getattr(event, "outcome", None) is not None:
+            print(event.outcome, event.end, flush=True)
+    leaf = MoveRobot("m", 40.0, action_name=name, timeout=T)
+    with TreeRunner(leaf) as runner:
+        runner.observe(told)
+        runner.run(60.0)
+"""
+
+
+def test_who_stands_still_itself_looks_out_for_a_server_that_went_away_all_the_same(
+    new_host: HostFactory, name: str, program: Start, record: Record
+) -> None:
+    """SIGSTOP to the server beyond its lease, then to the program for 4 s; SIGCONT to both"""
+    host = new_host()
+    journal = host.open(name)
+    process = program(LOOKS_OUT, short_lease=True)
+    process.line("executing", within=60.0)
+    journal.wait_for("accepted")
+    host.send(signal.SIGSTOP)
+    process.line("SERVER_LOST SERVER_GONE", within=20.0)
+    process.send(signal.SIGSTOP)
+    holds_for(lambda: True, 2.0)
+    host.send(signal.SIGCONT)
+    holds_for(lambda: True, 2.0)
+    process.send(signal.SIGCONT)
+    assert process.wait(60.0) == 0, process
+    assert process.lines[-1] == "SERVER_LOST CANCELED"
+    assert journal.ends() == ["canceled"]
+    record.outcome = "SERVER_GONE; back: canceled before the program ends"
+
+
+RARELY_TICKED = """
+    leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=SERVER))
+    with TreeRunner(leaf, heartbeat=30.0) as runner:
+        print(runner.run(60.0).name, leaf.outcome, flush=True)
+"""
+
+
 FIRST_GOAL = """
     leaf = MoveRobot("m", 0.1, action_name=name, timeout=T)
     with TreeRunner(leaf) as runner:
         print(runner.run(60.0).name, leaf.outcome, leaf.end, flush=True)
 """
+
+
+AFTER_ANOTHER = """
+    rclpy.init()
+    for number in range(3):
+        node = rclpy.create_node(f"n{number}")
+        leaf = MoveRobot("m", 0.1, action_name=name, timeout=T)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.run(60.0)
+            print(leaf.outcome, leaf.end, flush=True)
+        node.destroy_node()
+"""
+
+
+def test_so_does_the_first_goal_of_a_node_that_is_alone_in_its_context(
+    new_host: HostFactory, name: str, program: Start, record: Record
+) -> None:
+    """Two servers; three nodes one after another in one context, which makes a participant anew"""
+    journals = [new_host().open(name) for _ in range(2)]
+    process = program(AFTER_ANOTHER)
+    assert process.wait(60.0) == 0, process
+    assert process.lines == ["SERVER_AMBIGUOUS NEVER_STARTED"] * 3
+    assert [journal.count("received") for journal in journals] == [0, 0]
+    record.outcome = "SERVER_AMBIGUOUS, and nothing is sent"
+
+
+@pytest.mark.parametrize("server", [0.7, 5.0])
+def test_no_deadline_counts_the_second_that_a_process_waits(
+    new_host: HostFactory, name: str, program: Start, server: float, record: Record
+) -> None:
+    """One server; the runner ticks by events alone"""
+    journal = new_host().open(name)
+    process = program(RARELY_TICKED.replace("SERVER", f"{server}"))
+    assert process.wait(60.0) == 0, process
+    assert process.lines == ["SUCCESS SUCCEEDED"]
+    assert journal.events() == ["received", "accepted", "succeeded"]
+    record.outcome = "SUCCEEDED"
 
 
 @pytest.mark.parametrize("servers", [1, 2])

@@ -278,19 +278,22 @@ class TestStopped:
         assert journal.max_live == 1
         record.outcome = "SERVER_LOST; back: canceled first, then the next goal SUCCEEDED"
 
-    @pytest.mark.parametrize("ends", ["by-itself", "interrupted"])
+    @pytest.mark.parametrize("ends", ["by-itself", "interrupted", "interrupted-late"])
     def test_stopped_for_a_little_longer_than_its_lease_when_nobody_wants_more(
         self, new_host: HostFactory, name: str, node: Any, ends: str, record: Record
     ) -> None:
         """SIGSTOP until its lease is over, and the tree with it; SIGCONT 1 s later"""
         host = new_host()
-        journal = host.open(name)
-        leaf = MoveRobot("m", 30.0, action_name=name)
+        late = ends == "interrupted-late"  # so its first deadline ends with the look-out
+        journal = host.open(name, *(["1:delay_cancel=1"] if late else []))
+        leaf = MoveRobot("m", 30.0, action_name=name, timeout=Timeouts(cancel=2.0 if late else 5.0))
         with TreeRunner(leaf, node=node) as runner:
             runner.start()
             until(lambda: leaf.progress().feedback is not None)
             host.send(signal.SIGSTOP)
-            if ends == "interrupted":
+            if late:
+                assert holds_for(lambda: leaf.outcome is None, 2.0)
+            if ends != "by-itself":
                 runner.interrupt()
             until(lambda: leaf.end is End.SERVER_GONE, 9.0)
             assert holds_for(lambda: leaf.end is End.SERVER_GONE, 1.0)
