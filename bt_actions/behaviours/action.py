@@ -404,6 +404,8 @@ class ActionBehaviour(Behaviour):
             why = self._read_result(goal.result)
             if why:
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why
+        elif outcome is Outcome.ABORTED and (said := self._shown(goal.result)):
+            reason += f"; its result is: {said}"
         now = self._traffic.clocks.now().ros
         return AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
 
@@ -439,11 +441,15 @@ class ActionBehaviour(Behaviour):
         return ""
 
     def _unexpected(self, result: Any) -> str:
+        wanted = f"{self._expect_text} was expected" if self._expect_text else "not as expected"
+        return f"{wanted}, but the result is: {self._shown(result) or 'empty'}"
+
+    @staticmethod
+    def _shown(result: Any) -> str:
         from bt_actions.ros.messages import to_plain
 
-        wanted = f"{self._expect_text} was expected" if self._expect_text else "not as expected"
-        fields = ", ".join(f"{name} {value}" for name, value in to_plain(result).items())
-        return f"{wanted}, but the result is: {fields[:RESULT_SHOWN] or 'empty'}"
+        fields = to_plain(result) if result is not None else {}
+        return ", ".join(f"{name} {value}" for name, value in fields.items())[:RESULT_SHOWN]
 
     def _in_words(self, ticket: Ticket) -> str:
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""

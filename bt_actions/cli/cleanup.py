@@ -35,13 +35,18 @@ touched, nor those of an orchestrator that is alive, on another machine or in an
 container that is started again counts as another one, unless BT_ACTIONS_MACHINE names it: a name of
 its own for each container, the same each time.
 
+A server that is not in sight is not asked: name its action, and that is no success. And no server
+shows a goal that it has not accepted yet: where one takes long to decide, call this again later.
+
 examples:
   bt-actions cleanup
+  bt-actions cleanup /r1/move_robot
   bt-actions cleanup --look 10
   bt-actions run pick_and_place --cleanup-first
 
 exit codes:
-  0 nothing is left   3 the end of a goal is unknown, or no action server is in sight, or silent
+  0 no server in sight shows a goal that was left   3 the end of a goal is unknown, or no action
+  server is in sight, or one that is silent, or not that of an ACTION that is named
   129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
 """
 
@@ -53,6 +58,12 @@ def add_parser(subparsers: Subparsers) -> None:
         help="cancel what a killed orchestrator left",
         description="Cancel the goals that killed bt_actions processes of this machine left.",
         epilog=_EPILOG,
+    )
+    parser.add_argument(
+        "actions",
+        metavar="ACTION",
+        nargs="*",
+        help="wait for its server for up to 30 s, and fail where that is not in sight",
     )
     parser.add_argument(
         "--look", metavar="S", type=seconds, default=5.0, help="look for servers so long [5 s]"
@@ -68,13 +79,23 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    return sweep(args.look, args.patience)
+    from bt_actions.document.ros_names import why_not
+
+    for name in args.actions:
+        if why := why_not(name):
+            raise BadInput(f"{name!r} cannot be the name of an action server: {why}")
+    return sweep(args.look, args.patience, args.actions or None)
 
 
 def sweep(
-    look: float, patience: float, wanted: Collection[str] | None = None, namespace: str = ""
+    look: float,
+    patience: float,
+    wanted: Collection[str] | None = None,
+    namespace: str = "",
+    *,
+    first: bool = False,
 ) -> Exit:
-    """Clean up, saying what is found and how it ended.
+    """Clean up, saying what is found and how it ended; `first`: another run is to follow.
 
     Where not every server of one of the `wanted` actions answers, or none of any action is in
     sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread only.
@@ -88,7 +109,8 @@ def sweep(
                 "another container, where it cannot be seen whether it is alive (see "
                 "BT_ACTIONS_MACHINE)"
             )
-        hint = "; start it, or run without --cleanup-first" if wanted else ""
+        hint = "; start it" if wanted else ""
+        hint += ", or run without --cleanup-first" if wanted and first else ""
         code = _tell_what_is_open(swept, unseen, stop.signal, hint, any_will_do=wanted is not None)
         try:
             for goal in swept.left:
@@ -99,7 +121,7 @@ def sweep(
             if code is not Exit.UNKNOWN:
                 raise
             discard_stdout()
-        if wanted is None or code is not Exit.SUCCESS:
+        if not first or code is not Exit.SUCCESS:
             stop.settle(code)
     return code
 

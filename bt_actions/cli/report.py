@@ -143,7 +143,8 @@ class Row:
         surprise = self.outcome not in STOOD and self.end in (End.SUCCEEDED, End.ABORTED)
         gone = self.end is End.SERVER_GONE and self.outcome is not Outcome.SERVER_LOST
         told = f", end {self.end}" if surprise or gone or self.end is End.UNKNOWN else ""
-        return f"{self.outcome}{told}"
+        late = self.outcome is Outcome.SUCCEEDED and self.reason.startswith("late:")
+        return f"{self.outcome}{told}{', late' if late else ''}"
 
     @property
     def tries(self) -> str:

@@ -163,7 +163,7 @@ def _clean_up(wanted: set[str], namespace: str) -> Exit:
     from bt_actions.cli.cleanup import sweep
 
     with contextlib.redirect_stdout(sys.stderr):
-        return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace)
+        return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=True)
 
 
 def _refuse_without_sim(args: argparse.Namespace) -> None:

@@ -147,7 +147,7 @@ class GoalView:
 
     def finish(self, closing: Closing) -> None:
         """Write the result and the outcome."""
-        from bt_actions.cli.words import CLEAN_UP, STOOD_STILL, goal_text, result_lines
+        from bt_actions.cli.words import CLEAN_UP, goal_text, result_lines, stood_still
         from bt_actions.policy import End, Outcome
 
         if self._leaf.end in (End.SUCCEEDED, End.ABORTED):  # only these have a result of their own
@@ -160,7 +160,7 @@ class GoalView:
         if closing.error:
             self._line(closing.error)
         if self._report.servers_gone:
-            self._line(STOOD_STILL)
+            self._line(stood_still(self._report))
         if self._report.unaccounted:
             self._line(CLEAN_UP)
         for line in self._report.unaccounted:

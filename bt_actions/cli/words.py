@@ -31,11 +31,10 @@ _USUAL_ENDS = {
 """Ends that go without saying."""
 MOST = 3
 """Actions that are named where many are waited for."""
-STOOD_STILL = (
-    "A server that only stood still, or was cut off, may go on with its goal; once it is back,"
-    " `bt-actions cleanup` cancels that."
+CLEAN_UP = (
+    "`bt-actions cleanup` cancels what may still be running, once its server has accepted it and is"
+    " in sight:"
 )
-CLEAN_UP = "`bt-actions cleanup` asks again to cancel what may still be running:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +80,21 @@ def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     lines = summary(report)
     if report.servers_gone and not closing.verdict:
-        lines.append(STOOD_STILL)
+        lines.append(stood_still(report))
     lines += [line for line in (closing.complaint, closing.error) if line]
     if report.unaccounted and not closing.verdict:  # of a simulation, which ends with us
         lines.append(CLEAN_UP)
     lines += [f"not accounted for: {line}" for line in report.unaccounted]
     return lines
+
+
+def stood_still(report: Report) -> str:
+    """Say what to do about servers that went away with a goal."""
+    servers = " ".join(sorted({row.server for row in report.rows if row.left_at_server}))
+    return (
+        "A server that only stood still, or was cut off, may go on with its goal; once it is back,"
+        f" `bt-actions cleanup {servers}` cancels that."
+    )
 
 
 def goal_text(row: Row) -> str:

@@ -99,6 +99,25 @@ def test_what_nobody_wants_is_not_counted_where_it_is_silent(
     assert said.out == ("nothing is left to cancel on the 1 action of 2 in sight in ROS domain 7\n")
 
 
+def test_an_action_that_is_named_is_wanted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where its server is out of sight, others that are not say nothing of what was left there."""
+
+    def cleanup(wanted: list[str], missing: Callable[..., None], **_: object) -> Swept:
+        missing(wanted, True)
+        return Swept([], ["/a"], dict.fromkeys(wanted, "no server of {} answers"), 7)
+
+    monkeypatch.setattr(module, "cleanup", cleanup)
+    assert main(["cleanup", "/r1/move"]) == 3
+    said = capsys.readouterr()
+    assert said.err == (
+        "no server of /r1/move answers: nobody can see what was left there; start it\n"
+    )
+    assert main(["cleanup", "g h"]) == 2
+    assert "'g h' cannot be the name of an action server: " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_and_it_says_so(start: Start, node: Any, number: signal.Signals) -> None:
     cleanup = start("cleanup", "--look", "60")

@@ -65,12 +65,21 @@ def test_what_a_server_may_go_on_with_is_said_and_what_to_do(
     report = told(leaf, story.start(), lost, *failed)
 
     def hints(closing: Closing) -> int:
-        return sum("`bt-actions cleanup`" in line for line in last_words(report, closing))
+        return sum(
+            "`bt-actions cleanup move_robot`" in line for line in last_words(report, closing)
+        )
 
     assert hints(Closing(Exit.FAILURE)) == (end is End.SERVER_GONE)
     assert hints(Closing(Exit.SIGINT, "interrupted by SIGINT")) == (end is End.SERVER_GONE)
     assert report.servers_gone == (["Move on move_robot"] if end is End.SERVER_GONE else [])
     assert not hints(Closing(Exit.FAILURE, verdict="The part lies there."))
+
+
+def test_a_success_after_its_deadline_is_told_as_late(leaf: FakeAction, story: Story) -> None:
+    ended = {"outcome": Outcome.SUCCEEDED, "end": End.SUCCEEDED}
+    late = story.goal(leaf, "DONE", **ended, reason="late: not finished within 1 s")
+    assert row_of(leaf, late).verdict == "SUCCEEDED, late"
+    assert row_of(leaf, story.goal(leaf, "DONE", **ended)).verdict == "SUCCEEDED"
 
 
 def test_attempts_are_counted_over_the_retries_of_a_visit(leaf: FakeAction, story: Story) -> None:
