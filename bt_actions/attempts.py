@@ -13,7 +13,7 @@ from typing import Any
 
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import Now
-from bt_actions.policy import End, Outcome, Retry
+from bt_actions.policy import RETRYABLE, End, Outcome, Retry
 
 
 @dataclass(slots=True)
@@ -95,6 +95,9 @@ class Attempts:
 
     def _worth_it(self, record: AttemptRecord) -> bool:
         if record.outcome not in self.retry.outcomes:
+            if record.outcome in RETRYABLE:
+                why_not = f"{record.outcome} is not among the outcomes of retry"
+                record.reason += f" (not tried again: {why_not})"
             return False
         why_not = self._why_not(record)
         if why_not:

@@ -47,6 +47,17 @@ def test_only_what_is_named_is_tried_again(outcome: Outcome) -> None:
     assert attempts(everything).again(record(outcome), START) == (outcome in RETRYABLE)
 
 
+def test_who_could_have_been_tried_again_says_why_not() -> None:
+    lost = record(Outcome.ACCEPT_TIMEOUT)
+    assert not attempts(Retry(3)).again(lost, START)
+    why = "(not tried again: ACCEPT_TIMEOUT is not among the outcomes of retry)"
+    assert lost.reason.endswith(why)
+    for retry, outcome in ((Retry(1), Outcome.ACCEPT_TIMEOUT), (Retry(3), Outcome.CANCELED)):
+        silent = record(outcome)
+        assert not attempts(retry).again(silent, START)
+        assert silent.reason == ""
+
+
 @pytest.mark.parametrize("outcome", sorted(RETRYABLE))
 def test_a_retry_waits_until_the_end_of_the_earlier_goal_is_known(outcome: Outcome) -> None:
     retry = Retry(2, outcomes=RETRYABLE)
