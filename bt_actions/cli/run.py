@@ -39,7 +39,8 @@ examples:
 
 Ctrl-C, Ctrl-\\, SIGTERM, SIGHUP, --timeout and a closed standard output all end a run in the same
 way: every goal is canceled and seen to its end. A second Ctrl-C leaves at once and says which
-goals are not accounted for. Exit codes: see `bt-actions --help`.
+goals are not accounted for; not one within a quarter of a second, as shells and wrappers pass the
+first one on. Exit codes: see `bt-actions --help`.
 """
 
 
