@@ -585,7 +585,7 @@ class TreeRunner:
             if ticket.is_over:
                 self._tickets.discard(ticket)
             elif ticket.goal.lost:  # and what was lost longer ago is over by now
-                self._tickets = {each for each in list(self._tickets) if not each.is_over}
+                self._tickets -= {each for each in list(self._tickets) if each.is_over}
 
     def _is_ours(self, ticket: Ticket) -> bool:
         """Whether the goal is this tree's: begun in a tick of it, wherever its leaf is by now."""

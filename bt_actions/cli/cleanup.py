@@ -46,7 +46,7 @@ examples:
 
 exit codes:
   0 no server in sight shows a goal that was left   3 the end of a goal is unknown, or no action
-  server is in sight, or one that is silent, or not that of an ACTION that is named
+  server is in sight, or one is silent; with an ACTION, where its server is (of others it is told)
   129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
 """
 

@@ -61,7 +61,7 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     _send_what_waits(waits)
     with lock:
         for ticket in waits:
-            if ticket.goal.lost:
+            if ticket.looked_out_for:
                 ticket.goal.waited_for = True
             else:
                 ticket.line.tell(ticket, Event.DRAINED)
@@ -76,7 +76,7 @@ class _Patience:
         self._first, self._began = alarm.standstill.times, time.monotonic()
         self._lost: set[Ticket] = set()
         self._were_back: set[Ticket] = set()
-        self._allow({ticket for ticket in waits if not ticket.goal.lost})
+        self._allow({ticket for ticket in waits if not ticket.looked_out_for})
 
     def is_over(self, waits: list[Ticket]) -> bool:
         """Whether nobody waits any longer for these goals."""
@@ -89,7 +89,7 @@ class _Patience:
         back = {ticket for ticket in self._lost if not ticket.goal.lost}
         self._allow(back - self._were_back)  # once: else one that comes and goes had no end
         self._lost, self._were_back = self._lost - back, self._were_back | back
-        looks_out = any(ticket.goal.lost for ticket in waits)  # what is not over, that is
+        looks_out = any(ticket.looked_out_for for ticket in waits)
         if looks_out and now < self._began + LOOKS_OUT_AT_MOST:
             return False
         return now >= self._deadline

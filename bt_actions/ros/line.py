@@ -240,14 +240,18 @@ class Line:
         """See to it that no deadline counts the time in which a goal is not sent on our account."""
         waits = ticket.goal.state is State.WAITING_FOR_SERVER
         if waits and ticket.kept_since is not None:
-            ticket.goal.postpone(now - ticket.kept_since)
+            more = min(now - ticket.kept_since, HELD_AT_MOST - ticket.kept_for)
+            ticket.goal.postpone(more)
+            ticket.kept_for += more
         ticket.kept_since = now if waits and self.way.keeps(now) else None
 
     def _bear_with(self, goal: Goal, now: Now) -> None:
         """Hold deadlines that have passed while a standstill may be why nothing has come in."""
         answers = alarm.standstill.answers_take(now.steady)
-        in_doubt = LOOK_WHILE_RUNNING if self.way.in_doubt(now.steady) else 0.0
-        if goal.state is State.WAITING_FOR_SERVER:
+        waits = goal.state is State.WAITING_FOR_SERVER
+        open_question = self.way.keeps if waits else self.way.in_doubt
+        in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
+        if waits:
             in_doubt = max(in_doubt, alarm.standstill.servers_take(now.steady))
         in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
         goal.hold(max(answers, in_doubt), now, in_all)

@@ -130,7 +130,9 @@ class Ticket:
     look_out_left: float | None = None
     """Seconds for which a server that went away with it is looked out for yet; None: none did."""
     kept_since: float | None = None
-    """Since when it is not sent though a server is in sight (way.Way.keeps), in steady seconds."""
+    """Since when it is not sent though a server is in sight (way.Way.keeps), in steady seconds;"""
+    kept_for: float = 0.0
+    """and for how many seconds it was kept in all, which its deadline does not count."""
     paused_at: float | None = None
     begun_at: float = NEVER
     not_gone_before: float = NEVER
@@ -161,7 +163,12 @@ class Ticket:
     @property
     def is_over(self) -> bool:
         """Whether nothing is left to wait for: nor a server that may only have stood still."""
-        return self.accounted_for and not (self.goal.lost and self.look_out_left)
+        return self.accounted_for and not self.looked_out_for
+
+    @property
+    def looked_out_for(self) -> bool:
+        """Whether a server is looked out for that went away with it, and has not told its end."""
+        return self.goal.lost and self.goal.state is not State.DONE and bool(self.look_out_left)
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,12 +50,16 @@ _closing = False  # the process ends: a tree that ticks on begins nothing any mo
 
 
 class _Participant:
-    """That of a context, as long as any of its nodes is there: the next one gets a new one."""
+    """That of a context, as long as any of its nodes is there: the next one gets a new one.
 
-    def __init__(self) -> None:
+    Or the same, where the user has another node there, of which nobody tells us.
+    """
+
+    def __init__(self, before: _Participant | None) -> None:
         self.since = time.monotonic()
         """Since when it is known here; a new one is blind to nothing."""
-        self.long_standstills = alarm.standstill.long_times
+        now = alarm.standstill.long_times
+        self.long_standstills: int = now if before is None else before.long_standstills
         """How often this process had stood still for long by then: it may be deaf where a line is
         made after more of them."""
         self.nodes: weakref.WeakSet[Node] = weakref.WeakSet()
@@ -71,7 +75,7 @@ class Traffic:
         seen = _contexts.get(node.context)
         if seen is None or not any(is_valid(each) for each in seen.nodes):
             alarm.appears()
-            seen = _contexts[node.context] = _Participant()
+            seen = _contexts[node.context] = _Participant(seen)
         seen.nodes.add(node)
         self.seen_since, self.long_standstills = seen.since, seen.long_standstills
         self.made_at = time.monotonic()
@@ -351,7 +355,7 @@ def close_process() -> None:
             _closing = True
             lines = [line for line in alarm.minded() if isinstance(line, Line)]
             tickets = [ticket for line in lines for ticket in line.goals.values()]
-        left = [ticket for ticket in tickets if not ticket.goal.lost or not ticket.is_over]
+        left = [ticket for ticket in tickets if not ticket.goal.lost or ticket.looked_out_for]
         try:
             drain(left, lambda: hurried or insists())
         finally:

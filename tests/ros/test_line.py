@@ -208,7 +208,7 @@ def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -
     """Nor does it while the tree is paused, which gives that time back itself."""
     given: list[float] = []
     goal = SimpleNamespace(state=State.WAITING_FOR_SERVER, postpone=given.append)
-    ticket: Any = SimpleNamespace(goal=goal, kept_since=None)
+    ticket: Any = SimpleNamespace(goal=goal, kept_since=None, kept_for=0.0)
     keeps = True
     line: Any = SimpleNamespace(way=SimpleNamespace(keeps=lambda _: keeps))
     for now in (1.0, 1.2, 1.5):
@@ -217,7 +217,11 @@ def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -
     Line._give_back_time(line, ticket, 1.6)
     Line._give_back_time(line, ticket, 9.0)
     assert given == pytest.approx([0.2, 0.3, 0.1])
-    keeps, goal.state = True, State.EXECUTING
+    keeps = True
+    for now in (10.0, 10.1, 1000.0, 1000.1):
+        Line._give_back_time(line, ticket, now)
+    assert sum(given) == pytest.approx(HELD_AT_MOST), "and not for ever"
+    goal.state = State.EXECUTING
     Line._give_back_time(line, ticket, 9.1)
     assert ticket.kept_since is None
 
@@ -256,12 +260,12 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         is_parents=False,
         traffic=SimpleNamespace(clocks=clocks),
         pump=lambda: None,
-        way=SimpleNamespace(in_doubt=lambda _: doubt, keeps=lambda _: False),
+        way=SimpleNamespace(in_doubt=lambda _: doubt, keeps=lambda _: doubt > 0.0),
         _apply=lambda *_: None,
     )
     line._bear_with = partial(Line._bear_with, line)
     line._give_back_time = partial(Line._give_back_time, line)
-    ticket: Any = SimpleNamespace(goal=goal, paused_at=None, kept_since=None)
+    ticket: Any = SimpleNamespace(goal=goal, paused_at=None, kept_since=None, kept_for=0.0)
     with lock:  # an alarm that is still awake would live in it
         monkeypatch.setattr(alarm, "standstill", copy.copy(still))
         Line.poll(line, ticket)
