@@ -11,7 +11,7 @@ import time
 import pytest
 
 from tests.scenarios.conftest import Launch
-from tests.support.cycles import PATIENCE
+from tests.support.cycles import patience
 from tests.support.reliability import Record
 
 MEMORY = 0.05
@@ -21,6 +21,7 @@ AT_RANDOM = 5.0
 or a second participant where its server did not answer for two seconds."""
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("cycles", [20, pytest.param(200, marks=pytest.mark.chaos)])
 @pytest.mark.parametrize("how", ["own", "user", "interrupted"])
 def test_cycles_in_one_process_leave_nothing(
@@ -29,7 +30,7 @@ def test_cycles_in_one_process_leave_nothing(
     """Create, run, shut down, so many times in one process; "user": in a user's own context"""
     began = time.monotonic()
     program = launch(how, str(cycles), program=("-m", "tests.support.cycles"))
-    assert program.wait(PATIENCE + 10.0) == 0, str(program)  # in full: where it hangs
+    assert program.wait(patience(cycles) + 10.0) == 0, str(program)  # in full: where it hangs
     told = json.loads(program.lines[-1])
     warm, after = told["warm"], told["after"]
     assert program.errors == [], "no warning"

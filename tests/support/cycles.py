@@ -28,8 +28,14 @@ from bt_actions.simulation import Script, ScriptedServer
 NAME = "/cycles/move"
 OF_THE_PROCESS = ("bt_actions-lookout", "bt_actions-alarm")
 """Threads that are begun once, when they are needed."""
-PATIENCE = 100.0
-"""Seconds after which a process that hangs says where, and ends."""
+
+
+def patience(cycles: int) -> float:
+    """Seconds after which a process that hangs says where, and ends.
+
+    A new participant sends nothing in its first second.
+    """
+    return 100.0 + 2.0 * cycles
 
 
 def held() -> dict[str, float]:
@@ -114,8 +120,8 @@ class User:
 
 def main() -> None:
     """Run the cycles."""
-    faulthandler.dump_traceback_later(PATIENCE, exit=True)
     how, cycles = sys.argv[1], int(sys.argv[2])
+    faulthandler.dump_traceback_later(patience(cycles), exit=True)
     user = User() if how == "user" else None
     alone = interrupted if how == "interrupted" else on_a_node_of_its_own
     one: Callable[[int], None] = user.cycle if user else alone
