@@ -520,7 +520,7 @@ def test_what_a_killed_container_left_is_found_by_its_name(
     here = launch("cleanup")
     assert here.wait() == 0, here
     assert any(line.startswith("not touched: ") for line in here.errors), here
-    assert here.lines[-1].startswith("nothing of this machine was left behind on the ")
+    assert here.lines[-1].startswith("nothing of this machine is left to cancel on the ")
     assert journal.ends() == [None]
     again = launch("cleanup", environment=there)
     assert again.wait() == 0, again
