@@ -589,9 +589,14 @@ class Line:
         return state
 
     def _look_out(self, now: float) -> None:
-        """Count the time for which servers are looked out for; not that of a standstill."""
+        """Count the time for which servers are looked out for; not that of a standstill.
+
+        Nor that after one, in which a server that is there may be out of sight.
+        """
         passed = min(now - self._looked_out_at, 2 * LOOK_WHILE_RUNNING)
         self._looked_out_at = now
+        if alarm.standstill.servers_take(now) > 0.0:
+            return
         for ticket in self.goals.values():
             if ticket.goal.lost and ticket.look_out_left:
                 ticket.look_out_left = max(0.0, ticket.look_out_left - passed)

@@ -106,13 +106,7 @@ def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(story: Stor
     unknown = story.goal(run.leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.UNKNOWN)
     run.runner.after = [unknown, story.finish(Status.FAILURE)]
     said = "waiting to know the end of 1 goal: Move on move_robot; Ctrl-C twice leaves"
-    thread = threading.Thread(target=lambda: until(lambda: said in run.out.getvalue()))
-    done = threading.Thread(target=lambda: (thread.join(), run.runner.interrupted.set()))
-    for each in (thread, done):
-        each.start()
-    assert run.go().code is Exit.FAILURE
-    done.join()
-    text = run.out.getvalue()
+    text = run_until(run, said)
     assert text.count(said) == 1
     assert "ACCEPT_TIMEOUT, not started as far as its server knows" in text
 
@@ -123,13 +117,18 @@ def test_who_waits_for_a_server_that_went_away_is_told(story: Story) -> None:
     run.runner.before = [story.start(), gone, story.node(run.leaf, Status.FAILURE)]
     run.runner.after = [story.finish(Status.FAILURE)]
     said = "to cancel its goal if it is back: Move on move_robot; Ctrl-C twice leaves"
+    assert run_until(run, said).count(said) == 1
+
+
+def run_until(run: Run, said: str) -> str:
+    """Go, let the runner end when this was said, and return all that was."""
     thread = threading.Thread(target=lambda: until(lambda: said in run.out.getvalue()))
     done = threading.Thread(target=lambda: (thread.join(), run.runner.interrupted.set()))
     for each in (thread, done):
         each.start()
     assert run.go().code is Exit.FAILURE
     done.join()
-    assert run.out.getvalue().count(said) == 1
+    return run.out.getvalue()
 
 
 @contextlib.contextmanager

@@ -204,6 +204,22 @@ LONG.lives(-1.8)
 LONG.lives(1.2)
 
 
+@pytest.mark.parametrize(
+    ("now", "hidden", "left"),
+    [(10.2, 0.0, 2.8), (14.0, 0.0, 2.6), (14.0, 4.0, 3.0)],
+    ids=["a look", "a late one", "just after a standstill"],
+)
+def test_a_server_is_looked_out_for_as_long_as_it_would_be_seen(
+    monkeypatch: pytest.MonkeyPatch, now: float, hidden: float, left: float
+) -> None:
+    still = SimpleNamespace(servers_take=lambda _: hidden)
+    monkeypatch.setattr(alarm, "standstill", still)
+    ticket: Any = SimpleNamespace(goal=SimpleNamespace(lost=True), look_out_left=3.0)
+    line: Any = SimpleNamespace(goals={b"1": ticket}, _looked_out_at=10.0)
+    Line._look_out(line, now)
+    assert ticket.look_out_left == pytest.approx(left)
+
+
 def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -> None:
     """Nor does it while the tree is paused, which gives that time back itself."""
     given: list[float] = []
