@@ -2,10 +2,15 @@
 
 Nobody can ask a server for all of its goals: it publishes them, and its middleware delivers that
 when it does. But a server that has answered every question for some seconds has had the time. An
-answer does not say whose it is; so as many have to come as there are servers in sight.
+answer does not say whose it is; so as many have to come as there are servers in sight. The same
+holds of a goal that they deny: one that was sent, and not accepted yet, may turn up later.
 """
 
 from __future__ import annotations
+
+from collections.abc import Collection
+
+from bt_actions.goal import DENIED_FOR_GOOD
 
 ASK_AGAIN = 1.0
 """Seconds between two questions;"""
@@ -103,3 +108,43 @@ class RollCall:
             self._heard_at = now
             if self._asked_at - self._since >= SETTLE:
                 self._settled = (self._settled or frozenset()) | self._shown
+
+
+class Denial:
+    """For how long all servers in sight have denied that they have a certain goal.
+
+    A server denies what it has received, and has not decided on: only time tells. Times are seconds
+    of the steady clock.
+    """
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Go on in a new participant, of which the servers have been asked nothing."""
+        self._since: float | None = None  # when the first of the questions was asked in a row
+        self._number: int | None = None
+        self._asked_at = float("-inf")
+        self._of: Collection[bytes] = ()
+        self._denials = 0
+
+    @property
+    def _complete(self) -> bool:
+        return self._denials >= max(1, len(self._of))
+
+    def asked(self, number: int, of: Collection[bytes], now: float) -> None:
+        """The question of this number was asked, `of` these servers."""
+        if not self._complete or now - self._asked_at > LATE or of != self._of:
+            self._since = now
+        self._number, self._of, self._asked_at, self._denials = number, of, now, 0
+
+    def denied(self, number: int, now: float) -> None:
+        """One server answered the question of this number: it has not got it."""
+        if number == self._number and now - self._asked_at <= LATE:
+            self._denials += 1
+
+    @property
+    def for_good(self) -> bool:
+        """Whether nothing will come of it any more."""
+        since = self._asked_at if self._since is None else self._since
+        return self._complete and self._asked_at - since >= DENIED_FOR_GOOD

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from bt_actions.roll_call import ASK_AGAIN, LATE, SETTLE, RollCall
+from bt_actions.goal import DENIED_FOR_GOOD
+from bt_actions.roll_call import ASK_AGAIN, LATE, SETTLE, Denial, RollCall
 
 A, B = b"a", b"b"
 
@@ -138,3 +139,66 @@ def test_a_status_without_a_server_has_to_be_answered_for_too() -> None:
     assert not roll.known
     roll.settle()
     assert roll.known
+
+
+class Denied(Denial):
+    """One whose questions and answers come as a test says."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self._numbers: Iterator[int] = iter(range(1000))
+        super().__init__()
+
+    def ask(self, denials: int, *of: bytes, times: int = 1, after: float = 0.02) -> None:
+        """Ask `of` these, so many times, and have it denied so often each time."""
+        for _ in range(times):
+            number = next(self._numbers)
+            self.asked(number, frozenset(of), self.now)
+            for _ in range(denials):
+                self.denied(number, self.now + after)
+            self.now += ASK_AGAIN
+
+
+LONG = int(DENIED_FOR_GOOD / ASK_AGAIN)
+
+
+def test_a_goal_is_denied_for_good_after_a_long_row_of_denials() -> None:
+    goal = Denied()
+    goal.ask(1, A, times=LONG)
+    assert not goal.for_good
+    goal.ask(1, A)
+    assert goal.for_good
+
+
+@pytest.mark.parametrize("broken", ["no answer", "too late", "stood still", "another", "anew"])
+def test_the_row_begins_again(broken: str) -> None:
+    goal = Denied()
+    goal.ask(1, A, times=LONG)
+    if broken == "no answer":
+        goal.ask(0, A)
+    elif broken == "too late":
+        goal.ask(1, A, after=LATE + 0.1)
+    elif broken == "stood still":
+        goal.now += LATE
+    elif broken == "another":
+        goal.ask(2, A, B)
+    else:
+        goal.begin()
+    goal.ask(1, A, times=2)
+    assert not goal.for_good
+
+
+def test_each_of_two_servers_has_to_deny_it() -> None:
+    goal = Denied()
+    goal.ask(1, A, B, times=LONG + 2)
+    assert not goal.for_good
+    goal.ask(2, A, B, times=LONG + 1)
+    assert goal.for_good
+
+
+def test_an_answer_to_an_older_question_denies_nothing() -> None:
+    goal = Denied()
+    goal.ask(1, A, times=LONG)
+    goal.asked(5000, frozenset({A}), goal.now)
+    goal.denied(0, goal.now)
+    assert not goal.for_good

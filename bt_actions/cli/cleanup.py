@@ -35,8 +35,9 @@ touched, nor those of an orchestrator that is alive, on another machine or in an
 container that is started again counts as another one, unless BT_ACTIONS_MACHINE names it: a name of
 its own for each container, the same each time.
 
-A server that is not in sight is not asked: name its action, and that is no success. And no server
-shows a goal that it has not accepted yet: where one takes long to decide, call this again later.
+No server shows a goal that it has not accepted yet. What a dead process had sent, and nobody had
+answered, is on record, and is awaited for up to 30 s. A server that is not in sight is not asked
+otherwise: name its action, and that is no success.
 
 examples:
   bt-actions cleanup
@@ -45,7 +46,7 @@ examples:
   bt-actions run pick_and_place --cleanup-first
 
 exit codes:
-  0 no server in sight shows a goal that was left   3 the end of a goal is unknown, or no action
+  0 no server in sight has a goal that was left   3 the end of a goal is unknown, or no action
   server is in sight, or one is silent; with an ACTION, where its server is (of others it is told)
   129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
 """
@@ -135,13 +136,25 @@ def _sweep(
     except ImportError as error:
         raise BadInput(NO_ROS.format(error)) from error
 
+    from bt_actions.goal import DENIED_FOR_GOOD
+
     refuse_domain()
     foreign: list[str] = []
     unseen: list[str] = []
 
     def found(left: LeftBehind) -> None:
         stop.leaves_a_goal = True
-        note(f"canceling a goal of dead process {left.pid} on {left.action}: {left.goal_id.hex()}")
+        if left.awaited:
+            note(
+                f"dead process {left.pid} sent a goal to {left.action} that was not answered: "
+                f"waiting up to {DENIED_FOR_GOOD:g} s for it to be accepted, to cancel it: "
+                f"{left.goal_id.hex()}"
+            )
+        else:
+            note(
+                f"canceling a goal of dead process {left.pid} on {left.action}: "
+                f"{left.goal_id.hex()}"
+            )
 
     def missing(names: list[str], in_vain: bool) -> None:
         if in_vain:
@@ -169,8 +182,6 @@ def _tell_what_is_open(
     swept: Swept, unseen: list[str], stopped_by: signal.Signals | None, hint: str, any_will_do: bool
 ) -> Exit:
     """Say what is not known, which may be something to wait for; return the exit code."""
-    from bt_actions.policy import End
-
     code = Exit.SUCCESS
     if stopped_by is not None:
         note(f"stopped by {stopped_by.name} before all was seen")
@@ -188,7 +199,7 @@ def _tell_what_is_open(
                 nobody = f"{trouble.format(listing(who))}: nobody can see what was left there"
                 note(nobody + (hint if held_against else ""))
         code = Exit.UNKNOWN if unseen else code
-    if any(goal.end is End.UNKNOWN for goal in swept.left):
+    if not all(goal.is_over for goal in swept.left):
         note("not all of them have ended; they may still be running")
         code = Exit.UNKNOWN
     return code
@@ -197,7 +208,8 @@ def _tell_what_is_open(
 def _line(goal: LeftBehind) -> str:
     crowd = f": {goal.servers} servers of this name, and each may run it"
     told = crowd if goal.servers > 1 else ""
-    return f"{goal.action}  {goal.goal_id.hex()}  {goal.end}{told}\n"
+    end = goal.nothing_left or f"{goal.end}{told}"
+    return f"{goal.action}  {goal.goal_id.hex()}  {end}\n"
 
 
 def _nothing(swept: Swept, nothing: str) -> str:

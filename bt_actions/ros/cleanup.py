@@ -5,6 +5,10 @@ actions in sight, told by their ids (goal_ids.py), and canceled one by one; goal
 and of orchestrators that are alive, or that cannot be looked for from here, are never touched. No
 action type is needed for any of it. That a server has nothing to tell is believed when it has
 answered for long enough (roll_call.py).
+
+No status shows a goal that its server has not accepted yet. That it was sent is on its sender's
+record (ledger.py), and it is awaited: asked to cancel again and again, until it turns up, or has
+been denied for so long that it will not.
 """
 
 from __future__ import annotations
@@ -13,7 +17,8 @@ import contextlib
 import time
 import uuid
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from action_msgs.msg import GoalStatusArray
@@ -26,10 +31,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from unique_identifier_msgs.msg import UUID
 
+from bt_actions import ledger
+from bt_actions.goal import DENIED_FOR_GOOD
 from bt_actions.goal_ids import Author, author_of
-from bt_actions.goal_terms import ENDS
+from bt_actions.goal_terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
 from bt_actions.policy import End
-from bt_actions.roll_call import ASK_AGAIN, RollCall
+from bt_actions.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
 from bt_actions.ros.graph import servers
 from bt_actions.standstill import AT_MOST, STOOD_STILL, Standstill
 
@@ -40,6 +47,8 @@ GLANCE = 0.1
 """and, at least, between two looks at the graph, and for who is still alive."""
 LOOK_LONGEST = 30.0
 """Seconds for which servers may take to answer, in all: a ghost is shown for 20."""
+AWAIT_LONGEST = LOOK_LONGEST + DENIED_FOR_GOOD + 2 * SETTLE
+"""Seconds, in all, for which a goal is awaited that nobody has answered."""
 LOOK_AGAIN = 10.0
 """Seconds after which, at the latest, a participant that is not answered gives way to another."""
 DEPTH = 100
@@ -62,11 +71,21 @@ class LeftBehind:
     shown: End = End.UNKNOWN
     servers: int = 1
     asked_at: float = float("-inf")
+    awaited: bool = False
+    """It was sent, and no server has shown it yet."""
+    nothing_left: str = ""
+    """Why it is not awaited any more, though no server has told its end."""
+    denial: Denial = field(default_factory=Denial)
 
     @property
     def end(self) -> End:
         """How it ended, as far as is known."""
         return self.shown if self.servers <= 1 else End.UNKNOWN
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nobody runs it, nor will."""
+        return self.end is not End.UNKNOWN or bool(self.nothing_left)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +121,9 @@ def cleanup(
     """Cancel what dead orchestrators of this machine left; return it with its ends.
 
     Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
-    canceled to end. `found` is called with each at once, `sighted` with the name of each action of
-    which a server is in sight, and `elsewhere` with the action and the id of each unfinished goal
+    canceled to end. `found` is called with each at once, and again where it was `awaited` when it
+    turns up (in AWAIT_LONGEST seconds, at most); `sighted` with the name of each action of which a
+    server is in sight, and `elsewhere` with the action and the id of each unfinished goal
     of a bt_actions process on another machine, or in another container, of which nobody here can
     tell whether it is alive. The actions in `wanted`, whose relative names belong to `namespace`
     (None: all in sight), and those of goals that were found, are looked at until they are known,
@@ -210,18 +230,18 @@ class _Sight:
                     return
                 yield taken[0]
 
-    def answers(self) -> Iterator[int]:
-        """Take the answers that have come in, as the numbers of their questions.
+    def answers(self) -> Iterator[tuple[int, int]]:
+        """Take the answers that have come in: the number of the question, and the return code.
 
         rclpy's futures hear the first answer alone, where each server gives one.
         """
         handle = self._client.handle
         with handle:
             for _ in range(DEPTH):
-                header, _response = handle.take_response(CancelGoal.Response)
+                header, response = handle.take_response(CancelGoal.Response)
                 if header is None:
                     return
-                yield header.request_id.sequence_number
+                yield header.request_id.sequence_number, response.return_code
 
     def cancel(self, goal_id: bytes) -> int | None:
         """Ask all servers to cancel this goal; return the question's number, None: nobody hears."""
@@ -262,6 +282,8 @@ class _Sweep:
         self._foreign: set[bytes] = set()
         self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
         self._left: dict[bytes, LeftBehind] = {}
+        self._files: set[Path] = set()  # that were read
+        self._records: list[ledger.Sent] = []
 
     def begin(self, node: Node, wanted: Collection[str] | None) -> None:
         """Go on with what this node sees. Raises ValueError for a name that is none."""
@@ -269,16 +291,21 @@ class _Sweep:
         now = time.monotonic()
         if not self.has_begun:
             self._deadline = now + max(self._look, LOOK_LONGEST)
+            self._awaits_until = now + max(self._look, AWAIT_LONGEST)
         self.has_begun = True
         self._node = node
         self._domain = int(node.context.get_domain_id())
         self._wanted = None if wanted is None else frozenset(names)
         self._sights: dict[str, _Sight] = {}
         self._glanced_at = float("-inf")
+        self._questions: dict[tuple[str, int], LeftBehind] = {}
         for call in self._calls.values():
             call.begin(now)
+        for left in self._left.values():
+            left.denial.begin()
         for name in names:
             self._calls.setdefault(name, RollCall(now))
+        self._find()  # before the first status: one that tells an end comes once
 
     def goes_through(self, still: Standstill, *, breaks_off: bool) -> bool:
         """Look, cancel, and wait; return False where it `breaks_off`, for another participant.
@@ -297,14 +324,17 @@ class _Sweep:
                     until = max(until, now + held)
                 if now - last > STOOD_STILL:
                     self._deadline += now - last
+                    self._awaits_until += now - last
             self._turn(still)
             last = time.monotonic()  # its own work is no standstill
             lacks = self._lacks()
             looking = now < self._deadline and (now < until or bool(lacks))
-            if not looking and (self._over or now >= looked + self._patience):
+            awaiting = now < self._awaits_until and self._awaits
+            if not (looking or awaiting) and (self._over or now >= looked + self._patience):
                 break
-            if looking:
+            if looking or awaiting:
                 looked = now
+            if looking:
                 overdue = [name for name in lacks if self._calls[name].overdue(now)]
                 if now >= until:
                     self._says_that_it_waits_for(overdue)
@@ -324,6 +354,7 @@ class _Sweep:
         if (lacks := self._lacks()) and not self._stopped():
             self._missing(lacks, True)
         calls = sorted(self._calls.items())
+        ledger.strike(sent for sent in self._records if self._is_settled(sent))
         return Swept(
             left=list(self._left.values()),
             known=[name for name, call in calls if call.known],
@@ -345,10 +376,27 @@ class _Sweep:
         unknown = [action for action, call in sorted(self._calls.items()) if not call.known]
         return [action for action in unknown if self._requires(action)]
 
+    def _is_settled(self, sent: ledger.Sent) -> bool:
+        """Whether nobody need look for it again: it is over, or in a status, or looked for in vain.
+
+        Its server has been out of sight for longer then than it may take to accept a goal.
+        """
+        left = self._left[sent.goal_id]
+        in_vain = not self._calls[left.action].sighted and not self._stopped()
+        return left.is_over or not left.awaited or in_vain
+
     @property
     def _over(self) -> bool:
         """Whether every goal that was found has ended."""
-        return all(goal.end is not End.UNKNOWN for goal in self._left.values())
+        return all(goal.is_over for goal in self._left.values())
+
+    @property
+    def _awaits(self) -> bool:
+        """Whether a goal may turn up yet at a server in sight."""
+        return any(
+            left.awaited and not left.is_over and self._calls[left.action].sighted
+            for left in self._left.values()
+        )
 
     def _turn(self, still: Standstill) -> None:
         """Take all that has come in, then look around, and ask."""
@@ -374,8 +422,18 @@ class _Sweep:
         self._cancel(now)
 
     def _hear(self, action: str, sight: _Sight) -> None:
-        for number in sight.answers():
-            self._calls[action].answered(number, time.monotonic())
+        for number, code in sight.answers():
+            now = time.monotonic()
+            self._calls[action].answered(number, now)
+            left = self._questions.get((action, number))
+            if left is None:
+                continue
+            if code not in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
+                self._turns_up(left)
+            elif code == CANCEL_TERMINATED and len(self._calls[action].servers) <= 1:
+                left.nothing_left = "has ended"
+            else:
+                left.denial.denied(number, now)
 
     def _glance(self, now: float) -> None:
         """See which actions are in sight, and how many servers each has."""
@@ -398,6 +456,7 @@ class _Sweep:
             left = self._left.get(goal_id)
             if left is not None:
                 left.shown = ENDS.get(entry.status, End.UNKNOWN)
+                self._turns_up(left)
             elif not ended:
                 self._meet(action, goal_id)
             elif one_server:
@@ -422,17 +481,49 @@ class _Sweep:
                 del self._minded[goal_id]
                 left = self._left[goal_id] = LeftBehind(action, goal_id, author.pid)
                 self._found(left)
+        for path, goals in ledger.left_behind(self._files):
+            self._files.add(path)
+            for sent in goals:
+                if sent.domain == self._domain:
+                    self._await(sent)
         for left in self._left.values():
             left.servers = len(self._calls[left.action].servers)
+            if left.awaited and left.denial.for_good:
+                left.nothing_left = f"denied for {DENIED_FOR_GOOD:g} s"
+        for sent in self._records:
+            left, call = self._left[sent.goal_id], self._calls[sent.action]
+            gone = call.known and sent.servers and not sent.servers & call.servers
+            if left.awaited and gone:
+                left.nothing_left = "its server is gone"
+
+    def _await(self, sent: ledger.Sent) -> None:
+        self._records.append(sent)
+        if sent.goal_id in self._left:
+            return
+        self._calls.setdefault(sent.action, RollCall(time.monotonic()))
+        left = LeftBehind(sent.action, sent.goal_id, sent.pid, awaited=True)
+        self._left[sent.goal_id] = left
+        self._found(left)
+
+    def _turns_up(self, left: LeftBehind) -> None:
+        """A server has it: it tells the end in a status."""
+        if left.awaited:
+            left.awaited, left.nothing_left, left.asked_at = False, "", float("-inf")
+            if left.end is End.UNKNOWN:
+                self._found(left)
 
     def _cancel(self, now: float) -> None:
         """Ask the servers to cancel what has not ended, again every second."""
         due: dict[str, list[LeftBehind]] = {}
         for left in self._left.values():
-            if left.end is End.UNKNOWN and now - left.asked_at >= ASK_AGAIN:
+            if not left.is_over and now - left.asked_at >= ASK_AGAIN:
                 due.setdefault(left.action, []).append(left)
         for action, goals in due.items():
             sight = self._sights.get(action)
             for left in sorted(goals, key=lambda goal: goal.asked_at)[:CANCELS_A_TURN]:
-                if sight is not None and sight.cancel(left.goal_id) is not None:
+                question = None if sight is None else sight.cancel(left.goal_id)
+                if question is not None:
                     left.asked_at = now
+                    if left.awaited:
+                        self._questions[action, question] = left
+                        left.denial.asked(question, self._calls[action].servers, now)

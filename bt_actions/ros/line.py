@@ -30,7 +30,7 @@ from bt_actions.ros.alive import is_valid
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.past import Past
-from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, lock
+from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, ledger, lock
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.standstill import ANSWERS_TAKE_IN_ALL
@@ -296,6 +296,8 @@ class Line:
             self._tell_who_waits()
         for command in commands:
             self._carry_out(ticket, command, message)
+        if goal.accepted or (goal.state is State.DONE and goal.end is not End.UNKNOWN):
+            ledger.strike(goal.id)
         if goal.state is State.DONE:
             self.close_book(ticket)
         due = goal.due_in(now)
@@ -317,9 +319,13 @@ class Line:
         try:
             if command is Command.SEND:
                 ticket.testimony.sent(self.watch)
+                self._put_on_record(ticket)
                 self.client.send(goal.id, message)
+                known = ticket.testimony.sent_to
                 self.see()
                 ticket.testimony.sent(self.watch)  # who opened since got it, too
+                if ticket.testimony.sent_to != known:
+                    self._put_on_record(ticket)
             elif command is Command.ASK_RESULT:
                 self.client.ask_result(goal.id)
             elif goal.state is State.DONE:  # and nothing is sent after that
@@ -331,6 +337,11 @@ class Line:
                 self.tell(ticket, Event.SEND_FAILED, error)
             else:
                 self._warn_once(f"{command.name} could not be sent", error)
+
+    def _put_on_record(self, ticket: Ticket) -> None:
+        ledger.enter(
+            ticket.goal.id, self.name, self.traffic.domain.number, ticket.testimony.sent_to
+        )
 
     def _tell_who_waits(self) -> None:
         """Wake those of all nodes whose goals a change here may have let go on."""
@@ -504,6 +515,8 @@ class Line:
                 self.tell(ticket, Event.LEFT)
             if goal.lost:
                 ticket.look_out_left = 0.0  # nobody does from now on
+                if ticket.accounted_for:
+                    ledger.strike(goal.id)
                 self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
                 self.close_book(ticket)
 

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import State
+from bt_actions.ledger import Ledger
 from bt_actions.policy import End, Outcome
 from bt_actions.resources import Resources
 from bt_actions.ros.cancels import Cancels
+from bt_actions.ros.log import log
 from bt_actions.standstill import Leniency
 from bt_actions.testimony import Testimony
 
@@ -31,6 +33,8 @@ FEEDBACK_KEPT = 100
 lock = threading.RLock()
 changed = threading.Condition(lock)
 """Notified at every change of any goal."""
+ledger = Ledger(log.warning)
+"""What was sent and is not answered yet, for `cleanup`, should this process be killed."""
 LOOKED_OUT_FOR = 3.0
 """Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
 went away: one that only stood still goes on with its goal. Once for each goal."""
@@ -96,6 +100,7 @@ def disown() -> None:
     generation += 1
     lock._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001 - as threading itself does
     _domains.clear()
+    ledger.disown()
 
 
 class Beginner(Protocol):

@@ -36,7 +36,16 @@ from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.draining import drain
 from bt_actions.ros.line import Line
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import Beginner, Change, Observer, Ticket, changed, domain_of, lock
+from bt_actions.ros.shared import (
+    Beginner,
+    Change,
+    Observer,
+    Ticket,
+    changed,
+    domain_of,
+    ledger,
+    lock,
+)
 from bt_actions.ros.signals import ended_by_signals, insists
 from bt_actions.server import Server
 
@@ -330,6 +339,7 @@ class Traffic:
                 line.close()
                 alarm.forget(line)
             setattr(self.node, _ON_NODE, None)
+            ledger.close()
 
 
 def _who_begins() -> Beginner | None:
@@ -362,6 +372,11 @@ def close_process() -> None:
             for ticket in left:
                 if not ticket.is_over:
                     log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
+            with lock:
+                for ticket in tickets:
+                    if ticket.accounted_for:
+                        ledger.strike(ticket.goal.id)
+                ledger.close()
             log.flush()
 
 

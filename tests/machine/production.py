@@ -140,6 +140,14 @@ class Silence:
     info = warning = error
 
 
+class NoLedger:
+    """The record of what is sent, which nobody reads."""
+
+    def enter(self, *entry: Any) -> None: ...
+
+    strike = enter
+
+
 class Context:
     """What Traffic asks of a context."""
 
@@ -519,6 +527,10 @@ def installed() -> Iterator[None]:
     def fail(of_what: Line, what: str, error: Exception) -> None:
         raise error
 
+    def appears() -> None:
+        alarm.standstill.lives(now().moment())
+        alarm.standstill.rests(now().moment())
+
     patches: list[tuple[Any, str, Any]] = [
         (line, "time", ModelTime),
         (past, "time", ModelTime),
@@ -543,6 +555,8 @@ def installed() -> Iterator[None]:
         (alarm, "standstill", Standstill()),
         (alarm, "_open", set()),
         (alarm, "mind", lambda each: alarm._open.add(each)),
+        (alarm, "appears", appears),
+        (line, "ledger", NoLedger()),
         (shared, "_domains", {}),
         (shared.Ticket, "__post_init__", post_init),
         (Goal, "on", told),

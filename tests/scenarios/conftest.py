@@ -102,6 +102,14 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         write(Path(path), session.config.stash[_RECORDS])
 
 
+@pytest.fixture(autouse=True)
+def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The records of what is sent (bt_actions/ledger.py), of this scenario's programs alone."""
+    directory = tmp_path / "ledger"
+    monkeypatch.setenv("BT_ACTIONS_LEDGER", str(directory))
+    return directory
+
+
 @pytest.fixture
 def launch(domain: int, no_leaks: None) -> Iterator[Launch]:
     """Start `bt-actions` with some arguments as a process of its own; see Process for the rest."""

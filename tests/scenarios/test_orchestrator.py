@@ -109,6 +109,7 @@ def test_a_signal_ends_the_run_and_every_goal_first(
     serve: Serve,
     tree: Tree,
     name: str,
+    ledger: Path,
     record: Record,
 ) -> None:
     """The signal named, in the phase named"""
@@ -117,6 +118,7 @@ def test_a_signal_ends_the_run_and_every_goal_first(
     assert run.wait() == NUMBERS[number], run
     record.took(time.monotonic() - sent, ACCEPT + CANCEL + 1.0)
     assert not any("Traceback" in line for line in run.errors), run
+    assert list(ledger.glob("*")) == [], "all that was sent has been answered"
     if journal is not None:
         assert journal.ends() == ENDS[phase]
         assert journal.max_live <= 1
@@ -465,7 +467,13 @@ def test_a_wall_clock_that_jumps_by_an_hour_moves_no_deadline(
 
 
 def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
-    launch: Launch, serve: Serve, tree: Tree, name: str, node: Any, record: Record
+    launch: Launch,
+    serve: Serve,
+    tree: Tree,
+    name: str,
+    node: Any,
+    ledger: Path,
+    record: Record,
 ) -> None:
     """SIGKILL to the orchestrator; goals of two other clients run on the same server; cleanup"""
     from rclpy.action import ActionClient
@@ -485,6 +493,8 @@ def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
         journal.wait_for("accepted", times=3)
         run.send(signal.SIGKILL)
         run.wait()
+        [path] = [path for path in ledger.iterdir() if f"{run.pid:08x}" in path.name]
+        assert path.read_bytes().strip() == b"", "it has been answered, and its server shows it"
         assert holds_for(lambda: journal.ends() == [None] * 3, 0.5)
         assert journal.count("cancel_requested") == 0, "a killed client can cancel nothing"
         received = {e.goal for e in journal.entries() if e.event == "received"}

@@ -16,9 +16,9 @@ from tests.support.reliability import Record
 
 MEMORY = 0.05
 """MB that a cycle may hold on to: a tenth of what one leaked thread or context holds."""
-AT_RANDOM = 5.0
-"""MB by which a process grows in some runs, once (4.7 measured): what it discovers of others, say,
-or a second participant where its server did not answer for two seconds."""
+AT_RANDOM = 2
+"""Cycles, those that added most, that are not counted: a process grows by up to 8 MB in some runs,
+once (a second participant, say, where its server did not answer for two seconds)."""
 
 
 @pytest.mark.timeout(600)
@@ -37,8 +37,8 @@ def test_cycles_in_one_process_leave_nothing(
     assert program.lines[:-1] == []
     assert after["threads"] == warm["threads"]
     assert after["files"] <= warm["files"]
-    grown = after["memory"] - warm["memory"]
-    assert grown < AT_RANDOM + MEMORY * cycles, f"{grown:.2f} MB"
+    grown = sum(sorted(told["grown"])[:-AT_RANDOM])
+    assert grown < MEMORY * cycles, f"{grown:.2f} MB: {told['grown']}"
     assert told["longest"] < 30.0
     record.took(time.monotonic() - began)
     record.shows = "nothing was sent" if how == "interrupted" else f"{cycles} goals succeeded"

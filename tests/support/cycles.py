@@ -1,13 +1,14 @@
 """A program that sets up, runs and shuts down again and again. ``python -m … HOW CYCLES``.
 
-Prints a line of JSON with what the process holds after a quarter of the cycles, and after all.
-Whatever else it prints is a complaint.
+Prints a line of JSON with what the process holds after a quarter of the cycles, and after all, and
+how much memory each cycle in between has added. Whatever else it prints is a complaint.
 """
 
 from __future__ import annotations
 
 import faulthandler
 import gc
+import itertools
 import json
 import sys
 import threading
@@ -125,17 +126,21 @@ def main() -> None:
     user = User() if how == "user" else None
     alone = interrupted if how == "interrupted" else on_a_node_of_its_own
     one: Callable[[int], None] = user.cycle if user else alone
-    told = []
+    warm = None
+    memory: list[float] = []
     longest = 0.0
     for cycle in range(1, cycles + 1):
         began = time.monotonic()
         one(cycle)
         longest = max(longest, time.monotonic() - began)
-        if cycle in (cycles // 4, cycles):
-            told.append(held())
+        if cycle >= cycles // 4:
+            after = held()
+            warm = warm or after
+            memory.append(after["memory"])
     if user:
         user.close()
-    print(json.dumps({"warm": told[0], "after": told[1], "longest": longest}))
+    grown = [later - sooner for sooner, later in itertools.pairwise(memory)]
+    print(json.dumps({"warm": warm, "after": after, "grown": grown, "longest": longest}))
 
 
 if __name__ == "__main__":

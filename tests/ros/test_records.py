@@ -1,0 +1,104 @@
+"""What is on record of a goal (bt_actions/ledger.py): from before it is sent until its answer."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import pytest
+
+from bt_actions import MoveRobot, TreeRunner
+from bt_actions.goal_terms import Event
+from bt_actions.ros import line as module
+from bt_actions.ros.shared import lock
+from bt_actions.ros.traffic import Traffic
+from tests.support.trees import state
+from tests.support.waiting import until
+
+
+class Recorder:
+    """In place of the ledger: tells what was done to it, and what was on its way by then."""
+
+    def __init__(self) -> None:
+        self.open: dict[bytes, tuple[str, int, frozenset[bytes]]] = {}
+        self.entered: list[bytes] = []
+
+    def enter(self, goal_id: bytes, action: str, domain: int, servers: Collection[bytes]) -> None:
+        self.entered.append(goal_id)
+        self.open[goal_id] = action, domain, frozenset(servers)
+
+    def strike(self, goal_id: bytes) -> None:
+        self.open.pop(goal_id, None)
+
+
+@pytest.fixture
+def ledger(monkeypatch: pytest.MonkeyPatch) -> Recorder:
+    recorder = Recorder()
+    monkeypatch.setattr(module, "ledger", recorder)
+    return recorder
+
+
+def test_a_goal_is_on_record_until_it_is_accepted(
+    serve: Any, name: str, node: Any, ledger: Recorder
+) -> None:
+    journal = serve("1:delay_accept=1")
+    leaf = MoveRobot("m", 0.5, action_name=name)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        goal = journal.wait_for("received").goal
+        [(goal_id, (action, domain, servers))] = ledger.open.items()
+        assert (goal_id.hex(), action, domain) == (goal, name, node.context.get_domain_id())
+        assert len(servers) == 1
+        until(lambda: state(leaf) == "EXECUTING")
+        assert ledger.open == {}
+
+
+def test_it_is_on_record_before_it_is_sent(
+    serve: Any, name: str, run: Any, ledger: Recorder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serve()
+    seen: list[bool] = []
+    real = module.ActionClient.send
+
+    def send(client: Any, goal_id: bytes, goal: Any) -> None:
+        seen.append(goal_id in ledger.open)
+        real(client, goal_id, goal)
+
+    monkeypatch.setattr(module.ActionClient, "send", send)
+    run(MoveRobot("m", 0.1, action_name=name))
+    assert seen == [True]
+
+
+def test_a_refusal_takes_it_off(serve: Any, name: str, run: Any, ledger: Recorder) -> None:
+    serve("1:reject")
+    run(MoveRobot("m", 0.1, action_name=name))
+    assert ledger.open == {}
+    assert len(ledger.entered) == 1
+
+
+def test_what_could_not_be_sent_is_taken_off(
+    serve: Any, name: str, run: Any, ledger: Recorder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serve()
+
+    def send(*_: Any) -> None:
+        raise RuntimeError("no")
+
+    monkeypatch.setattr(module.ActionClient, "send", send)
+    run(MoveRobot("m", 0.1, action_name=name))
+    assert ledger.open == {}
+    assert len(ledger.entered) == 1
+
+
+def test_what_is_not_accounted_for_stays(
+    serve: Any, name: str, node: Any, ledger: Recorder
+) -> None:
+    journal = serve("1:delay_accept=1")
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        goal = journal.wait_for("received").goal
+        with lock:
+            [ticket] = Traffic.of(node).line(leaf.action_type, name).goals.values()
+            ticket.line.tell(ticket, Event.CLOSED)
+        assert [goal_id.hex() for goal_id in ledger.open] == [goal]

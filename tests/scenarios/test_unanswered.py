@@ -1,0 +1,169 @@
+"""Unanswered: a run is gone, and its server has its goal without having accepted it.
+
+No status tells of such a goal; what its sender had on record does (bt_actions/ledger.py).
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.scenarios.conftest import Launch
+from tests.support.processes import HostFactory, Journal, Process
+from tests.support.reliability import Record
+from tests.support.waiting import until
+
+Serve = Callable[..., Journal]
+Tree = Callable[..., Path]
+
+DELAY = 12.0
+"""Seconds that a server here takes to accept: longer than all that cleanup waits for otherwise."""
+
+
+def received(launch: Launch, journal: Journal, path: Path, how: signal.Signals) -> Process:
+    """Send a goal, and end the run as soon as its server has it: by SIGINT twice, or SIGKILL."""
+    run = launch("run", str(path))
+    journal.wait_for("received")
+    run.line("sending a goal to")
+    run.send(how)
+    if how is signal.SIGINT:
+        time.sleep(0.5)  # or it would be the same wish
+        run.send(how)
+    run.wait()
+    assert journal.count("accepted") == 0
+    return run
+
+
+def canceled_at_once(journal: Journal) -> None:
+    """See that the first goal was canceled within the second in which it is asked again."""
+    accepted, canceled = (journal.wait_for(event).t for event in ("accepted", "canceled"))
+    assert canceled - accepted < 2.0
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        pytest.param(signal.SIGKILL, id="SIGKILL"),
+        pytest.param(signal.SIGINT, id="SIGINT twice", marks=pytest.mark.chaos),
+    ],
+)
+def test_cleanup_awaits_what_its_server_has_not_accepted_yet(
+    how: signal.Signals, launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
+) -> None:
+    """The run ends by the signal named while its server decides for 12 s; then cleanup"""
+    journal = serve(f"1:delay_accept={DELAY:g}")
+    received(launch, journal, tree(name, distance=90.0), how)
+    began = time.monotonic()
+    cleanup = launch("cleanup")
+    assert cleanup.wait(60.0) == 0, cleanup
+    record.took(time.monotonic() - began, DELAY + 5.0)
+    assert journal.ends() == ["canceled"]
+    canceled_at_once(journal)
+    assert [line.split()[-1] for line in cleanup.lines] == ["CANCELED"], cleanup
+    assert "that was not answered: waiting up to 30 s" in "\n".join(cleanup.errors), cleanup
+    again = launch("cleanup")
+    assert again.wait() == 0, again
+    assert "nothing is left" in "\n".join(again.lines), again
+    record.outcome = "awaited, then CANCELED; exit code 0; a second cleanup finds nothing"
+
+
+def test_cleanup_first_awaits_it_before_the_tree_starts(
+    launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
+) -> None:
+    """SIGKILL to the run while its server decides for 12 s; then `run --cleanup-first`"""
+    journal = serve(f"1:delay_accept={DELAY:g}")
+    received(launch, journal, tree(name, distance=90.0), signal.SIGKILL)
+    again = launch("run", str(tree(name, distance=0.5)), "--cleanup-first")
+    assert again.wait(60.0) == 0, again
+    assert journal.ends() == ["canceled", "succeeded"]
+    assert journal.max_live == 1
+    record.outcome = "the old goal CANCELED, then the new one SUCCEEDED; exit code 0"
+
+
+def test_cleanup_that_is_stopped_leaves_the_record_to_the_next(
+    launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
+) -> None:
+    """SIGKILL to the run; cleanup, SIGINT while it waits; and cleanup again"""
+    journal = serve(f"1:delay_accept={DELAY:g}")
+    received(launch, journal, tree(name, distance=90.0), signal.SIGKILL)
+    first = launch("cleanup")
+    until(lambda: "was not answered" in "\n".join(first.errors), 20.0, what="it waits")
+    first.send(signal.SIGINT)
+    assert first.wait() == 3, first
+    second = launch("cleanup")
+    assert second.wait(60.0) == 0, second
+    assert journal.ends() == ["canceled"]
+    record.outcome = "the first: exit code 3; the second: CANCELED, exit code 0"
+
+
+@pytest.mark.chaos
+def test_cleanup_gives_up_a_goal_that_its_server_denies_for_good(
+    launch: Launch, serve: Serve, tree: Tree, name: str, ledger: Path, record: Record
+) -> None:
+    """SIGKILL to the run; its server refuses the goal, which nobody hears; then cleanup"""
+    journal = serve("1:delay_accept=2", "1:reject")
+    received(launch, journal, tree(name, distance=90.0), signal.SIGKILL)
+    cleanup = launch("cleanup")
+    assert cleanup.wait(90.0) == 0, cleanup
+    assert [line.split("  ")[-1] for line in cleanup.lines] == ["denied for 30 s"], cleanup
+    assert list(ledger.iterdir()) == []
+    record.outcome = "exit code 0 after 30 s"
+
+
+def test_a_server_that_was_restarted_has_nothing_to_await(
+    launch: Launch, new_host: HostFactory, tree: Tree, name: str, ledger: Path, record: Record
+) -> None:
+    """SIGKILL to the run and to its server, which is started again; then cleanup"""
+    host = new_host()
+    received(launch, host.open(name, "1:delay_accept=60"), tree(name), signal.SIGKILL)
+    host.kill()
+    journal = new_host().open(name)
+    began = time.monotonic()
+    cleanup = launch("cleanup", name)
+    assert cleanup.wait(60.0) == 0, cleanup
+    record.took(time.monotonic() - began, 15.0)
+    assert [line.split("  ")[-1] for line in cleanup.lines] == ["its server is gone"], cleanup
+    assert list(ledger.iterdir()) == []
+    assert journal.count("received") == 1
+    record.outcome = "its server is gone; exit code 0"
+
+
+@pytest.mark.chaos
+def test_cleanup_looks_for_the_server_of_what_was_not_answered(
+    launch: Launch, new_host: HostFactory, tree: Tree, name: str, domain: int, record: Record
+) -> None:
+    """SIGKILL to the run and to its server; cleanup beside another server; cleanup again"""
+    host = new_host()
+    received(launch, host.open(name, "1:delay_accept=60"), tree(name), signal.SIGKILL)
+    host.kill()
+    new_host().open(f"{name}/another")
+    cleanup = launch("cleanup")
+    assert cleanup.wait(60.0) == 3, cleanup
+    assert f"no server of {name} answers" in "\n".join(cleanup.errors), cleanup
+    again = launch("cleanup")
+    assert again.wait(60.0) == 0, again
+    record.outcome = "exit code 3, once: its server is not in sight"
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [b"", b"\0" * 5000, b"{" * 3000, b'{"goal": 3}'.ljust(1023) + b"\n", b"\xff" * 100_000],
+    ids=["empty", "zeros", "braces", "a number", "long"],
+)
+def test_a_spoilt_record_harms_nobody(
+    spoilt: bytes, ledger: Path, serve: Serve, domain: int, record: Record
+) -> None:
+    """A record of a dead process with other bytes in it"""
+    from bt_actions.goal_ids import new_goal_id
+    from bt_actions.ros.cleanup import cleanup
+
+    serve()
+    ledger.mkdir(mode=0o700)
+    dead = new_goal_id()[:6] + (2**22 + 1).to_bytes(4, "big") + b"\1\1"
+    (ledger / f"{dead.hex()}.goals").write_bytes(spoilt)
+    assert cleanup(look=0.5, patience=0.5).left == []
+    record.outcome = "nothing is found"

@@ -1,0 +1,286 @@
+"""The record of what was sent and is not answered yet."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bt_actions import ledger as module
+from bt_actions.goal_ids import new_goal_id
+from bt_actions.ledger import KEPT_FOR, LENGTH, LINES_AT_MOST, Ledger, Sent, left_behind, strike
+
+SERVERS = frozenset({b"a" * 16, b"b" * 16})
+LEAVES = """
+import os, sys
+from bt_actions.goal_ids import new_goal_id
+from bt_actions.ledger import Ledger
+ledger, ids = Ledger(print), [new_goal_id() for _ in range(4)]
+for number, goal_id in enumerate(ids):
+    ledger.enter(goal_id, f"/robot_{number}/move", number, [b"a" * 16])
+ledger.strike(ids[1])
+print(*(goal_id.hex() for goal_id in ids), flush=True)
+os._exit(1)
+"""
+"""A process that is gone while three of its four goals are without an answer."""
+
+
+@pytest.fixture(autouse=True)
+def directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the records are."""
+    path = tmp_path / "records" / "here"
+    monkeypatch.setenv(module.DIRECTORY, str(path))
+    return path
+
+
+@pytest.fixture
+def complaints() -> list[str]:
+    """What the ledger complains of."""
+    return []
+
+
+@pytest.fixture
+def ledger(complaints: list[str]) -> Iterator[Ledger]:
+    """This process's."""
+    ours = Ledger(complaints.append)
+    yield ours
+    ours.disown()
+
+
+def die() -> list[str]:
+    """Run LEAVES; return the ids of its goals."""
+    gone = subprocess.run([sys.executable, "-c", LEAVES], capture_output=True, text=True)
+    assert gone.returncode == 1, gone.stderr
+    return gone.stdout.split()
+
+
+def found() -> list[Sent]:
+    """All that the dead have left."""
+    return [sent for _, goals in left_behind() for sent in goals]
+
+
+def lines(directory: Path) -> list[bytes]:
+    """What is in the only file."""
+    (path,) = directory.iterdir()
+    return path.read_bytes().split()
+
+
+def test_what_a_dead_process_left_is_found(directory: Path) -> None:
+    ids = die()
+    seen = [(sent.goal_id.hex(), sent.action, sent.domain, sent.servers) for sent in found()]
+    servers = frozenset({b"a" * 16})
+    assert seen == [(ids[n], f"/robot_{n}/move", n, servers) for n in (0, 2, 3)]
+    assert {sent.pid for sent in found()} == {int(ids[0][12:20], 16)}
+
+
+def test_what_is_struck_is_not_found_again_and_the_last_takes_the_file_away(
+    directory: Path,
+) -> None:
+    ids = die()
+    first, *others = found()
+    strike([first])
+    assert [sent.goal_id.hex() for sent in found()] == [ids[2], ids[3]]
+    strike(others)
+    assert list(directory.iterdir()) == []
+
+
+def test_a_file_is_passed_over() -> None:
+    die()
+    ((path, _),) = left_behind()
+    assert list(left_behind({path})) == []
+
+
+def test_nothing_is_found_of_who_is_alive(ledger: Ledger, directory: Path) -> None:
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert len(list(directory.iterdir())) == 1
+    assert found() == []
+
+
+def test_an_answer_blanks_the_line_which_the_next_goal_gets(
+    ledger: Ledger, directory: Path
+) -> None:
+    first, second, third = (new_goal_id() for _ in range(3))
+    ledger.enter(first, "/move", 0, SERVERS)
+    ledger.enter(second, "/move", 0, SERVERS)
+    ledger.strike(first)
+    ledger.enter(third, "/move", 0, SERVERS)
+    (path,) = directory.iterdir()
+    assert path.stat().st_size == 2 * LENGTH
+    entries = [json.loads(line)["goal"] for line in path.read_text().splitlines()]
+    assert entries == [third.hex(), second.hex()]
+
+
+def test_what_more_is_known_of_a_goal_takes_its_line(ledger: Ledger, directory: Path) -> None:
+    goal_id = new_goal_id()
+    ledger.enter(goal_id, "/move", 0, [])
+    ledger.enter(goal_id, "/move", 0, SERVERS)
+    (path,) = directory.iterdir()
+    (line,) = path.read_text().splitlines()
+    assert json.loads(line)["servers"] == ["61" * 16, "62" * 16]
+
+
+def test_the_file_goes_when_nothing_is_on_record(ledger: Ledger, directory: Path) -> None:
+    goal_id = new_goal_id()
+    ledger.enter(goal_id, "/move", 0, SERVERS)
+    ledger.close()
+    assert len(list(directory.iterdir())) == 1, "there is an open goal"
+    ledger.strike(goal_id)
+    ledger.close()
+    assert list(directory.iterdir()) == []
+    ledger.enter(goal_id, "/move", 0, SERVERS)
+    assert len(list(directory.iterdir())) == 1
+
+
+def test_the_child_of_a_fork_leaves_its_parents_file_alone(ledger: Ledger, directory: Path) -> None:
+    goal_id = new_goal_id()
+    ledger.enter(goal_id, "/move", 0, SERVERS)
+    child = os.fork()
+    if not child:
+        ledger.disown()
+        ledger.strike(goal_id)
+        ledger.close()
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    assert lines(directory)
+    ledger.strike(goal_id)
+    assert not lines(directory)
+
+
+def test_a_goal_of_the_child_has_a_file_of_its_own(ledger: Ledger, directory: Path) -> None:
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    child = os.fork()
+    if not child:
+        ledger.disown()
+        ledger.enter(new_goal_id(), "/child", 0, SERVERS)
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert [sent.action for sent in found()] == ["/child"]
+
+
+def test_no_more_than_so_many_are_on_record(
+    ledger: Ledger, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LINES_AT_MOST", 2)
+    ids = [new_goal_id() for _ in range(3)]
+    for goal_id in ids:
+        ledger.enter(goal_id, "/move", 0, SERVERS)
+    assert len(lines_of(directory)) == 2
+    ledger.strike(ids[2])
+    ledger.strike(ids[0])
+    assert len(lines_of(directory)) == 1
+
+
+def lines_of(directory: Path) -> list[str]:
+    """The lines of the only file that are not blank."""
+    (path,) = directory.iterdir()
+    text = path.read_text()
+    return [text[at : at + LENGTH] for at in range(0, len(text), LENGTH) if text[at] == "{"]
+
+
+def test_without_room_it_complains_once_and_the_goal_goes_on(
+    ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module.os, "pwrite", lambda *_: 100)
+    for _ in range(3):
+        ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    (complaint,) = complaints
+    assert "No space left on device" in complaint
+
+
+@pytest.mark.parametrize("obstacle", ["a file", "a link", "open to others"])
+def test_a_directory_that_others_may_have_made_is_not_used(
+    obstacle: str, ledger: Ledger, complaints: list[str], directory: Path, tmp_path: Path
+) -> None:
+    directory.parent.mkdir()
+    if obstacle == "a file":
+        directory.touch()
+    elif obstacle == "a link":
+        (tmp_path / "elsewhere").mkdir()
+        directory.symlink_to(tmp_path / "elsewhere")
+    else:
+        directory.mkdir()
+        directory.chmod(0o777)
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert len(complaints) == 1
+    assert found() == []
+    if directory.is_dir():
+        assert list(directory.iterdir()) == []
+
+
+GOAL = "@"
+"""Stands for a goal id of the dead process."""
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "nonsense",
+        "[" * 1000,
+        '"@"',
+        "[]",
+        '{"goal": "@"}',
+        '{"goal": 3, "domain": 0, "action": "/a", "servers": []}',
+        '{"goal": "@", "domain": "0", "action": "/a", "servers": []}',
+        '{"goal": "@", "domain": true, "action": "/a", "servers": []}',
+        '{"goal": "@", "domain": 0, "action": "a", "servers": []}',
+        '{"goal": "@", "domain": 0, "action": "/a\\n", "servers": []}',
+        '{"goal": "@", "domain": 0, "action": "/\\u001b[2J", "servers": []}',
+        '{"goal": "@", "domain": 0, "action": ["/a"], "servers": []}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": 3}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": ["x"]}',
+        '{"goal": "@00", "domain": 0, "action": "/a", "servers": []}',
+        '{"goal": "00000000000000000000000000000000", "domain": 0, "action": "/a", "servers": []}',
+    ],
+)
+def test_what_is_damaged_is_skipped(entry: str, directory: Path) -> None:
+    ids = die()
+    (path,) = directory.iterdir()
+    good = path.read_bytes()[2 * LENGTH : 3 * LENGTH]
+    bad = entry.replace(GOAL, ids[0]).encode().ljust(LENGTH)
+    path.write_bytes(bad + good)
+    assert [sent.goal_id.hex() for sent in found()] == [ids[2]]
+
+
+def test_no_more_is_read_than_is_ever_written(directory: Path) -> None:
+    die()
+    (path,) = directory.iterdir()
+    good = path.read_bytes()[:LENGTH]
+    path.write_bytes(good * (LINES_AT_MOST + 10))
+    assert len(found()) == LINES_AT_MOST
+
+
+def test_what_is_no_file_of_ours_is_not_opened(directory: Path, tmp_path: Path) -> None:
+    die()
+    (path,) = directory.iterdir()
+    text = path.read_bytes()
+    path.unlink()
+    (tmp_path / "elsewhere").write_bytes(text)
+    path.symlink_to(tmp_path / "elsewhere")
+    os.mkfifo(directory / f"{path.stem[:-1]}0.goals")
+    (directory / "nonsense.goals").write_bytes(text)
+    (directory / "00.goals").write_bytes(text)
+    assert found() == []
+
+
+def test_the_next_process_removes_what_is_over_and_what_nobody_wants(
+    ledger: Ledger, directory: Path
+) -> None:
+    die()
+    (old,) = directory.iterdir()
+    past = time.time() - KEPT_FOR - 1.0
+    os.utime(old, (past, past))
+    die()
+    (recent,) = set(directory.iterdir()) - {old}
+    assert not old.exists()
+    empty = recent.with_stem(recent.stem[:-1] + ("0" if recent.stem[-1] != "0" else "1"))
+    empty.write_bytes(b" " * LENGTH)
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert recent.exists()
+    assert not empty.exists()
