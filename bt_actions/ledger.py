@@ -57,6 +57,8 @@ class Sent:
     """ROS domain id."""
     servers: frozenset[bytes]
     """GIDs of the servers that were in sight; none where they are not known."""
+    lost: bool
+    """They had gone, as far as its sender knew; that may be wrong where a link was cut."""
     pid: int
     path: Path
     line: int
@@ -77,7 +79,19 @@ class Ledger:
         self._lines: dict[bytes, int] = {}
         self._blank: list[int] = []
 
-    def enter(self, goal_id: bytes, action: str, domain: int, servers: Collection[bytes]) -> None:
+    def __contains__(self, goal_id: bytes) -> bool:
+        """Whether a goal is on record."""
+        return goal_id in self._lines
+
+    def enter(
+        self,
+        goal_id: bytes,
+        action: str,
+        domain: int,
+        servers: Collection[bytes],
+        *,
+        lost: bool = False,
+    ) -> None:
         """Put a goal on record that is about to be sent, or what more is known of it."""
         if goal_id[:_PREFIX] != self._prefix:
             self._open(goal_id[:_PREFIX])
@@ -89,7 +103,13 @@ class Ledger:
             if line >= LINES_AT_MOST:
                 return
         known = sorted(each.hex() for each in servers) if len(servers) <= SERVERS_AT_MOST else []
-        entry = {"goal": goal_id.hex(), "domain": domain, "action": action, "servers": known}
+        entry = {
+            "goal": goal_id.hex(),
+            "domain": domain,
+            "action": action,
+            "servers": known,
+            "lost": lost,
+        }
         text = json.dumps(entry).encode().ljust(LENGTH - 1) + b"\n"
         self._lines[goal_id] = line
         try:
@@ -229,6 +249,7 @@ def _parse(path: Path, number: int, line: bytes) -> Sent | None:
         entry = json.loads(line)
         goal_id, action, domain = bytes.fromhex(entry["goal"]), entry["action"], entry["domain"]
         servers = frozenset(bytes.fromhex(each) for each in entry["servers"])
+        lost = entry["lost"]
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
     author = author_of(goal_id)
@@ -236,9 +257,9 @@ def _parse(path: Path, number: int, line: bytes) -> Sent | None:
         return None
     if not isinstance(action, str) or not _NAME.fullmatch(action) or len(action) > _NAME_AT_MOST:
         return None
-    if type(domain) is not int:
+    if type(domain) is not int or type(lost) is not bool:
         return None
-    return Sent(goal_id, action, domain, servers, author.pid, path, number)
+    return Sent(goal_id, action, domain, servers, lost, author.pid, path, number)
 
 
 def _remove_what_is_over(directory: Path) -> None:

@@ -48,6 +48,14 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _records(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What is sent here and not answered is nobody's business (bt_actions/ledger.py)."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BT_ACTIONS_LEDGER", str(tmp_path_factory.mktemp("ledger")))
+        yield
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _little_to_collect() -> None:
     """Begin without what the tests before have left: to collect it stops all threads again."""

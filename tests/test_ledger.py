@@ -119,10 +119,12 @@ def test_an_answer_blanks_the_line_which_the_next_goal_gets(
 def test_what_more_is_known_of_a_goal_takes_its_line(ledger: Ledger, directory: Path) -> None:
     goal_id = new_goal_id()
     ledger.enter(goal_id, "/move", 0, [])
-    ledger.enter(goal_id, "/move", 0, SERVERS)
+    assert goal_id in ledger
+    ledger.enter(goal_id, "/move", 0, SERVERS, lost=True)
     (path,) = directory.iterdir()
     (line,) = path.read_text().splitlines()
     assert json.loads(line)["servers"] == ["61" * 16, "62" * 16]
+    assert json.loads(line)["lost"] is True
 
 
 def test_the_file_goes_when_nothing_is_on_record(ledger: Ledger, directory: Path) -> None:
@@ -226,17 +228,19 @@ GOAL = "@"
         '"@"',
         "[]",
         '{"goal": "@"}',
-        '{"goal": 3, "domain": 0, "action": "/a", "servers": []}',
-        '{"goal": "@", "domain": "0", "action": "/a", "servers": []}',
-        '{"goal": "@", "domain": true, "action": "/a", "servers": []}',
-        '{"goal": "@", "domain": 0, "action": "a", "servers": []}',
-        '{"goal": "@", "domain": 0, "action": "/a\\n", "servers": []}',
-        '{"goal": "@", "domain": 0, "action": "/\\u001b[2J", "servers": []}',
-        '{"goal": "@", "domain": 0, "action": ["/a"], "servers": []}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": 3}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": ["x"]}',
-        '{"goal": "@00", "domain": 0, "action": "/a", "servers": []}',
-        '{"goal": "00000000000000000000000000000000", "domain": 0, "action": "/a", "servers": []}',
+        '{"goal": 3, "domain": 0, "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": "0", "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": true, "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "a", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/a\\n", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/\\u001b[2J", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": ["/a"], "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": 3, "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": ["x"], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": []}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": 0}',
+        '{"goal": "@00", "domain": 0, "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "00", "domain": 0, "action": "/a", "servers": [], "lost": false}',
     ],
 )
 def test_what_is_damaged_is_skipped(entry: str, directory: Path) -> None:

@@ -367,9 +367,9 @@ class _Sweep:
         )
 
     def _requires(self, action: str) -> bool:
-        if self._wanted is None:
-            return self._calls[action].sighted
-        return action in self._wanted or any(g.action == action for g in self._left.values())
+        if any(left.action == action for left in self._left.values()):
+            return True
+        return self._calls[action].sighted if self._wanted is None else action in self._wanted
 
     def _lacks(self) -> list[str]:
         """Return the actions that are looked for, and not known."""
@@ -381,7 +381,9 @@ class _Sweep:
 
         Its server has been out of sight for longer then than it may take to accept a goal.
         """
-        left = self._left[sent.goal_id]
+        left = self._left.get(sent.goal_id)
+        if left is None:
+            return not self._stopped()
         in_vain = not self._calls[left.action].sighted and not self._stopped()
         return left.is_over or not left.awaited or in_vain
 
@@ -481,26 +483,27 @@ class _Sweep:
                 del self._minded[goal_id]
                 left = self._left[goal_id] = LeftBehind(action, goal_id, author.pid)
                 self._found(left)
-        for path, goals in ledger.left_behind(self._files):
-            self._files.add(path)
-            for sent in goals:
-                if sent.domain == self._domain:
-                    self._await(sent)
+        self._look_up()
         for left in self._left.values():
             left.servers = len(self._calls[left.action].servers)
-            if left.awaited and left.denial.for_good:
-                left.nothing_left = f"denied for {DENIED_FOR_GOOD:g} s"
+
+    def _look_up(self) -> None:
+        """See what the dead have on record, and what of it need not be awaited any more."""
+        for path, goals in ledger.left_behind(self._files):
+            self._files.add(path)
+            self._records.extend(sent for sent in goals if sent.domain == self._domain)
         for sent in self._records:
-            left, call = self._left[sent.goal_id], self._calls[sent.action]
-            gone = call.known and sent.servers and not sent.servers & call.servers
-            if left.awaited and gone:
+            call = self._calls.setdefault(sent.action, RollCall(time.monotonic()))
+            gone = bool(sent.servers) and not sent.servers & call.servers
+            left = self._left.get(sent.goal_id)
+            if left is None and not (sent.lost and gone):
+                self._await(sent)
+            elif left is not None and left.awaited and left.denial.for_good:
+                left.nothing_left = f"denied for {DENIED_FOR_GOOD:g} s"
+            elif left is not None and left.awaited and gone and call.known:
                 left.nothing_left = "its server is gone"
 
     def _await(self, sent: ledger.Sent) -> None:
-        self._records.append(sent)
-        if sent.goal_id in self._left:
-            return
-        self._calls.setdefault(sent.action, RollCall(time.monotonic()))
         left = LeftBehind(sent.action, sent.goal_id, sent.pid, awaited=True)
         self._left[sent.goal_id] = left
         self._found(left)

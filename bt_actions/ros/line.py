@@ -298,6 +298,8 @@ class Line:
             self._carry_out(ticket, command, message)
         if goal.accepted or (goal.state is State.DONE and goal.end is not End.UNKNOWN):
             ledger.strike(goal.id)
+        elif goal.lost != was_lost and goal.id in ledger:
+            self._put_on_record(ticket)
         if goal.state is State.DONE:
             self.close_book(ticket)
         due = goal.due_in(now)
@@ -339,9 +341,9 @@ class Line:
                 self._warn_once(f"{command.name} could not be sent", error)
 
     def _put_on_record(self, ticket: Ticket) -> None:
-        ledger.enter(
-            ticket.goal.id, self.name, self.traffic.domain.number, ticket.testimony.sent_to
-        )
+        goal, sent_to = ticket.goal, ticket.testimony.sent_to
+        domain = self.traffic.domain.number
+        ledger.enter(goal.id, self.name, domain, sent_to, lost=goal.lost)
 
     def _tell_who_waits(self) -> None:
         """Wake those of all nodes whose goals a change here may have let go on."""

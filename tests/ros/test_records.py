@@ -12,6 +12,7 @@ from bt_actions.goal_terms import Event
 from bt_actions.ros import line as module
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
+from tests.support.processes import HostFactory
 from tests.support.trees import state
 from tests.support.waiting import until
 
@@ -20,12 +21,17 @@ class Recorder:
     """In place of the ledger: tells what was done to it, and what was on its way by then."""
 
     def __init__(self) -> None:
-        self.open: dict[bytes, tuple[str, int, frozenset[bytes]]] = {}
+        self.open: dict[bytes, tuple[str, int, frozenset[bytes], bool]] = {}
         self.entered: list[bytes] = []
 
-    def enter(self, goal_id: bytes, action: str, domain: int, servers: Collection[bytes]) -> None:
+    def enter(
+        self, goal_id: bytes, action: str, domain: int, servers: Collection[bytes], *, lost: bool
+    ) -> None:
         self.entered.append(goal_id)
-        self.open[goal_id] = action, domain, frozenset(servers)
+        self.open[goal_id] = action, domain, frozenset(servers), lost
+
+    def __contains__(self, goal_id: bytes) -> bool:
+        return goal_id in self.open
 
     def strike(self, goal_id: bytes) -> None:
         self.open.pop(goal_id, None)
@@ -46,9 +52,9 @@ def test_a_goal_is_on_record_until_it_is_accepted(
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
         goal = journal.wait_for("received").goal
-        [(goal_id, (action, domain, servers))] = ledger.open.items()
+        [(goal_id, (action, domain, servers, lost))] = ledger.open.items()
         assert (goal_id.hex(), action, domain) == (goal, name, node.context.get_domain_id())
-        assert len(servers) == 1
+        assert (len(servers), lost) == (1, False)
         until(lambda: state(leaf) == "EXECUTING")
         assert ledger.open == {}
 
@@ -102,3 +108,23 @@ def test_what_is_not_accounted_for_stays(
             [ticket] = Traffic.of(node).line(leaf.action_type, name).goals.values()
             ticket.line.tell(ticket, Event.CLOSED)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
+
+
+def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
+    new_host: HostFactory, name: str, node: Any, ledger: Recorder
+) -> None:
+    host = new_host()
+    journal = host.open(name, "1:delay_accept=60")
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        journal.wait_for("received")
+        host.kill()
+        until(lambda: leaf.outcome is not None, 40.0)
+        [(*_, lost)] = ledger.open.values()
+        assert lost
+        with lock:
+            [ticket] = Traffic.of(node).line(leaf.action_type, name).goals.values()
+            ticket.line.tell(ticket, Event.SERVER_RETURNED)
+            [(*_, lost)] = ledger.open.values()
+            assert not lost

@@ -5,6 +5,7 @@ No status tells of such a goal; what its sender had on record does (bt_actions/l
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 from collections.abc import Callable
@@ -27,8 +28,8 @@ DELAY = 12.0
 def received(launch: Launch, journal: Journal, path: Path, how: signal.Signals) -> Process:
     """Send a goal, and end the run as soon as its server has it: by SIGINT twice, or SIGKILL."""
     run = launch("run", str(path))
-    journal.wait_for("received")
     run.line("sending a goal to")
+    journal.wait_for("received")
     run.send(how)
     if how is signal.SIGINT:
         time.sleep(0.5)  # or it would be the same wish
@@ -147,6 +148,34 @@ def test_cleanup_looks_for_the_server_of_what_was_not_answered(
     again = launch("cleanup")
     assert again.wait(60.0) == 0, again
     record.outcome = "exit code 3, once: its server is not in sight"
+
+
+@pytest.mark.chaos
+def test_what_was_known_to_be_lost_is_not_told_again(
+    launch: Launch, new_host: HostFactory, tree: Tree, name: str, ledger: Path, record: Record
+) -> None:
+    """SIGKILL to the server, and when that is told, to the run; cleanup beside another server"""
+    host = new_host()
+    journal = host.open(name, "1:delay_accept=60")
+    timeout = "{server: 5 s, accept: 60 s, result: 60 s, cancel: 3 s}"
+    path = tree(
+        name, timeout=timeout, retry="{attempts: 2, backoff: 60 s, outcomes: [SERVER_LOST]}"
+    )
+    run = launch("run", str(path), "--verbose")
+    run.line("sending a goal to")
+    journal.wait_for("received")
+    host.kill()
+    run.line("SERVER_LOST", 60.0)
+    run.send(signal.SIGKILL)
+    run.wait()
+    [record_of_run] = ledger.iterdir()
+    assert json.loads(record_of_run.read_text())["lost"] is True
+    new_host().open(f"{name}/another")
+    cleanup = launch("cleanup")
+    assert cleanup.wait(60.0) == 0, cleanup
+    assert "nothing is left" in "\n".join(cleanup.lines), cleanup
+    assert list(ledger.iterdir()) == []
+    record.outcome = "nothing is left; exit code 0"
 
 
 @pytest.mark.parametrize(
