@@ -2,19 +2,21 @@
 
 A server shows the goals that it has accepted. Of one that it has received, and has not decided on
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
-So each process keeps a file of its goals without an answer, which outlives it, and which cleanup
-(ros/cleanup.py) reads. It lies in memory (/dev/shm), so that writing it never waits for a disk.
+So each process keeps a file of its goals without an answer, its ledger, which outlives it, and
+which cleanup reads (ros/unanswered.py). It lies in memory (/dev/shm), so that writing it waits for
+no disk.
 
 The file is named by the bytes that all goal ids of its process begin with (goal_ids.py). A goal has
-a line of fixed length, which is written in place before the goal is sent, and is blank again when
-it has been answered: two system calls a goal. A process that ends in good order removes the file.
-What is read is believed no further than that a question about a goal is worth asking.
+a row of fixed length, which is written in place before the goal is sent, and blanked when it has
+been answered. A process that ends in good order removes the file. What is read is believed no
+further than that a question about a goal is worth asking.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import itertools
 import json
 import os
 import re
@@ -24,18 +26,20 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bt_actions.goal_ids import author_of
+from bt_actions.goal_ids import Author, author_of
 
 DIRECTORY = "BT_ACTIONS_LEDGER"
 """The environment variable that names another directory: one that outlives a container, say."""
 LENGTH = 1024
-"""Bytes of a line: the longest action name has 255."""
-LINES_AT_MOST = 4096
+"""Bytes of a row: the longest action name has 255."""
+ROWS_AT_MOST = 4096
 """Goals on record at a time; no more are read, either."""
 SERVERS_AT_MOST = 8
 """Servers of a goal on record; where there are more, none is."""
 KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up."""
+TIDIED_AT_MOST = 64
+"""Files that a process which opens its own looks at, whether they can be removed."""
 _BLANK = b" " * (LENGTH - 1)
 _PREFIX = 12
 _SUFFIX = ".goals"
@@ -43,8 +47,132 @@ _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _NAME_AT_MOST = 255
 
 
-class Untrusted(OSError):
-    """The directory is somebody else's, or others may write there."""
+# What a process writes of itself
+
+
+class Ledger:
+    """This process's file. Under its caller's lock; nothing here raises.
+
+    `complain` is called once with why a goal is not on record, should that happen.
+    """
+
+    def __init__(self, complain: Callable[[str], None]) -> None:
+        self._complain = complain
+        self._complained = False
+        self._file: int | None = None
+        self._path = Path()
+        self._prefix = b""
+        self._rows: dict[bytes, tuple[int, bytes]] = {}
+        self._blank: list[int] = []
+        self._unused = 0
+
+    def __contains__(self, goal_id: bytes) -> bool:
+        """Whether a goal is on record."""
+        return goal_id in self._rows
+
+    def enter(
+        self,
+        goal_id: bytes,
+        action: str,
+        domain: int,
+        servers: Collection[bytes],
+        *,
+        lost: bool = False,
+    ) -> None:
+        """Put a goal on record that is about to be sent, or what more is known of it."""
+        entry = {
+            "goal": goal_id.hex(),
+            "domain": domain,
+            "action": action,
+            "servers": sorted(each.hex() for each in servers)
+            if len(servers) <= SERVERS_AT_MOST
+            else [],
+            "lost": lost,
+        }
+        text = json.dumps(entry).encode().ljust(LENGTH - 1) + b"\n"
+        try:
+            if len(text) > LENGTH:
+                raise OSError(errno.EMSGSIZE, os.strerror(errno.EMSGSIZE))
+            self._see_to_the_file(goal_id[:_PREFIX])
+            self._write(goal_id, text)
+        except OSError as error:
+            self.strike(goal_id)
+            self._fail(error)
+
+    def strike(self, goal_id: bytes) -> None:
+        """Take a goal off the record, if it is there."""
+        row, _text = self._rows.pop(goal_id, (None, b""))
+        if row is None or self._file is None:
+            return
+        self._blank.append(row)
+        try:
+            os.pwrite(self._file, _BLANK, row * LENGTH)
+        except OSError as error:
+            self._fail(error)
+
+    def close(self) -> None:
+        """Remove the file, where nothing is on record; the next goal opens another."""
+        if self._file is None or self._rows:
+            return
+        with contextlib.suppress(OSError):
+            self._path.unlink()
+        self.disown()
+
+    def disown(self) -> None:
+        """Let go of the file, as the child of a fork: it is the parent's."""
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                os.close(self._file)
+        self._file, self._prefix = None, b""
+        self._rows, self._blank, self._unused = {}, [], 0
+
+    def _write(self, goal_id: bytes, text: bytes) -> None:
+        if self._file is None:
+            return
+        row, _text = self._rows.get(goal_id, (None, b""))
+        if row is None:
+            row = self._blank.pop() if self._blank else self._unused
+            if row >= ROWS_AT_MOST:
+                raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+            self._unused = max(self._unused, row + 1)
+        self._rows[goal_id] = row, text
+        if os.pwrite(self._file, text, row * LENGTH) < LENGTH:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def _see_to_the_file(self, prefix: bytes) -> None:
+        """Have it open, and in its place: whoever logs out may have all of /dev/shm removed."""
+        if prefix != self._prefix:
+            self.disown()
+            self._open(prefix)
+        elif self._file is not None and not os.fstat(self._file).st_nlink:
+            rows = self._rows
+            self.disown()
+            self._open(prefix)
+            for goal_id, (_row, text) in rows.items():
+                self._write(goal_id, text)
+
+    def _open(self, prefix: bytes) -> None:
+        directory = _directory()
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        _check(directory)
+        _tidy(directory)
+        self._path = directory / (prefix.hex() + _SUFFIX)
+        how = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+        self._file = os.open(self._path, how, 0o600)
+        self._prefix = prefix
+        # What is there is of the program that this one has replaced (exec).
+        self._unused = -(-os.fstat(self._file).st_size // LENGTH)
+
+    def _fail(self, error: OSError) -> None:
+        if not self._complained:
+            self._complained = True
+            self._complain(
+                "should this process be killed, goals that no server has answered yet cannot be "
+                f"cleaned up: they cannot be put on record: {error}"
+            )
+
+
+# What is read of those that are dead
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,147 +187,43 @@ class Sent:
     """GIDs of the servers that were in sight; none where they are not known."""
     lost: bool
     """They had gone, as far as its sender knew; that may be wrong where a link was cut."""
-    pid: int
+    author: Author
+    """Who is dead, or not `here`."""
     path: Path
-    line: int
-
-
-class Ledger:
-    """This process's file. Under its caller's lock; nothing here raises.
-
-    `complain` is called once with why there is none, should it be so.
-    """
-
-    def __init__(self, complain: Callable[[str], None]) -> None:
-        self._complain = complain
-        self._file: int | None = None
-        self._path = Path()
-        self._prefix = b""
-        self._failed = False
-        self._lines: dict[bytes, int] = {}
-        self._blank: list[int] = []
-
-    def __contains__(self, goal_id: bytes) -> bool:
-        """Whether a goal is on record."""
-        return goal_id in self._lines
-
-    def enter(
-        self,
-        goal_id: bytes,
-        action: str,
-        domain: int,
-        servers: Collection[bytes],
-        *,
-        lost: bool = False,
-    ) -> None:
-        """Put a goal on record that is about to be sent, or what more is known of it."""
-        if goal_id[:_PREFIX] != self._prefix:
-            self._open(goal_id[:_PREFIX])
-        if self._file is None:
-            return
-        line = self._lines.get(goal_id)
-        if line is None:
-            line = self._blank.pop() if self._blank else len(self._lines)
-            if line >= LINES_AT_MOST:
-                return
-        known = sorted(each.hex() for each in servers) if len(servers) <= SERVERS_AT_MOST else []
-        entry = {
-            "goal": goal_id.hex(),
-            "domain": domain,
-            "action": action,
-            "servers": known,
-            "lost": lost,
-        }
-        text = json.dumps(entry).encode().ljust(LENGTH - 1) + b"\n"
-        self._lines[goal_id] = line
-        try:
-            if len(text) > LENGTH or os.pwrite(self._file, text, line * LENGTH) < LENGTH:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        except OSError as error:
-            self.strike(goal_id)
-            self._fail(error)
-
-    def strike(self, goal_id: bytes) -> None:
-        """Take a goal off the record, if it is there."""
-        line = self._lines.pop(goal_id, None)
-        if line is None or self._file is None:
-            return
-        self._blank.append(line)
-        try:
-            os.pwrite(self._file, _BLANK, line * LENGTH)
-        except OSError as error:
-            self._fail(error)
-
-    def close(self) -> None:
-        """Remove the file, where nothing is on record; the next goal opens another."""
-        if self._file is None or self._lines:
-            return
-        with contextlib.suppress(OSError):
-            self._path.unlink()
-        self.disown()
-
-    def disown(self) -> None:
-        """Let go of the file, as the child of a fork: it is the parent's."""
-        if self._file is not None:
-            with contextlib.suppress(OSError):
-                os.close(self._file)
-        self._file, self._prefix = None, b""
-        self._lines, self._blank = {}, []
-
-    def _open(self, prefix: bytes) -> None:
-        self.disown()
-        self._prefix = prefix
-        try:
-            directory = _directory()
-            directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-            _check(directory)
-            _remove_what_is_over(directory)
-            self._path = directory / (prefix.hex() + _SUFFIX)
-            how = os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
-            self._file = os.open(self._path, how, 0o600)
-        except OSError as error:
-            self._fail(error)
-
-    def _fail(self, error: OSError) -> None:
-        if not self._failed:
-            self._failed = True
-            self._complain(
-                "should this process be killed, goals that no server has answered yet cannot be "
-                f"cleaned up: they cannot be put on record: {error}"
-            )
+    row: int
 
 
 def left_behind(passed_over: Collection[Path] = ()) -> Iterator[tuple[Path, list[Sent]]]:
-    """Find the files of processes of this machine and user that are dead, and what is in them.
+    """Find the files of this user's processes that are dead, or elsewhere, and what is in them.
 
-    Those in `passed_over` are not read. What is damaged is skipped.
+    Those in `passed_over` are not read. What is damaged is skipped. Raises OSError where what there
+    is cannot be read, or others may have put it there.
     """
     directory = _directory()
     try:
         _check(directory)
-        paths = sorted(directory.glob("*" + _SUFFIX))
-    except OSError:
+    except FileNotFoundError:
         return
-    for path in paths:
-        if path not in passed_over and _is_dead(path):
-            yield path, _read(path)
+    for path in sorted(directory.glob("*" + _SUFFIX)):
+        author = _author(path)
+        if path not in passed_over and author is not None and not (author.here and author.alive):
+            yield path, _parse_all(path, author)
 
 
-def strike(goals: Iterable[Sent]) -> None:
-    """Blank the lines of goals that need not be asked for any more; where that fails, they are."""
+def strike_left(goals: Iterable[Sent]) -> None:
+    """Blank the rows of goals that need not be asked for any more; where that fails, they are."""
     by_path: dict[Path, list[int]] = {}
     for sent in goals:
-        by_path.setdefault(sent.path, []).append(sent.line)
-    for path, lines in by_path.items():
+        by_path.setdefault(sent.path, []).append(sent.row)
+    for path, rows in by_path.items():
         with contextlib.suppress(OSError):
             file = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
             try:
-                for line in lines:
-                    os.pwrite(file, _BLANK, line * LENGTH)
-                is_over = not os.pread(file, LENGTH * LINES_AT_MOST, 0).strip()
+                for row in rows:
+                    os.pwrite(file, _BLANK, row * LENGTH)
             finally:
                 os.close(file)
-            if is_over:
+            if not _read(path).strip():
                 path.unlink()
 
 
@@ -214,58 +238,67 @@ def _check(directory: Path) -> None:
     """Raise OSError where others could have put something into it."""
     seen = directory.lstat()
     if not stat.S_ISDIR(seen.st_mode):
-        raise Untrusted(f"{directory} is no directory")
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(directory))
     if seen.st_uid != os.geteuid() or seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise Untrusted(f"{directory} is not this user's alone to write in")
+        raise PermissionError(errno.EPERM, "others may write there", str(directory))
 
 
-def _is_dead(path: Path) -> bool:
+def _author(path: Path) -> Author | None:
+    """Return whose file it is; None: nobody's of ours."""
     try:
         prefix = bytes.fromhex(path.name.removesuffix(_SUFFIX))
     except ValueError:
-        return False
-    author = author_of(prefix + bytes(4)) if len(prefix) == _PREFIX else None
-    return author is not None and author.here and not author.alive
+        return None
+    return author_of(prefix + bytes(4)) if len(prefix) == _PREFIX else None
 
 
-def _read(path: Path) -> list[Sent]:
+def _read(path: Path) -> bytes:
+    """Return what is in a plain file, up to what is ever written; b"" where it has gone."""
     try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            return b""
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-        try:
-            if not stat.S_ISREG(os.fstat(file).st_mode):
-                return []
-            text = os.pread(file, LENGTH * LINES_AT_MOST, 0)
-        finally:
-            os.close(file)
-    except OSError:
-        return []
-    lines = (text[start : start + LENGTH] for start in range(0, len(text), LENGTH))
-    found = (_parse(path, number, line) for number, line in enumerate(lines) if line.strip())
+    except FileNotFoundError:
+        return b""
+    try:
+        return os.pread(file, LENGTH * ROWS_AT_MOST, 0)
+    finally:
+        os.close(file)
+
+
+def _parse_all(path: Path, author: Author) -> list[Sent]:
+    text = _read(path)
+    rows = (text[start : start + LENGTH] for start in range(0, len(text), LENGTH))
+    found = (_parse(path, author, row, text) for row, text in enumerate(rows) if text.strip())
     return [sent for sent in found if sent is not None]
 
 
-def _parse(path: Path, number: int, line: bytes) -> Sent | None:
+def _parse(path: Path, author: Author, row: int, text: bytes) -> Sent | None:
     try:
-        entry = json.loads(line)
+        entry = json.loads(text)
         goal_id, action, domain = bytes.fromhex(entry["goal"]), entry["action"], entry["domain"]
         servers = frozenset(bytes.fromhex(each) for each in entry["servers"])
         lost = entry["lost"]
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
-    author = author_of(goal_id)
-    if author is None or goal_id[:_PREFIX].hex() != path.name.removesuffix(_SUFFIX):
+    if author_of(goal_id) != author:
         return None
     if not isinstance(action, str) or not _NAME.fullmatch(action) or len(action) > _NAME_AT_MOST:
         return None
     if type(domain) is not int or type(lost) is not bool:
         return None
-    return Sent(goal_id, action, domain, servers, lost, author.pid, path, number)
+    return Sent(goal_id, action, domain, servers, lost, author, path, row)
 
 
-def _remove_what_is_over(directory: Path) -> None:
-    """Remove the files of the dead with nothing in them, and what nobody has wanted for long."""
-    for path in directory.glob("*" + _SUFFIX):
-        with contextlib.suppress(OSError):
-            old = time.time() - path.lstat().st_mtime > KEPT_FOR
-            if _is_dead(path) and (old or not _read(path)):
-                path.unlink()
+def _tidy(directory: Path) -> None:
+    """Remove files of the dead with nothing in them, and what nobody has wanted for long."""
+    with contextlib.suppress(OSError), os.scandir(directory) as entries:
+        for entry in itertools.islice(entries, TIDIED_AT_MOST):
+            path = Path(entry.path)
+            author = _author(path) if path.name.endswith(_SUFFIX) else None
+            if author is None or (author.here and author.alive):
+                continue
+            with contextlib.suppress(OSError):
+                old = time.time() - path.lstat().st_mtime > KEPT_FOR
+                if old or (author.here and not _read(path).strip()):
+                    path.unlink()

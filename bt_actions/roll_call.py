@@ -16,6 +16,10 @@ ASK_AGAIN = 1.0
 """Seconds between two questions;"""
 LATE = 1.5
 """so many, and the server may have been stopped in between."""
+SILENT = 10.0
+"""Seconds without an answer to any question, after which denials count anew;"""
+QUESTIONS = 10
+"""and how many questions may be under way: over a bad link an answer takes seconds."""
 SETTLE = 4.0
 """Seconds of answers within which a server's status must have been received; where a client was
 just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
@@ -111,7 +115,7 @@ class RollCall:
 
 
 class Denial:
-    """For how long all servers in sight have denied that they have a certain goal.
+    """For how long all servers of an action have denied that they have a certain goal.
 
     A server denies what it has received, and has not decided on: only time tells. Times are seconds
     of the steady clock.
@@ -122,29 +126,32 @@ class Denial:
 
     def begin(self) -> None:
         """Go on in a new participant, of which the servers have been asked nothing."""
-        self._since: float | None = None  # when the first of the questions was asked in a row
-        self._number: int | None = None
-        self._asked_at = float("-inf")
-        self._of: Collection[bytes] = ()
-        self._denials = 0
-
-    @property
-    def _complete(self) -> bool:
-        return self._denials >= max(1, len(self._of))
+        self._asked: dict[int, tuple[float, Collection[bytes]]] = {}
+        self._denials: dict[int, int] = {}
+        self._last: tuple[float, Collection[bytes]] | None = None  # question that all denied
+        self._denied_for = 0.0
 
     def asked(self, number: int, of: Collection[bytes], now: float) -> None:
         """The question of this number was asked, `of` these servers."""
-        if not self._complete or now - self._asked_at > LATE or of != self._of:
-            self._since = now
-        self._number, self._of, self._asked_at, self._denials = number, of, now, 0
+        self._asked[number], self._denials[number] = (now, of), 0
+        for oldest in list(self._asked)[:-QUESTIONS]:
+            del self._asked[oldest], self._denials[oldest]
 
-    def denied(self, number: int, now: float) -> None:
+    def denied(self, number: int) -> None:
         """One server answered the question of this number: it has not got it."""
-        if number == self._number and now - self._asked_at <= LATE:
-            self._denials += 1
+        if number not in self._asked:
+            return
+        self._denials[number] += 1
+        at, of = self._asked[number]
+        if self._denials[number] != max(1, len(of)) or (self._last and at <= self._last[0]):
+            return
+        if self._last is None or self._last[1] != of or at - self._last[0] > SILENT:
+            self._denied_for = 0.0
+        else:
+            self._denied_for += min(at - self._last[0], LATE)  # it may have been stopped meanwhile
+        self._last = at, of
 
     @property
     def for_good(self) -> bool:
         """Whether nothing will come of it any more."""
-        since = self._asked_at if self._since is None else self._since
-        return self._complete and self._asked_at - since >= DENIED_FOR_GOOD
+        return self._denied_for >= DENIED_FOR_GOOD

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -14,7 +15,17 @@ import pytest
 
 from bt_actions import ledger as module
 from bt_actions.goal_ids import new_goal_id
-from bt_actions.ledger import KEPT_FOR, LENGTH, LINES_AT_MOST, Ledger, Sent, left_behind, strike
+from bt_actions.ledger import (
+    KEPT_FOR,
+    LENGTH,
+    ROWS_AT_MOST,
+    SERVERS_AT_MOST,
+    TIDIED_AT_MOST,
+    Ledger,
+    Sent,
+    left_behind,
+    strike_left,
+)
 
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
 LEAVES = """
@@ -65,10 +76,11 @@ def found() -> list[Sent]:
     return [sent for _, goals in left_behind() for sent in goals]
 
 
-def lines(directory: Path) -> list[bytes]:
-    """What is in the only file."""
+def rows(directory: Path) -> list[str]:
+    """The rows of the only file that are not blank."""
     (path,) = directory.iterdir()
-    return path.read_bytes().split()
+    text = path.read_text()
+    return [text[at : at + LENGTH] for at in range(0, len(text), LENGTH) if text[at] == "{"]
 
 
 def test_what_a_dead_process_left_is_found(directory: Path) -> None:
@@ -76,7 +88,7 @@ def test_what_a_dead_process_left_is_found(directory: Path) -> None:
     seen = [(sent.goal_id.hex(), sent.action, sent.domain, sent.servers) for sent in found()]
     servers = frozenset({b"a" * 16})
     assert seen == [(ids[n], f"/robot_{n}/move", n, servers) for n in (0, 2, 3)]
-    assert {sent.pid for sent in found()} == {int(ids[0][12:20], 16)}
+    assert {sent.author.pid for sent in found()} == {int(ids[0][12:20], 16)}
 
 
 def test_what_is_struck_is_not_found_again_and_the_last_takes_the_file_away(
@@ -84,9 +96,9 @@ def test_what_is_struck_is_not_found_again_and_the_last_takes_the_file_away(
 ) -> None:
     ids = die()
     first, *others = found()
-    strike([first])
+    strike_left([first])
     assert [sent.goal_id.hex() for sent in found()] == [ids[2], ids[3]]
-    strike(others)
+    strike_left(others)
     assert list(directory.iterdir()) == []
 
 
@@ -149,9 +161,9 @@ def test_the_child_of_a_fork_leaves_its_parents_file_alone(ledger: Ledger, direc
         ledger.close()
         os._exit(0)
     assert os.waitpid(child, 0)[1] == 0
-    assert lines(directory)
+    assert rows(directory)
     ledger.strike(goal_id)
-    assert not lines(directory)
+    assert not rows(directory)
 
 
 def test_a_goal_of_the_child_has_a_file_of_its_own(ledger: Ledger, directory: Path) -> None:
@@ -165,24 +177,18 @@ def test_a_goal_of_the_child_has_a_file_of_its_own(ledger: Ledger, directory: Pa
     assert [sent.action for sent in found()] == ["/child"]
 
 
-def test_no_more_than_so_many_are_on_record(
-    ledger: Ledger, directory: Path, monkeypatch: pytest.MonkeyPatch
+def test_no_more_than_so_many_are_on_record_and_that_is_told(
+    ledger: Ledger, complaints: list[str], directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "LINES_AT_MOST", 2)
+    monkeypatch.setattr(module, "ROWS_AT_MOST", 2)
     ids = [new_goal_id() for _ in range(3)]
     for goal_id in ids:
         ledger.enter(goal_id, "/move", 0, SERVERS)
-    assert len(lines_of(directory)) == 2
+    assert len(rows(directory)) == 2
+    assert len(complaints) == 1
     ledger.strike(ids[2])
     ledger.strike(ids[0])
-    assert len(lines_of(directory)) == 1
-
-
-def lines_of(directory: Path) -> list[str]:
-    """The lines of the only file that are not blank."""
-    (path,) = directory.iterdir()
-    text = path.read_text()
-    return [text[at : at + LENGTH] for at in range(0, len(text), LENGTH) if text[at] == "{"]
+    assert len(rows(directory)) == 1
 
 
 def test_without_room_it_complains_once_and_the_goal_goes_on(
@@ -195,9 +201,14 @@ def test_without_room_it_complains_once_and_the_goal_goes_on(
     assert "No space left on device" in complaint
 
 
-@pytest.mark.parametrize("obstacle", ["a file", "a link", "open to others"])
+@pytest.mark.parametrize("obstacle", ["a file", "a link", "open to others", "another user's"])
 def test_a_directory_that_others_may_have_made_is_not_used(
-    obstacle: str, ledger: Ledger, complaints: list[str], directory: Path, tmp_path: Path
+    obstacle: str,
+    ledger: Ledger,
+    complaints: list[str],
+    directory: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     directory.parent.mkdir()
     if obstacle == "a file":
@@ -207,13 +218,97 @@ def test_a_directory_that_others_may_have_made_is_not_used(
         directory.symlink_to(tmp_path / "elsewhere")
     else:
         directory.mkdir()
-        directory.chmod(0o777)
+        if obstacle == "open to others":
+            directory.chmod(0o777)
+        else:
+            somebody = os.geteuid() + 1
+            monkeypatch.setattr(module.os, "geteuid", lambda: somebody)
     ledger.enter(new_goal_id(), "/move", 0, SERVERS)
     ledger.enter(new_goal_id(), "/move", 0, SERVERS)
     assert len(complaints) == 1
-    assert found() == []
+    with pytest.raises(OSError, match=str(directory)):
+        list(left_behind())
     if directory.is_dir():
         assert list(directory.iterdir()) == []
+
+
+def test_where_nobody_has_sent_anything_there_is_nothing_to_read(directory: Path) -> None:
+    assert not directory.exists()
+    assert found() == []
+
+
+def test_a_record_that_cannot_be_read_is_no_empty_one(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    die()
+
+    def fail(*_: object) -> bytes:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr(module.os, "pread", fail)
+    with pytest.raises(OSError, match="Too many open files"):
+        found()
+
+
+def test_what_cannot_be_opened_once_is_tried_again(
+    ledger: Ledger, complaints: list[str], directory: Path
+) -> None:
+    directory.parent.mkdir()
+    directory.touch()
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert len(complaints) == 1
+    directory.unlink()
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert len(rows(directory)) == 1
+    assert len(complaints) == 1
+
+
+def test_a_file_that_somebody_removes_is_written_again(ledger: Ledger, directory: Path) -> None:
+    """As systemd does with all of a user's /dev/shm, when that user has logged out."""
+    first, second = new_goal_id(), new_goal_id()
+    ledger.enter(first, "/move", 0, SERVERS)
+    shutil.rmtree(directory)
+    ledger.enter(second, "/move", 0, SERVERS)
+    assert [json.loads(row)["goal"] for row in rows(directory)] == [first.hex(), second.hex()]
+    ledger.strike(first)
+    assert [json.loads(row)["goal"] for row in rows(directory)] == [second.hex()]
+
+
+def test_who_has_replaced_a_program_goes_on_behind_what_that_has_left(
+    ledger: Ledger, directory: Path
+) -> None:
+    """After exec the process is the same, and so is the name of its file."""
+    first, second = new_goal_id(), new_goal_id()
+    ledger.enter(first, "/move", 0, SERVERS)
+    ledger.disown()
+    ledger.enter(second, "/move", 0, SERVERS)
+    assert [json.loads(row)["goal"] for row in rows(directory)] == [first.hex(), second.hex()]
+
+
+def test_nothing_is_written_through_a_link(
+    ledger: Ledger, complaints: list[str], directory: Path, tmp_path: Path
+) -> None:
+    goal_id = new_goal_id()
+    directory.mkdir(mode=0o700, parents=True)
+    (tmp_path / "elsewhere").touch()
+    (directory / f"{goal_id[:12].hex()}.goals").symlink_to(tmp_path / "elsewhere")
+    ledger.enter(goal_id, "/move", 0, SERVERS)
+    assert len(complaints) == 1
+    assert (tmp_path / "elsewhere").read_bytes() == b""
+
+
+def test_of_many_servers_none_is_on_record(ledger: Ledger, directory: Path) -> None:
+    many = [bytes([number]) * 16 for number in range(SERVERS_AT_MOST + 1)]
+    ledger.enter(new_goal_id(), "/" + "m" * 254, 0, many[:-1])
+    ledger.enter(new_goal_id(), "/" + "m" * 254, 0, many)
+    assert [len(json.loads(row)["servers"]) for row in rows(directory)] == [SERVERS_AT_MOST, 0]
+
+
+def test_what_does_not_fit_is_not_on_record(ledger: Ledger, complaints: list[str]) -> None:
+    goal_id = new_goal_id()
+    ledger.enter(goal_id, "/" + "m" * LENGTH, 0, SERVERS)
+    assert goal_id not in ledger
+    assert len(complaints) == 1
 
 
 GOAL = "@"
@@ -231,6 +326,7 @@ GOAL = "@"
         '{"goal": 3, "domain": 0, "action": "/a", "servers": [], "lost": false}',
         '{"goal": "@", "domain": "0", "action": "/a", "servers": [], "lost": false}',
         '{"goal": "@", "domain": true, "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/LONG", "servers": [], "lost": false}',
         '{"goal": "@", "domain": 0, "action": "a", "servers": [], "lost": false}',
         '{"goal": "@", "domain": 0, "action": "/a\\n", "servers": [], "lost": false}',
         '{"goal": "@", "domain": 0, "action": "/\\u001b[2J", "servers": [], "lost": false}',
@@ -240,6 +336,7 @@ GOAL = "@"
         '{"goal": "@", "domain": 0, "action": "/a", "servers": []}',
         '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": 0}',
         '{"goal": "@00", "domain": 0, "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "OTHER", "domain": 0, "action": "/a", "servers": [], "lost": false}',
         '{"goal": "00", "domain": 0, "action": "/a", "servers": [], "lost": false}',
     ],
 )
@@ -247,6 +344,8 @@ def test_what_is_damaged_is_skipped(entry: str, directory: Path) -> None:
     ids = die()
     (path,) = directory.iterdir()
     good = path.read_bytes()[2 * LENGTH : 3 * LENGTH]
+    other = ids[0][:20] + "ffff" + ids[0][24:]  # of another process
+    entry = entry.replace("OTHER", other).replace("LONG", "a" * 255)
     bad = entry.replace(GOAL, ids[0]).encode().ljust(LENGTH)
     path.write_bytes(bad + good)
     assert [sent.goal_id.hex() for sent in found()] == [ids[2]]
@@ -256,8 +355,8 @@ def test_no_more_is_read_than_is_ever_written(directory: Path) -> None:
     die()
     (path,) = directory.iterdir()
     good = path.read_bytes()[:LENGTH]
-    path.write_bytes(good * (LINES_AT_MOST + 10))
-    assert len(found()) == LINES_AT_MOST
+    path.write_bytes(good * (ROWS_AT_MOST + 10))
+    assert len(found()) == ROWS_AT_MOST
 
 
 def test_what_is_no_file_of_ours_is_not_opened(directory: Path, tmp_path: Path) -> None:
@@ -267,10 +366,15 @@ def test_what_is_no_file_of_ours_is_not_opened(directory: Path, tmp_path: Path) 
     path.unlink()
     (tmp_path / "elsewhere").write_bytes(text)
     path.symlink_to(tmp_path / "elsewhere")
-    os.mkfifo(directory / f"{path.stem[:-1]}0.goals")
+    os.mkfifo(directory / f"{changed(path).name}")
     (directory / "nonsense.goals").write_bytes(text)
     (directory / "00.goals").write_bytes(text)
     assert found() == []
+
+
+def changed(path: Path) -> Path:
+    """The file of another dead process."""
+    return path.with_stem(path.stem[:-1] + ("0" if path.stem[-1] != "0" else "1"))
 
 
 def test_the_next_process_removes_what_is_over_and_what_nobody_wants(
@@ -283,8 +387,28 @@ def test_the_next_process_removes_what_is_over_and_what_nobody_wants(
     die()
     (recent,) = set(directory.iterdir()) - {old}
     assert not old.exists()
-    empty = recent.with_stem(recent.stem[:-1] + ("0" if recent.stem[-1] != "0" else "1"))
-    empty.write_bytes(b" " * LENGTH)
+    blank = changed(recent)
+    damaged = recent.with_stem(recent.stem[:-2] + ("00" if recent.stem[-2] != "0" else "11"))
+    blank.write_bytes(b" " * LENGTH)
+    damaged.write_bytes(b"a newer form")
     ledger.enter(new_goal_id(), "/move", 0, SERVERS)
     assert recent.exists()
-    assert not empty.exists()
+    assert damaged.exists()
+    assert not blank.exists()
+
+
+def test_it_does_not_look_at_all_of_many(ledger: Ledger, directory: Path) -> None:
+    die()
+    (path,) = directory.iterdir()
+    for number in range(TIDIED_AT_MOST + 10):
+        path.with_stem(f"{path.stem[:-2]}{number:02x}").write_bytes(b"")
+    before = len(list(directory.iterdir()))
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert before - len(list(directory.iterdir())) < TIDIED_AT_MOST
+
+
+def test_what_is_elsewhere_is_told_apart(directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    die()
+    assert {sent.author.here for sent in found()} == {True}
+    monkeypatch.setenv("BT_ACTIONS_MACHINE", "another")
+    assert {sent.author.here for sent in found()} == {False}

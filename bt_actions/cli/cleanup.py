@@ -36,8 +36,8 @@ container that is started again counts as another one, unless BT_ACTIONS_MACHINE
 its own for each container, the same each time.
 
 No server shows a goal that it has not accepted yet. What a dead process had sent, and nobody had
-answered, is on record, and is awaited for up to 30 s. A server that is not in sight is not asked
-otherwise: name its action, and that is no success.
+answered, is on record, and is awaited for half a minute or more. Otherwise a server that is not in
+sight is not asked: name its action, and that is no success.
 
 examples:
   bt-actions cleanup
@@ -147,7 +147,7 @@ def _sweep(
         if left.awaited:
             note(
                 f"dead process {left.pid} sent a goal to {left.action} that was not answered: "
-                f"waiting up to {DENIED_FOR_GOOD:g} s for it to be accepted, to cancel it: "
+                f"waiting for {DENIED_FOR_GOOD:g} s or more, to cancel it should it be accepted: "
                 f"{left.goal_id.hex()}"
             )
         else:
@@ -199,6 +199,9 @@ def _tell_what_is_open(
                 nobody = f"{trouble.format(listing(who))}: nobody can see what was left there"
                 note(nobody + (hint if held_against else ""))
         code = Exit.UNKNOWN if unseen else code
+    if swept.trouble is not None:
+        note(f"nobody can see what was sent and not answered: {swept.trouble}")
+        code = code or Exit.UNKNOWN
     if not all(goal.is_over for goal in swept.left):
         note("not all of them have ended; they may still be running")
         code = Exit.UNKNOWN

@@ -31,10 +31,7 @@ _USUAL_ENDS = {
 """Ends that go without saying."""
 MOST = 3
 """Actions that are named where many are waited for."""
-CLEAN_UP = (
-    "`bt-actions cleanup` cancels what may still be running, once its server has accepted it and is"
-    " in sight:"
-)
+CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,7 @@ action type is needed for any of it. That a server has nothing to tell is believ
 answered for long enough (roll_call.py).
 
 No status shows a goal that its server has not accepted yet. That it was sent is on its sender's
-record (ledger.py), and it is awaited: asked to cancel again and again, until it turns up, or has
-been denied for so long that it will not.
+record, and it is awaited (unanswered.py): its server is asked again and again to cancel it.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import time
 import uuid
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from action_msgs.msg import GoalStatusArray
@@ -31,13 +29,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions import ledger
 from bt_actions.goal import DENIED_FOR_GOOD
 from bt_actions.goal_ids import Author, author_of
 from bt_actions.goal_terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
 from bt_actions.policy import End
 from bt_actions.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
 from bt_actions.ros.graph import servers
+from bt_actions.ros.unanswered import Unanswered
 from bt_actions.standstill import AT_MOST, STOOD_STILL, Standstill
 
 STATUS = "/_action/status"
@@ -72,9 +70,9 @@ class LeftBehind:
     servers: int = 1
     asked_at: float = float("-inf")
     awaited: bool = False
-    """It was sent, and no server has shown it yet."""
+    """It was sent, and no server has shown it yet; one may."""
     nothing_left: str = ""
-    """Why it is not awaited any more, though no server has told its end."""
+    """Why none will, or its end is not told: it need not be awaited."""
     denial: Denial = field(default_factory=Denial)
 
     @property
@@ -86,6 +84,10 @@ class LeftBehind:
     def is_over(self) -> bool:
         """Whether nobody runs it, nor will."""
         return self.end is not End.UNKNOWN or bool(self.nothing_left)
+
+    def is_nowhere(self, why: str) -> None:
+        """No server has it, nor will."""
+        self.awaited, self.nothing_left = False, why
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +101,8 @@ class Swept:
     """The others in sight, or wanted, each with the reason, in whose braces belongs its name."""
     domain: int
     """The ROS domain in force."""
+    trouble: OSError | None = None
+    """Why nobody can read what was sent and is not answered."""
 
 
 class CannotStart(RuntimeError):
@@ -282,8 +286,9 @@ class _Sweep:
         self._foreign: set[bytes] = set()
         self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
         self._left: dict[bytes, LeftBehind] = {}
-        self._files: set[Path] = set()  # that were read
-        self._records: list[ledger.Sent] = []
+        self._unanswered = Unanswered()
+        self._awaits_until = 0.0
+        self._looked_out = False  # for as long as for what is wanted
 
     def begin(self, node: Node, wanted: Collection[str] | None) -> None:
         """Go on with what this node sees. Raises ValueError for a name that is none."""
@@ -328,6 +333,7 @@ class _Sweep:
             self._turn(still)
             last = time.monotonic()  # its own work is no standstill
             lacks = self._lacks()
+            self._looked_out |= now >= self._deadline
             looking = now < self._deadline and (now < until or bool(lacks))
             awaiting = now < self._awaits_until and self._awaits
             if not (looking or awaiting) and (self._over or now >= looked + self._patience):
@@ -354,7 +360,7 @@ class _Sweep:
         if (lacks := self._lacks()) and not self._stopped():
             self._missing(lacks, True)
         calls = sorted(self._calls.items())
-        ledger.strike(sent for sent in self._records if self._is_settled(sent))
+        self._unanswered.strike(self._left, self._calls, was_looked_for=self._looked_out)
         return Swept(
             left=list(self._left.values()),
             known=[name for name, call in calls if call.known],
@@ -363,6 +369,7 @@ class _Sweep:
                 for name, call in calls
                 if not call.known and (call.sighted or self._requires(name))
             },
+            trouble=self._unanswered.trouble,
             domain=self._domain,
         )
 
@@ -376,17 +383,6 @@ class _Sweep:
         unknown = [action for action, call in sorted(self._calls.items()) if not call.known]
         return [action for action in unknown if self._requires(action)]
 
-    def _is_settled(self, sent: ledger.Sent) -> bool:
-        """Whether nobody need look for it again: it is over, or in a status, or looked for in vain.
-
-        Its server has been out of sight for longer then than it may take to accept a goal.
-        """
-        left = self._left.get(sent.goal_id)
-        if left is None:
-            return not self._stopped()
-        in_vain = not self._calls[left.action].sighted and not self._stopped()
-        return left.is_over or not left.awaited or in_vain
-
     @property
     def _over(self) -> bool:
         """Whether every goal that was found has ended."""
@@ -396,8 +392,7 @@ class _Sweep:
     def _awaits(self) -> bool:
         """Whether a goal may turn up yet at a server in sight."""
         return any(
-            left.awaited and not left.is_over and self._calls[left.action].sighted
-            for left in self._left.values()
+            left.awaited and self._calls[left.action].sighted for left in self._left.values()
         )
 
     def _turn(self, still: Standstill) -> None:
@@ -433,9 +428,9 @@ class _Sweep:
             if code not in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
                 self._turns_up(left)
             elif code == CANCEL_TERMINATED and len(self._calls[action].servers) <= 1:
-                left.nothing_left = "has ended"
+                left.is_nowhere("has ended")
             else:
-                left.denial.denied(number, now)
+                left.denial.denied(number)
 
     def _glance(self, now: float) -> None:
         """See which actions are in sight, and how many servers each has."""
@@ -467,11 +462,15 @@ class _Sweep:
     def _meet(self, action: str, goal_id: bytes) -> None:
         """See whose goal it is that runs there."""
         author = author_of(goal_id)
-        if author is None or goal_id in self._foreign:
+        if author is None:
             return
         if author.here:
             self._minded[goal_id] = action, author
         else:
+            self._meet_elsewhere(action, goal_id)
+
+    def _meet_elsewhere(self, action: str, goal_id: bytes) -> None:
+        if goal_id not in self._foreign:
             self._foreign.add(goal_id)
             self._elsewhere(action, goal_id)
 
@@ -483,34 +482,20 @@ class _Sweep:
                 del self._minded[goal_id]
                 left = self._left[goal_id] = LeftBehind(action, goal_id, author.pid)
                 self._found(left)
-        self._look_up()
+        for sent in self._unanswered.read(self._domain):
+            self._meet_elsewhere(sent.action, sent.goal_id)
+        for sent in list(self._unanswered.new(self._left, self._calls)):
+            self._calls.setdefault(sent.action, RollCall(time.monotonic()))
+            left = LeftBehind(sent.action, sent.goal_id, sent.author.pid, awaited=True)
+            self._left[sent.goal_id] = left
+            self._found(left)
+        self._unanswered.judge(self._left, self._calls)
         for left in self._left.values():
             left.servers = len(self._calls[left.action].servers)
 
-    def _look_up(self) -> None:
-        """See what the dead have on record, and what of it need not be awaited any more."""
-        for path, goals in ledger.left_behind(self._files):
-            self._files.add(path)
-            self._records.extend(sent for sent in goals if sent.domain == self._domain)
-        for sent in self._records:
-            call = self._calls.setdefault(sent.action, RollCall(time.monotonic()))
-            gone = bool(sent.servers) and not sent.servers & call.servers
-            left = self._left.get(sent.goal_id)
-            if left is None and not (sent.lost and gone):
-                self._await(sent)
-            elif left is not None and left.awaited and left.denial.for_good:
-                left.nothing_left = f"denied for {DENIED_FOR_GOOD:g} s"
-            elif left is not None and left.awaited and gone and call.known:
-                left.nothing_left = "its server is gone"
-
-    def _await(self, sent: ledger.Sent) -> None:
-        left = LeftBehind(sent.action, sent.goal_id, sent.pid, awaited=True)
-        self._left[sent.goal_id] = left
-        self._found(left)
-
     def _turns_up(self, left: LeftBehind) -> None:
         """A server has it: it tells the end in a status."""
-        if left.awaited:
+        if left.awaited or left.nothing_left:
             left.awaited, left.nothing_left, left.asked_at = False, "", float("-inf")
             if left.end is End.UNKNOWN:
                 self._found(left)

@@ -296,7 +296,7 @@ class Line:
             self._tell_who_waits()
         for command in commands:
             self._carry_out(ticket, command, message)
-        if goal.accepted or (goal.state is State.DONE and goal.end is not End.UNKNOWN):
+        if self._is_answered(ticket):
             ledger.strike(goal.id)
         elif goal.lost != was_lost and goal.id in ledger:
             self._put_on_record(ticket)
@@ -339,6 +339,16 @@ class Line:
                 self.tell(ticket, Event.SEND_FAILED, error)
             else:
                 self._warn_once(f"{command.name} could not be sent", error)
+
+    @staticmethod
+    def _is_answered(ticket: Ticket) -> bool:
+        """Whether it need not be on record any more: whoever got it shows it, or will not run it.
+
+        One that two servers got is accepted by one of them first.
+        """
+        goal = ticket.goal
+        shown = goal.accepted and len(ticket.testimony.sent_to) <= 1
+        return shown or (ticket.accounted_for and (not goal.lost or goal.state is State.DONE))
 
     def _put_on_record(self, ticket: Ticket) -> None:
         goal, sent_to = ticket.goal, ticket.testimony.sent_to

@@ -99,6 +99,18 @@ def test_what_nobody_wants_is_not_counted_where_it_is_silent(
     assert said.out == ("nothing is left to cancel on the 1 action of 2 in sight in ROS domain 7\n")
 
 
+def test_where_the_records_cannot_be_read_nobody_says_that_nothing_is_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trouble = PermissionError(errno.EPERM, "others may write there", "/records")
+    monkeypatch.setattr(module, "cleanup", lambda **_: Swept([], ["/a"], {}, 7, trouble))
+    assert main(["cleanup"]) == 3
+    said = capsys.readouterr()
+    assert "nobody can see what was sent and not answered" in said.err
+    assert "/records" in said.err
+    assert said.out == ""
+
+
 def test_an_action_that_is_named_is_wanted(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bt_actions import MoveRobot, TreeRunner
-from bt_actions.goal_terms import Event
+from bt_actions.goal_terms import Event, State
 from bt_actions.ros import line as module
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
@@ -47,7 +48,7 @@ def ledger(monkeypatch: pytest.MonkeyPatch) -> Recorder:
 def test_a_goal_is_on_record_until_it_is_accepted(
     serve: Any, name: str, node: Any, ledger: Recorder
 ) -> None:
-    journal = serve("1:delay_accept=1")
+    journal = serve("1:delay_accept=3")
     leaf = MoveRobot("m", 0.5, action_name=name)
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
@@ -128,3 +129,62 @@ def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
             ticket.line.tell(ticket, Event.SERVER_RETURNED)
             [(*_, lost)] = ledger.open.values()
             assert not lost
+
+
+@pytest.mark.parametrize(
+    ("servers", "accepted", "accounted_for", "lost", "done", "is_answered"),
+    [
+        (1, False, False, False, False, False),
+        (1, True, False, False, False, True),
+        (2, True, False, False, False, False),  # the second one may accept it later
+        (2, True, True, False, True, True),
+        (1, False, True, False, False, True),  # denied for good, and kept in mind
+        (1, False, True, True, False, False),  # it may come back while we are there
+        (1, False, True, True, True, True),
+        (1, False, False, False, True, False),  # nobody knows
+    ],
+)
+def test_when_it_need_not_be_on_record(
+    servers: int, accepted: bool, accounted_for: bool, lost: bool, done: bool, is_answered: bool
+) -> None:
+    state = State.DONE if done else State.CANCELING
+    ticket: Any = SimpleNamespace(
+        goal=SimpleNamespace(accepted=accepted, lost=lost, state=state),
+        testimony=SimpleNamespace(sent_to=[b"gid"] * servers),
+        accounted_for=accounted_for,
+    )
+    assert module.Line._is_answered(ticket) is is_answered
+
+
+def test_when_the_node_goes_what_is_not_accounted_for_stays_and_what_is_goes(
+    serve: Any, name: str, node: Any, ledger: Recorder
+) -> None:
+    """As a foreign loop leaves it that does not wait: Traffic.destroy sends LEFT, and CLOSED."""
+    journal = serve("1:delay_accept=60")
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        goal = journal.wait_for("received").goal
+        with lock:
+            line = Traffic.of(node).line(leaf.action_type, name)
+            [ticket] = line.goals.values()
+            line.put_away(all_of_them=True)
+            ticket.line.tell(ticket, Event.CLOSED)
+        assert [goal_id.hex() for goal_id in ledger.open] == [goal]
+
+
+def test_what_is_put_away_as_gone_is_taken_off(
+    new_host: HostFactory, name: str, node: Any, ledger: Recorder
+) -> None:
+    host = new_host()
+    journal = host.open(name, "1:delay_accept=60")
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        journal.wait_for("received")
+        host.kill()
+        until(lambda: leaf.outcome is not None, 40.0)
+        assert len(ledger.open) == 1
+        with lock:
+            Traffic.of(node).line(leaf.action_type, name).put_away()
+        assert ledger.open == {}

@@ -65,7 +65,7 @@ def test_cleanup_awaits_what_its_server_has_not_accepted_yet(
     assert journal.ends() == ["canceled"]
     canceled_at_once(journal)
     assert [line.split()[-1] for line in cleanup.lines] == ["CANCELED"], cleanup
-    assert "that was not answered: waiting up to 30 s" in "\n".join(cleanup.errors), cleanup
+    assert "that was not answered: waiting for 30 s" in "\n".join(cleanup.errors), cleanup
     again = launch("cleanup")
     assert again.wait() == 0, again
     assert "nothing is left" in "\n".join(again.lines), again
@@ -174,25 +174,4 @@ def test_what_was_known_to_be_lost_is_not_told_again(
     cleanup = launch("cleanup")
     assert cleanup.wait(60.0) == 0, cleanup
     assert "nothing is left" in "\n".join(cleanup.lines), cleanup
-    assert list(ledger.iterdir()) == []
     record.outcome = "nothing is left; exit code 0"
-
-
-@pytest.mark.parametrize(
-    "spoilt",
-    [b"", b"\0" * 5000, b"{" * 3000, b'{"goal": 3}'.ljust(1023) + b"\n", b"\xff" * 100_000],
-    ids=["empty", "zeros", "braces", "a number", "long"],
-)
-def test_a_spoilt_record_harms_nobody(
-    spoilt: bytes, ledger: Path, serve: Serve, domain: int, record: Record
-) -> None:
-    """A record of a dead process with other bytes in it"""
-    from bt_actions.goal_ids import new_goal_id
-    from bt_actions.ros.cleanup import cleanup
-
-    serve()
-    ledger.mkdir(mode=0o700)
-    dead = new_goal_id()[:6] + (2**22 + 1).to_bytes(4, "big") + b"\1\1"
-    (ledger / f"{dead.hex()}.goals").write_bytes(spoilt)
-    assert cleanup(look=0.5, patience=0.5).left == []
-    record.outcome = "nothing is found"

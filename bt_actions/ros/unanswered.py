@@ -1,0 +1,87 @@
+"""What dead processes sent and nobody answered (ledger.py), as a cleanup awaits it.
+
+Each is awaited until a server shows it, or it is sure that none will. Asks nobody: cleanup.py does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bt_actions.goal import DENIED_FOR_GOOD
+from bt_actions.ledger import Sent, left_behind, strike_left
+from bt_actions.roll_call import RollCall
+
+if TYPE_CHECKING:
+    from bt_actions.ros.cleanup import LeftBehind
+
+
+class Unanswered:
+    """What is on record of one ROS domain."""
+
+    def __init__(self) -> None:
+        self.trouble: OSError | None = None
+        """Why the records cannot be read."""
+        self._read: set[Path] = set()
+        self._sent: dict[bytes, Sent] = {}
+
+    def read(self, domain: int) -> Iterator[Sent]:
+        """Read the records of those that have died since; return goals that are elsewhere's."""
+        try:
+            for path, goals in left_behind(self._read):
+                self._read.add(path)
+                for sent in goals:
+                    if sent.domain == domain and sent.author.here:
+                        self._sent[sent.goal_id] = sent
+                    elif sent.domain == domain:
+                        yield sent
+        except OSError as error:
+            self.trouble = error
+
+    def new(
+        self, left: Mapping[bytes, LeftBehind], calls: Mapping[str, RollCall]
+    ) -> Iterator[Sent]:
+        """Return those that are to be awaited from now on.
+
+        Where its sender had seen its server go, only if that is in sight again.
+        """
+        for goal_id, sent in self._sent.items():
+            if goal_id not in left and not (sent.lost and self._is_gone(sent, calls)):
+                yield sent
+
+    def judge(self, left: Mapping[bytes, LeftBehind], calls: Mapping[str, RollCall]) -> None:
+        """See which of them need not be awaited any more."""
+        for goal_id, sent in self._sent.items():
+            awaited = left.get(goal_id)
+            if awaited is None or not awaited.awaited:
+                continue
+            if awaited.denial.for_good:
+                awaited.is_nowhere(f"denied for {DENIED_FOR_GOOD:g} s")
+            elif calls[sent.action].known and self._is_gone(sent, calls):
+                awaited.is_nowhere("its server is gone")
+
+    def strike(
+        self,
+        left: Mapping[bytes, LeftBehind],
+        calls: Mapping[str, RollCall],
+        *,
+        was_looked_for: bool,
+    ) -> None:
+        """Take off the record what nobody need look for again.
+
+        That is what is over, what a status shows, and what was looked for to no avail for longer
+        than a server may take to decide.
+        """
+        strike_left(
+            sent
+            for goal_id, sent in self._sent.items()
+            if (goal := left.get(goal_id)) is not None
+            and (not goal.awaited or (was_looked_for and not calls[sent.action].sighted))
+        )
+
+    @staticmethod
+    def _is_gone(sent: Sent, calls: Mapping[str, RollCall]) -> bool:
+        """Whether no server that may have got it is in sight, nor was."""
+        call = calls.get(sent.action)
+        return bool(sent.servers) and not (call is not None and sent.servers & call.servers)

@@ -1,0 +1,209 @@
+"""What a cleanup awaits of what dead processes sent; with killed orchestrators: tests/scenarios."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bt_actions.policy import End
+from bt_actions.ros import cleanup as module
+from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
+from tests.support.processes import Journal, Process
+
+SEND = """
+import sys, rclpy
+from rclpy.action import ActionClient
+from robot_control_interfaces.action import MoveRobot
+from unique_identifier_msgs.msg import UUID
+from bt_actions.goal_ids import new_goal_id
+from bt_actions.ledger import Ledger
+from bt_actions.ros.graph import servers
+action, domain, distance, lost = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
+rclpy.init()
+node, goal_id = rclpy.create_node("sender"), new_goal_id()
+client, known = ActionClient(node, MoveRobot, action), []
+if distance:
+    client.wait_for_server()
+    known = servers(node, action)
+if lost:
+    known = [b"another server's"]
+Ledger(print).enter(goal_id, action, domain, known, lost=bool(lost))
+if distance:
+    goal = MoveRobot.Goal(distance=distance)
+    client.send_goal_async(goal, goal_uuid=UUID(uuid=list(goal_id)))
+print(goal_id.hex(), flush=True)
+rclpy.spin(node)
+"""
+"""A program that has one goal on record, whatever is answered; it sends it if it has a distance."""
+
+Leave = Callable[..., str]
+
+
+@pytest.fixture(autouse=True)
+def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the records of a test's programs are."""
+    path = tmp_path / "records"
+    monkeypatch.setenv("BT_ACTIONS_LEDGER", str(path))
+    return path
+
+
+@pytest.fixture
+def leave(start_program: Callable[..., Process], name: str, domain: int) -> Leave:
+    """Have a program send a goal, or only say so, and kill it; return the goal's id."""
+
+    def leave_behind(
+        distance: float, *lost: str, journal: Journal | None = None, elsewhere: int = 0
+    ) -> str:
+        arguments = [name, str(domain + elsewhere), str(distance), *lost]
+        sender = start_program("-c", SEND, *arguments)
+        goal = sender.line()
+        if journal is not None:
+            journal.wait_for("received", within=20.0)
+        sender.send(signal.SIGKILL)
+        sender.popen.wait()
+        return goal
+
+    return leave_behind
+
+
+def sweep(**more: Any) -> tuple[Swept, list[str], list[str]]:
+    """Clean up; return what came of it, what was found, and what is missing in the end."""
+    found: list[str] = []
+    missing: list[str] = []
+
+    def note(left: LeftBehind) -> None:
+        found.append(f"{'awaited' if left.awaited else 'shown'} {left.goal_id.hex()}")
+
+    swept = cleanup(
+        look=1.0,
+        patience=5.0,
+        found=note,
+        missing=lambda names, in_vain: missing.extend(names if in_vain else ()),
+        **more,
+    )
+    return swept, found, missing
+
+
+def test_what_is_on_record_and_in_a_status_is_one_goal(
+    serve: Callable[..., Journal], leave: Leave, records: Path
+) -> None:
+    journal = serve()
+    goal = leave(90.0, journal=journal)
+    swept, found, _ = sweep()
+    assert [(left.goal_id.hex(), left.end) for left in swept.left] == [(goal, End.CANCELED)]
+    assert found == [f"awaited {goal}", f"shown {goal}"]
+    assert list(records.iterdir()) == []
+
+
+def test_one_that_has_ended_since_is_told_with_its_end(
+    serve: Callable[..., Journal], leave: Leave, records: Path
+) -> None:
+    journal = serve()
+    leave(0.1, journal=journal)
+    journal.wait_for("succeeded")
+    swept, _, _ = sweep()
+    assert [left.end for left in swept.left] == [End.SUCCEEDED]
+    assert list(records.iterdir()) == []
+
+
+def test_one_of_another_domain_is_left_alone(
+    serve: Callable[..., Journal], leave: Leave, records: Path
+) -> None:
+    serve()
+    leave(0.0, elsewhere=1)
+    swept, found, missing = sweep()
+    assert (swept.left, found, missing) == ([], [], [])
+    assert len(list(records.iterdir())) == 1
+
+
+def test_one_of_another_machine_is_named(
+    serve: Callable[..., Journal], leave: Leave, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serve()
+    goal = leave(0.0)
+    monkeypatch.setenv("BT_ACTIONS_MACHINE", "another")
+    elsewhere: list[tuple[str, str]] = []
+    swept, found, _ = sweep(elsewhere=lambda action, id_: elsewhere.append((action, id_.hex())))
+    assert (swept.left, found) == ([], [])
+    assert elsewhere == [(name, goal)]
+
+
+def test_one_whose_sender_dies_meanwhile_is_found(
+    serve: Callable[..., Journal],
+    start_program: Callable[..., Process],
+    name: str,
+    domain: int,
+) -> None:
+    journal = serve("1:delay_accept=10")
+    sender = start_program("-c", SEND, name, str(domain), "90.0")
+    goal = sender.line()
+    journal.wait_for("received", within=20.0)
+
+    def sighted(action: str) -> None:
+        if action == name:
+            sender.send(signal.SIGKILL)
+            sender.popen.wait()
+
+    swept, found, _ = sweep(sighted=sighted)
+    assert [left.end for left in swept.left] == [End.CANCELED]
+    assert found == [f"awaited {goal}", f"shown {goal}"]
+
+
+def test_one_whose_server_was_known_to_be_gone_is_not_awaited(
+    serve: Callable[..., Journal], leave: Leave, records: Path
+) -> None:
+    serve()
+    leave(0.0, "lost")
+    swept, found, missing = sweep()
+    assert (swept.left, found, missing) == ([], [], [])
+
+
+def test_one_whose_server_is_not_in_sight_is_looked_for(
+    leave: Leave, name: str, records: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LOOK_LONGEST", 3.0)
+    leave(0.0)
+    swept, _, missing = sweep()
+    assert [left.is_over for left in swept.left] == [False]
+    assert missing == [name]
+    assert list(records.iterdir()) == [], "it has been told, and looked for long enough"
+
+
+@pytest.mark.parametrize("how", ["stopped", "no participant"])
+def test_one_that_was_not_looked_for_to_the_end_stays_on_record(
+    how: str, leave: Leave, records: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave(0.0)
+    stopped: list[int] = []
+    if how == "stopped":
+        sweep(stopped=lambda: len(stopped.append(1) or stopped) > 10)
+    else:
+
+        def no_more(*_: Any, **__: Any) -> None:
+            raise CannotStart("no descriptors")
+
+        monkeypatch.setattr(module._Sweep, "goes_through", lambda *_, **__: False)
+        begin = module._Sweep.begin
+
+        def once(self: Any, *given: Any) -> None:
+            begin(self, *given)
+            monkeypatch.setattr(module, "_participant", no_more)
+
+        monkeypatch.setattr(module._Sweep, "begin", once)
+        sweep()
+    assert len(list(records.iterdir())) == 1
+
+
+def test_records_that_cannot_be_read_are_told(
+    serve: Callable[..., Journal], leave: Leave, records: Path
+) -> None:
+    serve()
+    leave(0.0)
+    records.chmod(0o777)
+    swept, found, _ = sweep()
+    assert found == []
+    assert isinstance(swept.trouble, PermissionError)
