@@ -8,8 +8,9 @@ no disk.
 
 The file is named by the bytes that all goal ids of its process begin with (goal_ids.py). A goal has
 a row of fixed length, which is written in place before the goal is sent, and blanked when it has
-been answered. A process that ends in good order removes the file. What is read is believed no
-further than that a question about a goal is worth asking.
+been answered. A process that ends in good order removes the file, but for goals whose server went
+away: that may only stand still. What is read is believed no further than that a question about a
+goal is worth asking.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ ROWS_AT_MOST = 4096
 SERVERS_AT_MOST = 8
 """Servers of a goal on record; where there are more, none is."""
 KEPT_FOR = 86400.0
-"""Seconds after which a file is removed that nobody has cleaned up."""
+"""Seconds after which a file is removed that nobody has cleaned up, also those of a suspended
+machine, whatever becomes of its wall clock."""
 TIDIED_AT_MOST = 64
 """Files that a process which opens its own looks at, whether they can be removed."""
 _BLANK = b" " * (LENGTH - 1)
@@ -88,6 +90,7 @@ class Ledger:
             if len(servers) <= SERVERS_AT_MOST
             else [],
             "lost": lost,
+            "at": round(_boot_time(), 1),
         }
         text = json.dumps(entry).encode().ljust(LENGTH - 1) + b"\n"
         try:
@@ -186,7 +189,9 @@ class Sent:
     servers: frozenset[bytes]
     """GIDs of the servers that were in sight; none where they are not known."""
     lost: bool
-    """They had gone, as far as its sender knew; that may be wrong where a link was cut."""
+    """They had gone, as far as was known; but they may only have stood still."""
+    at: float
+    """Seconds since the start of the machine when it was sent, or lost."""
     author: Author
     """Who is dead, or not `here`."""
     path: Path
@@ -227,11 +232,31 @@ def strike_left(goals: Iterable[Sent]) -> None:
                 path.unlink()
 
 
+def mark_lost(goals: Iterable[Sent]) -> None:
+    """Have it on record that the servers of these goals are not in sight."""
+    for sent in goals:
+        with contextlib.suppress(OSError, ValueError):
+            file = os.open(sent.path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+            try:
+                entry = json.loads(os.pread(file, LENGTH, sent.row * LENGTH)) | {"lost": True}
+                text = json.dumps(entry).encode().ljust(LENGTH - 1) + b"\n"
+                if len(text) == LENGTH:
+                    os.pwrite(file, text, sent.row * LENGTH)
+            finally:
+                os.close(file)
+
+
 def _directory() -> Path:
     named = os.environ.get(DIRECTORY)
     # What others may have made there is not used: _check
     shared = "/dev/shm"  # nosec B108
-    return Path(named or f"{shared}/bt_actions-{os.geteuid()}")
+    return Path(named or f"{shared}/bt_actions-{os.geteuid()}").absolute()
+
+
+def _boot_time() -> float:
+    """Return seconds that only a start of the machine sets back."""
+    clock = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if clock is None else time.clock_gettime(clock)
 
 
 def _check(directory: Path) -> None:
@@ -278,8 +303,8 @@ def _parse(path: Path, author: Author, row: int, text: bytes) -> Sent | None:
         entry = json.loads(text)
         goal_id, action, domain = bytes.fromhex(entry["goal"]), entry["action"], entry["domain"]
         servers = frozenset(bytes.fromhex(each) for each in entry["servers"])
-        lost = entry["lost"]
-    except (ValueError, KeyError, TypeError, RecursionError):
+        lost, at = entry["lost"], float(entry["at"])
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
     if author_of(goal_id) != author:
         return None
@@ -287,7 +312,7 @@ def _parse(path: Path, author: Author, row: int, text: bytes) -> Sent | None:
         return None
     if type(domain) is not int or type(lost) is not bool:
         return None
-    return Sent(goal_id, action, domain, servers, lost, author, path, row)
+    return Sent(goal_id, action, domain, servers, lost, at, author, path, row)
 
 
 def _tidy(directory: Path) -> None:
@@ -299,6 +324,10 @@ def _tidy(directory: Path) -> None:
             if author is None or (author.here and author.alive):
                 continue
             with contextlib.suppress(OSError):
-                old = time.time() - path.lstat().st_mtime > KEPT_FOR
-                if old or (author.here and not _read(path).strip()):
+                left, now = _parse_all(path, author), _boot_time()
+                if left:
+                    is_over = all(now - sent.at > KEPT_FOR for sent in left)
+                else:
+                    is_over = author.here and not _read(path).strip()
+                if is_over:
                     path.unlink()

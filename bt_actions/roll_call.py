@@ -148,7 +148,9 @@ class Denial:
         if self._last is None or self._last[1] != of or at - self._last[0] > SILENT:
             self._denied_for = 0.0
         else:
-            self._denied_for += min(at - self._last[0], LATE)  # it may have been stopped meanwhile
+            missed = any(self._last[0] < other < at for other, _ in self._asked.values())
+            passed = at - self._last[0]  # and it may have been stopped meanwhile
+            self._denied_for += min(passed, LATE) if missed else passed
         self._last = at, of
 
     @property

@@ -24,6 +24,7 @@ from bt_actions.ledger import (
     Ledger,
     Sent,
     left_behind,
+    mark_lost,
     strike_left,
 )
 
@@ -100,6 +101,16 @@ def test_what_is_struck_is_not_found_again_and_the_last_takes_the_file_away(
     assert [sent.goal_id.hex() for sent in found()] == [ids[2], ids[3]]
     strike_left(others)
     assert list(directory.iterdir()) == []
+
+
+def test_that_a_server_is_not_in_sight_is_kept() -> None:
+    ids = die()
+    mark_lost(found()[1:2])
+    assert [(sent.goal_id.hex(), sent.lost) for sent in found()] == [
+        (ids[0], False),
+        (ids[2], True),
+        (ids[3], False),
+    ]
 
 
 def test_a_file_is_passed_over() -> None:
@@ -323,21 +334,24 @@ GOAL = "@"
         '"@"',
         "[]",
         '{"goal": "@"}',
-        '{"goal": 3, "domain": 0, "action": "/a", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": "0", "action": "/a", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": true, "action": "/a", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": 0, "action": "/LONG", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": 0, "action": "a", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": 0, "action": "/a\\n", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": 0, "action": "/\\u001b[2J", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": 0, "action": ["/a"], "servers": [], "lost": false}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": 3, "lost": false}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": ["x"], "lost": false}',
+        '{"goal": 3, "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": "0", "action": "/a", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": true, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": "/LONG", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": "a", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": "/a\\n", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": "/\\u001b", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": ["/a"], "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": 3, "lost": false, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": ["x"], "lost": false, "at": 1.0}',
         '{"goal": "@", "domain": 0, "action": "/a", "servers": []}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": 0}',
-        '{"goal": "@00", "domain": 0, "action": "/a", "servers": [], "lost": false}',
-        '{"goal": "OTHER", "domain": 0, "action": "/a", "servers": [], "lost": false}',
-        '{"goal": "00", "domain": 0, "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": 0, "at": 1.0}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": false}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": BIG}',
+        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": "x"}',
+        '{"goal": "@00", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "OTHER", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
+        '{"goal": "00", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
     ],
 )
 def test_what_is_damaged_is_skipped(entry: str, directory: Path) -> None:
@@ -345,7 +359,7 @@ def test_what_is_damaged_is_skipped(entry: str, directory: Path) -> None:
     (path,) = directory.iterdir()
     good = path.read_bytes()[2 * LENGTH : 3 * LENGTH]
     other = ids[0][:20] + "ffff" + ids[0][24:]  # of another process
-    entry = entry.replace("OTHER", other).replace("LONG", "a" * 255)
+    entry = entry.replace("OTHER", other).replace("LONG", "a" * 255).replace("BIG", "9" * 400)
     bad = entry.replace(GOAL, ids[0]).encode().ljust(LENGTH)
     path.write_bytes(bad + good)
     assert [sent.goal_id.hex() for sent in found()] == [ids[2]]
@@ -378,15 +392,23 @@ def changed(path: Path) -> Path:
 
 
 def test_the_next_process_removes_what_is_over_and_what_nobody_wants(
-    ledger: Ledger, directory: Path
+    ledger: Ledger, directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     die()
     (old,) = directory.iterdir()
-    past = time.time() - KEPT_FOR - 1.0
-    os.utime(old, (past, past))
+    later = time.clock_gettime(time.CLOCK_BOOTTIME) + KEPT_FOR
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "_boot_time", lambda: later - 60.0)
+        ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+        assert old.exists()
+        ledger.disown()
+        patch.setattr(module, "_boot_time", lambda: later + 60.0)
+        ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+        assert not old.exists()
+        ledger.disown()
+    shutil.rmtree(directory)
     die()
-    (recent,) = set(directory.iterdir()) - {old}
-    assert not old.exists()
+    (recent,) = directory.iterdir()
     blank = changed(recent)
     damaged = recent.with_stem(recent.stem[:-2] + ("00" if recent.stem[-2] != "0" else "11"))
     blank.write_bytes(b" " * LENGTH)

@@ -46,8 +46,9 @@ examples:
   bt-actions run pick_and_place --cleanup-first
 
 exit codes:
-  0 no server in sight has a goal that was left   3 the end of a goal is unknown, or no action
-  server is in sight, or one is silent; with an ACTION, where its server is (of others it is told)
+  0 no server in sight has a goal that was left (should none take more than 30 s to accept one)
+  3 the end of a goal is unknown, or no action server is in sight, or one is silent; with an ACTION,
+  where its server is (of others it is told)
   129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
 """
 

@@ -73,6 +73,8 @@ class LeftBehind:
     """It was sent, and no server has shown it yet; one may."""
     nothing_left: str = ""
     """Why none will, or its end is not told: it need not be awaited."""
+    server_is_gone: bool = False
+    """That is why."""
     denial: Denial = field(default_factory=Denial)
 
     @property
@@ -288,6 +290,7 @@ class _Sweep:
         self._left: dict[bytes, LeftBehind] = {}
         self._unanswered = Unanswered()
         self._awaits_until = 0.0
+        self._domain = 0
         self._looked_out = False  # for as long as for what is wanted
 
     def begin(self, node: Node, wanted: Collection[str] | None) -> None:
@@ -497,6 +500,7 @@ class _Sweep:
         """A server has it: it tells the end in a status."""
         if left.awaited or left.nothing_left:
             left.awaited, left.nothing_left, left.asked_at = False, "", float("-inf")
+            left.server_is_gone = False
             if left.end is End.UNKNOWN:
                 self._found(left)
 

@@ -344,11 +344,12 @@ class Line:
     def _is_answered(ticket: Ticket) -> bool:
         """Whether it need not be on record any more: whoever got it shows it, or will not run it.
 
-        One that two servers got is accepted by one of them first.
+        One that two servers got is accepted by one of them first. And a server that has gone may
+        only stand still, for longer than this process is there.
         """
         goal = ticket.goal
         shown = goal.accepted and len(ticket.testimony.sent_to) <= 1
-        return shown or (ticket.accounted_for and (not goal.lost or goal.state is State.DONE))
+        return shown or (ticket.accounted_for and goal.end is not End.SERVER_GONE)
 
     def _put_on_record(self, ticket: Ticket) -> None:
         goal, sent_to = ticket.goal, ticket.testimony.sent_to
@@ -527,8 +528,6 @@ class Line:
                 self.tell(ticket, Event.LEFT)
             if goal.lost:
                 ticket.look_out_left = 0.0  # nobody does from now on
-                if ticket.accounted_for:
-                    ledger.strike(goal.id)
                 self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
                 self.close_book(ticket)
 
@@ -555,6 +554,7 @@ class Line:
         ]
         for ticket in settled[:-LOST_KEPT]:
             self.tell(ticket, Event.CLOSED)
+            ledger.strike(ticket.goal.id)
 
     def _observe(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""

@@ -63,6 +63,8 @@ class Domain:
         """Remember a lost goal whose line goes: its server may be back for the next one."""
         kept = self._lost.setdefault((action, action_type), [])
         kept.append(ticket)
+        for forgotten in kept[:-LOST_KEPT]:
+            ledger.strike(forgotten.goal.id)
         del kept[:-LOST_KEPT]
 
     def lost_with(self, resources: frozenset[str]) -> list[tuple[str, Any]]:

@@ -373,9 +373,6 @@ def close_process() -> None:
                 if not ticket.is_over:
                     log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
             with lock:
-                for ticket in tickets:
-                    if ticket.accounted_for:
-                        ledger.strike(ticket.goal.id)
                 ledger.close()
             log.flush()
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.goal import DENIED_FOR_GOOD
-from bt_actions.ledger import Sent, left_behind, strike_left
+from bt_actions.ledger import Sent, left_behind, mark_lost, strike_left
 from bt_actions.roll_call import RollCall
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ class Unanswered:
                 awaited.is_nowhere(f"denied for {DENIED_FOR_GOOD:g} s")
             elif calls[sent.action].known and self._is_gone(sent, calls):
                 awaited.is_nowhere("its server is gone")
+                awaited.server_is_gone = True
 
     def strike(
         self,
@@ -68,16 +69,19 @@ class Unanswered:
         *,
         was_looked_for: bool,
     ) -> None:
-        """Take off the record what nobody need look for again.
+        """Take off the record what is over, or what a status shows.
 
-        That is what is over, what a status shows, and what was looked for to no avail for longer
-        than a server may take to decide.
+        What was looked for to no avail is to be told once; should its server only have stood still,
+        and be in sight another time, it is awaited again.
         """
-        strike_left(
+        met = [(sent, left[goal_id]) for goal_id, sent in self._sent.items() if goal_id in left]
+        settled = [sent for sent, goal in met if not (goal.awaited or goal.server_is_gone)]
+        strike_left(settled)
+        mark_lost(
             sent
-            for goal_id, sent in self._sent.items()
-            if (goal := left.get(goal_id)) is not None
-            and (not goal.awaited or (was_looked_for and not calls[sent.action].sighted))
+            for sent, goal in met
+            if goal.server_is_gone
+            or (goal.awaited and was_looked_for and not calls[sent.action].sighted)
         )
 
     @staticmethod

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from bt_actions import MoveRobot, TreeRunner
-from bt_actions.goal_terms import Event, State
+from bt_actions.goal_terms import Event
+from bt_actions.policy import End
 from bt_actions.ros import line as module
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
@@ -132,24 +133,22 @@ def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
 
 
 @pytest.mark.parametrize(
-    ("servers", "accepted", "accounted_for", "lost", "done", "is_answered"),
+    ("servers", "accepted", "accounted_for", "lost", "is_answered"),
     [
-        (1, False, False, False, False, False),
-        (1, True, False, False, False, True),
-        (2, True, False, False, False, False),  # the second one may accept it later
-        (2, True, True, False, True, True),
-        (1, False, True, False, False, True),  # denied for good, and kept in mind
-        (1, False, True, True, False, False),  # it may come back while we are there
-        (1, False, True, True, True, True),
-        (1, False, False, False, True, False),  # nobody knows
+        (1, False, False, False, False),
+        (1, True, False, False, True),
+        (2, True, False, False, False),  # the second one may accept it later
+        (2, True, True, False, True),
+        (1, False, True, False, True),  # denied for good, and kept in mind
+        (1, False, True, True, False),  # it may only have stood still
     ],
 )
 def test_when_it_need_not_be_on_record(
-    servers: int, accepted: bool, accounted_for: bool, lost: bool, done: bool, is_answered: bool
+    servers: int, accepted: bool, accounted_for: bool, lost: bool, is_answered: bool
 ) -> None:
-    state = State.DONE if done else State.CANCELING
+    end = End.SERVER_GONE if lost else End.NEVER_STARTED if accounted_for else End.UNKNOWN
     ticket: Any = SimpleNamespace(
-        goal=SimpleNamespace(accepted=accepted, lost=lost, state=state),
+        goal=SimpleNamespace(accepted=accepted, end=end),
         testimony=SimpleNamespace(sent_to=[b"gid"] * servers),
         accounted_for=accounted_for,
     )
@@ -173,7 +172,7 @@ def test_when_the_node_goes_what_is_not_accounted_for_stays_and_what_is_goes(
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
 
 
-def test_what_is_put_away_as_gone_is_taken_off(
+def test_what_is_put_away_as_gone_stays_marked_as_lost(
     new_host: HostFactory, name: str, node: Any, ledger: Recorder
 ) -> None:
     host = new_host()
@@ -184,7 +183,23 @@ def test_what_is_put_away_as_gone_is_taken_off(
         journal.wait_for("received")
         host.kill()
         until(lambda: leaf.outcome is not None, 40.0)
-        assert len(ledger.open) == 1
-        with lock:
-            Traffic.of(node).line(leaf.action_type, name).put_away()
-        assert ledger.open == {}
+    assert [lost for *_, lost in ledger.open.values()] == [True]
+
+
+def test_of_many_that_were_lost_the_newest_stay(
+    new_host: HostFactory,
+    name: str,
+    node: Any,
+    ledger: Recorder,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "LOST_KEPT", -1)  # all but the newest -1: the oldest one goes
+    host = new_host()
+    journal = host.open(name, "1:delay_accept=60")
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        journal.wait_for("received")
+        host.kill()
+        until(lambda: leaf.outcome is not None, 40.0)
+        until(lambda: ledger.open == {})

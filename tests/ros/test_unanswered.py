@@ -31,7 +31,7 @@ if distance:
     known = servers(node, action)
 if lost:
     known = [b"another server's"]
-Ledger(print).enter(goal_id, action, domain, known, lost=bool(lost))
+Ledger(print).enter(goal_id, action, domain, known, lost=lost == ["lost"])
 if distance:
     goal = MoveRobot.Goal(distance=distance)
     client.send_goal_async(goal, goal_uuid=UUID(uuid=list(goal_id)))
@@ -162,15 +162,16 @@ def test_one_whose_server_was_known_to_be_gone_is_not_awaited(
     assert (swept.left, found, missing) == ([], [], [])
 
 
-def test_one_whose_server_is_not_in_sight_is_looked_for(
-    leave: Leave, name: str, records: Path, monkeypatch: pytest.MonkeyPatch
+def test_one_whose_server_is_not_in_sight_is_looked_for_and_told_once(
+    leave: Leave, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "LOOK_LONGEST", 3.0)
-    leave(0.0)
-    swept, _, missing = sweep()
-    assert [left.is_over for left in swept.left] == [False]
+    leave(0.0, "lost once")
+    first, _, missing = sweep()
+    assert [left.is_over for left in first.left] == [False]
     assert missing == [name]
-    assert list(records.iterdir()) == [], "it has been told, and looked for long enough"
+    swept, found, missing = sweep()
+    assert (swept.left, found, missing) == ([], [], [])
 
 
 @pytest.mark.parametrize("how", ["stopped", "no participant"])

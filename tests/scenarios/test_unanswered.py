@@ -128,7 +128,8 @@ def test_a_server_that_was_restarted_has_nothing_to_await(
     assert cleanup.wait(60.0) == 0, cleanup
     record.took(time.monotonic() - began, 15.0)
     assert [line.split("  ")[-1] for line in cleanup.lines] == ["its server is gone"], cleanup
-    assert list(ledger.iterdir()) == []
+    [left] = ledger.iterdir()
+    assert json.loads(left.read_text())["lost"] is True
     assert journal.count("received") == 1
     record.outcome = "its server is gone; exit code 0"
 
@@ -148,6 +149,28 @@ def test_cleanup_looks_for_the_server_of_what_was_not_answered(
     again = launch("cleanup")
     assert again.wait(60.0) == 0, again
     record.outcome = "exit code 3, once: its server is not in sight"
+
+
+@pytest.mark.chaos
+def test_what_a_run_has_given_up_as_lost_is_awaited_when_its_server_is_back(
+    launch: Launch, new_host: HostFactory, tree: Tree, name: str, record: Record
+) -> None:
+    """SIGSTOP to a server that decides, until the run has ended; SIGCONT; then cleanup"""
+    host = new_host()
+    journal = host.open(name, "1:delay_accept=25")
+    path = tree(name, distance=90.0, timeout="{server: 5 s, accept: 60 s, cancel: 3 s}")
+    run = launch("run", str(path))
+    run.line("sending a goal to")
+    journal.wait_for("received")
+    host.send(signal.SIGSTOP)
+    assert run.wait(60.0) == 1, run
+    assert "SERVER_LOST" in "\n".join(run.lines), run
+    host.send(signal.SIGCONT)
+    cleanup = launch("cleanup", name)
+    assert cleanup.wait(90.0) == 0, cleanup
+    assert journal.ends() == ["canceled"]
+    canceled_at_once(journal)
+    record.outcome = "SERVER_LOST; then awaited, and CANCELED; exit code 0"
 
 
 @pytest.mark.chaos
