@@ -37,7 +37,7 @@ ROWS_AT_MOST = 4096
 """Goals on record at a time; no more are read, either."""
 SERVERS_AT_MOST = 8
 """Servers of a goal on record; where there are more, none is."""
-KEPT_FOR = 86400.0
+ACCEPT_LONGEST = KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up, also those of a suspended
 machine, whatever becomes of its wall clock."""
 TIDIED_AT_MOST = 64
@@ -79,9 +79,13 @@ class Ledger:
         domain: int,
         servers: Collection[bytes],
         *,
+        accept: float | None = None,
         lost: bool = False,
     ) -> None:
-        """Put a goal on record that is about to be sent, or what more is known of it."""
+        """Put a goal on record that is about to be sent, or what more is known of it.
+
+        `accept`: the seconds that its server is given to decide.
+        """
         entry = {
             "goal": goal_id.hex(),
             "domain": domain,
@@ -89,6 +93,7 @@ class Ledger:
             "servers": sorted(each.hex() for each in servers)
             if len(servers) <= SERVERS_AT_MOST
             else [],
+            "accept": min(accept or 0.0, ACCEPT_LONGEST),
             "lost": lost,
             "at": round(_boot_time(), 1),
         }
@@ -188,6 +193,8 @@ class Sent:
     """ROS domain id."""
     servers: frozenset[bytes]
     """GIDs of the servers that were in sight; none where they are not known."""
+    accept: float
+    """Seconds that its server was given to decide; 0: nobody said."""
     lost: bool
     """They had gone, as far as was known; but they may only have stood still."""
     at: float
@@ -303,7 +310,7 @@ def _parse(path: Path, author: Author, row: int, text: bytes) -> Sent | None:
         entry = json.loads(text)
         goal_id, action, domain = bytes.fromhex(entry["goal"]), entry["action"], entry["domain"]
         servers = frozenset(bytes.fromhex(each) for each in entry["servers"])
-        lost, at = entry["lost"], float(entry["at"])
+        lost, at, accept = entry["lost"], float(entry["at"]), float(entry["accept"])
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
     if author_of(goal_id) != author:
@@ -312,7 +319,9 @@ def _parse(path: Path, author: Author, row: int, text: bytes) -> Sent | None:
         return None
     if type(domain) is not int or type(lost) is not bool:
         return None
-    return Sent(goal_id, action, domain, servers, lost, at, author, path, row)
+    if not 0.0 <= accept <= ACCEPT_LONGEST:
+        return None
+    return Sent(goal_id, action, domain, servers, accept, lost, at, author, path, row)
 
 
 def _tidy(directory: Path) -> None:

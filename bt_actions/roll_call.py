@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from bt_actions.goal import DENIED_FOR_GOOD
-
 ASK_AGAIN = 1.0
 """Seconds between two questions;"""
 LATE = 1.5
@@ -129,7 +127,8 @@ class Denial:
         self._asked: dict[int, tuple[float, Collection[bytes]]] = {}
         self._denials: dict[int, int] = {}
         self._last: tuple[float, Collection[bytes]] | None = None  # question that all denied
-        self._denied_for = 0.0
+        self.lasted = 0.0
+        """Seconds for which all have denied it, the last time too."""
 
     def asked(self, number: int, of: Collection[bytes], now: float) -> None:
         """The question of this number was asked, `of` these servers."""
@@ -146,14 +145,9 @@ class Denial:
         if self._denials[number] != max(1, len(of)) or (self._last and at <= self._last[0]):
             return
         if self._last is None or self._last[1] != of or at - self._last[0] > SILENT:
-            self._denied_for = 0.0
+            self.lasted = 0.0
         else:
             missed = any(self._last[0] < other < at for other, _ in self._asked.values())
             passed = at - self._last[0]  # and it may have been stopped meanwhile
-            self._denied_for += min(passed, LATE) if missed else passed
+            self.lasted += min(passed, LATE) if missed else passed
         self._last = at, of
-
-    @property
-    def for_good(self) -> bool:
-        """Whether nothing will come of it any more."""
-        return self._denied_for >= DENIED_FOR_GOOD

@@ -35,7 +35,7 @@ from bt_actions.goal_ids import new_goal_id
 from bt_actions.ledger import Ledger
 ledger, ids = Ledger(print), [new_goal_id() for _ in range(4)]
 for number, goal_id in enumerate(ids):
-    ledger.enter(goal_id, f"/robot_{number}/move", number, [b"a" * 16])
+    ledger.enter(goal_id, f"/robot_{number}/move", number, [b"a" * 16], accept=60.0)
 ledger.strike(ids[1])
 print(*(goal_id.hex() for goal_id in ids), flush=True)
 os._exit(1)
@@ -89,6 +89,7 @@ def test_what_a_dead_process_left_is_found(directory: Path) -> None:
     seen = [(sent.goal_id.hex(), sent.action, sent.domain, sent.servers) for sent in found()]
     servers = frozenset({b"a" * 16})
     assert seen == [(ids[n], f"/robot_{n}/move", n, servers) for n in (0, 2, 3)]
+    assert {sent.accept for sent in found()} == {60.0}
     assert {sent.author.pid for sent in found()} == {int(ids[0][12:20], 16)}
 
 
@@ -322,46 +323,58 @@ def test_what_does_not_fit_is_not_on_record(ledger: Ledger, complaints: list[str
     assert len(complaints) == 1
 
 
-GOAL = "@"
-"""Stands for a goal id of the dead process."""
-
-
 @pytest.mark.parametrize(
-    "entry",
-    [
-        "nonsense",
-        "[" * 1000,
-        '"@"',
-        "[]",
-        '{"goal": "@"}',
-        '{"goal": 3, "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": "0", "action": "/a", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": true, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "/LONG", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "a", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "/a\\n", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "/\\u001b", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": ["/a"], "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": 3, "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": ["x"], "lost": false, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": []}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": 0, "at": 1.0}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": false}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": BIG}',
-        '{"goal": "@", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": "x"}',
-        '{"goal": "@00", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "OTHER", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
-        '{"goal": "00", "domain": 0, "action": "/a", "servers": [], "lost": false, "at": 1.0}',
-    ],
+    "text",
+    [b"nonsense", b"[" * 1000, b'"goal"', b"[]", b"\0" * LENGTH, b"\xff\xfe", b'{"goal": '],
+    ids=["a word", "deep", "a text", "a list", "zeros", "no text", "cut off"],
 )
-def test_what_is_damaged_is_skipped(entry: str, directory: Path) -> None:
+def test_what_is_no_row_is_skipped(text: bytes, directory: Path) -> None:
     ids = die()
     (path,) = directory.iterdir()
     good = path.read_bytes()[2 * LENGTH : 3 * LENGTH]
-    other = ids[0][:20] + "ffff" + ids[0][24:]  # of another process
-    entry = entry.replace("OTHER", other).replace("LONG", "a" * 255).replace("BIG", "9" * 400)
-    bad = entry.replace(GOAL, ids[0]).encode().ljust(LENGTH)
-    path.write_bytes(bad + good)
+    path.write_bytes(text.ljust(LENGTH) + good)
+    assert [sent.goal_id.hex() for sent in found()] == [ids[2]]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("goal", 3),
+        ("goal", "00"),
+        ("goal", "of another process"),
+        ("goal", "too long"),
+        ("domain", "0"),
+        ("domain", True),
+        ("action", "/" + "a" * 255),
+        ("action", "relative"),
+        ("action", "/a\n"),
+        ("action", "/\x1b[2J"),
+        ("action", ["/a"]),
+        ("servers", 3),
+        ("servers", ["x"]),
+        ("lost", 0),
+        ("at", "x"),
+        ("at", 10**400),
+        ("accept", "no"),
+        ("accept", -1.0),
+        ("accept", float("nan")),
+        ("accept", 1e6),
+        *((key, None) for key in ("goal", "domain", "action", "servers", "lost", "at", "accept")),
+    ],
+)
+def test_a_row_with_a_wrong_field_is_skipped(key: str, value: object, directory: Path) -> None:
+    ids = die()
+    (path,) = directory.iterdir()
+    text = path.read_bytes()
+    first, good = text[:LENGTH], text[2 * LENGTH : 3 * LENGTH]
+    entry = json.loads(first)
+    if value == "of another process":
+        value = ids[0][:20] + "ffff" + ids[0][24:]
+    elif value == "too long":
+        value = ids[0] + "00"
+    bad = entry | {key: value} if value is not None else entry.keys() - {key}
+    given = bad if isinstance(bad, dict) else {name: entry[name] for name in bad}
+    path.write_bytes(json.dumps(given).encode().ljust(LENGTH) + good)
     assert [sent.goal_id.hex() for sent in found()] == [ids[2]]
 
 

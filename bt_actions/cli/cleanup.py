@@ -36,17 +36,17 @@ container that is started again counts as another one, unless BT_ACTIONS_MACHINE
 its own for each container, the same each time.
 
 No server shows a goal that it has not accepted yet. What a dead process had sent, and nobody had
-answered, is on record, and is awaited for half a minute or more. Otherwise a server that is not in
-sight is not asked: name its action, and that is no success.
+answered, is on record, and is awaited for half a minute or more (--accept). Otherwise a server that
+is not in sight is not asked: name its action, and that is no success.
 
 examples:
   bt-actions cleanup
   bt-actions cleanup /r1/move_robot
-  bt-actions cleanup --look 10
+  bt-actions cleanup --look 10 --accept 120
   bt-actions run pick_and_place --cleanup-first
 
 exit codes:
-  0 no server in sight has a goal that was left (should none take more than 30 s to accept one)
+  0 no server in sight has a goal that was left (should none take longer to accept one: --accept)
   3 the end of a goal is unknown, or no action server is in sight, or one is silent; with an ACTION,
   where its server is (of others it is told)
   129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
@@ -77,6 +77,13 @@ def add_parser(subparsers: Subparsers) -> None:
         default=5.0,
         help="wait so long for the goals to end [5 s]",
     )
+    parser.add_argument(
+        "--accept",
+        metavar="S",
+        type=seconds,
+        default=0.0,
+        help="a server may take so long to accept a goal [30 s, or the timeout.accept of the goal]",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -86,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     for name in args.actions:
         if why := why_not(name):
             raise BadInput(f"{name!r} cannot be the name of an action server: {why}")
-    return sweep(args.look, args.patience, args.actions or None)
+    return sweep(args.look, args.patience, args.actions or None, accept=args.accept)
 
 
 def sweep(
@@ -95,6 +102,7 @@ def sweep(
     wanted: Collection[str] | None = None,
     namespace: str = "",
     *,
+    accept: float = 0.0,
     first: bool = False,
 ) -> Exit:
     """Clean up, saying what is found and how it ended; `first`: another run is to follow.
@@ -103,7 +111,7 @@ def sweep(
     sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread only.
     """
     with _Stop() as stop:
-        swept, foreign, unseen = _sweep(stop, look, patience, wanted, namespace)
+        swept, foreign, unseen = _sweep(stop, look, patience, accept, wanted, namespace)
         stop.is_told = stop.signal is not None
         if foreign:
             note(
@@ -129,15 +137,18 @@ def sweep(
 
 
 def _sweep(
-    stop: _Stop, look: float, patience: float, wanted: Collection[str] | None, namespace: str
+    stop: _Stop,
+    look: float,
+    patience: float,
+    accept: float,
+    wanted: Collection[str] | None,
+    namespace: str,
 ) -> tuple[Swept, list[str], list[str]]:
     """Look, and cancel; return what was seen, goals of others, and actions that are missing."""
     try:
         from bt_actions.ros.cleanup import CannotStart, cleanup
     except ImportError as error:
         raise BadInput(NO_ROS.format(error)) from error
-
-    from bt_actions.goal import DENIED_FOR_GOOD
 
     refuse_domain()
     foreign: list[str] = []
@@ -148,7 +159,7 @@ def _sweep(
         if left.awaited:
             note(
                 f"dead process {left.pid} sent a goal to {left.action} that was not answered: "
-                f"waiting for {DENIED_FOR_GOOD:g} s or more, to cancel it should it be accepted: "
+                f"waiting for {left.takes:g} s or more, to cancel it should it be accepted: "
                 f"{left.goal_id.hex()}"
             )
         else:
@@ -167,6 +178,7 @@ def _sweep(
         swept = cleanup(
             look=look,
             patience=patience,
+            accept=accept,
             found=found,
             elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
             wanted=wanted,

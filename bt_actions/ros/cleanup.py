@@ -45,8 +45,8 @@ GLANCE = 0.1
 """and, at least, between two looks at the graph, and for who is still alive."""
 LOOK_LONGEST = 30.0
 """Seconds for which servers may take to answer, in all: a ghost is shown for 20."""
-AWAIT_LONGEST = LOOK_LONGEST + DENIED_FOR_GOOD + 2 * SETTLE
-"""Seconds, in all, for which a goal is awaited that nobody has answered."""
+AWAIT_LONGER = LOOK_LONGEST + 2 * SETTLE
+"""Seconds by which a goal is awaited longer, at most, than it has to be denied."""
 LOOK_AGAIN = 10.0
 """Seconds after which, at the latest, a participant that is not answered gives way to another."""
 DEPTH = 100
@@ -69,6 +69,8 @@ class LeftBehind:
     shown: End = End.UNKNOWN
     servers: int = 1
     asked_at: float = float("-inf")
+    takes: float = DENIED_FOR_GOOD
+    """Seconds for which it has to be denied until it will not turn up any more."""
     awaited: bool = False
     """It was sent, and no server has shown it yet; one may."""
     nothing_left: str = ""
@@ -115,6 +117,7 @@ def cleanup(
     *,
     look: float = 5.0,
     patience: float = 5.0,
+    accept: float = 0.0,
     found: Callable[[LeftBehind], None] = lambda left: None,
     sighted: Callable[[str], None] = lambda action: None,
     elsewhere: Callable[[str, bytes], None] = lambda action, goal_id: None,
@@ -128,7 +131,7 @@ def cleanup(
 
     Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
     canceled to end. `found` is called with each at once, and again where it was `awaited` when it
-    turns up (in AWAIT_LONGEST seconds, at most); `sighted` with the name of each action of which a
+    turns up; `sighted` with the name of each action of which a
     server is in sight, and `elsewhere` with the action and the id of each unfinished goal
     of a bt_actions process on another machine, or in another container, of which nobody here can
     tell whether it is alive. The actions in `wanted`, whose relative names belong to `namespace`
@@ -137,17 +140,21 @@ def cleanup(
     that are not, in the beginning of waiting for one that is silent, and in the end if it was in
     vain, as it is told. Ends in the next turn when `stopped` says so. Blocks.
 
+    A goal that was sent and not answered is awaited: until it has been denied for `accept` seconds,
+    for as long as its sender gave the server to decide, and for DENIED_FOR_GOOD, whichever is most.
+
     Where a server in sight does not answer, or this process stands still for long meanwhile, it may
     be that it will never tell this participant anything (ros/lookout.py). So it looks again with a
     new one, unless `context` is given.
 
-    Raises CannotStart, if nothing has been looked at yet; ValueError for a `look` or a `patience`
-    that is negative or no number, and for a name in `wanted` that is none; and what rclpy raises
-    where `context` is shut down meanwhile.
+    Raises CannotStart, if nothing has been looked at yet; ValueError for a `look`, a `patience` or
+    an `accept` that is negative or no number, and for a name in `wanted` that is none; and what
+    rclpy raises where `context` is shut down meanwhile.
     """
-    if not (look >= 0.0 and patience >= 0.0):
-        raise ValueError(f"look {look} and patience {patience}: seconds are 0 or more")
-    sweep = _Sweep(look, patience, found, sighted, elsewhere, missing, stopped)
+    if not (look >= 0.0 and patience >= 0.0 and accept >= 0.0):
+        given = f"look {look}, patience {patience}, accept {accept}"
+        raise ValueError(f"{given}: seconds are 0 or more")
+    sweep = _Sweep(look, patience, accept, found, sighted, elsewhere, missing, stopped)
     for tries_left in (2, 1, 0) if context is None else (0,):
         still = Standstill()
         still.lives(time.monotonic())  # it counts from when the participant is made
@@ -267,6 +274,7 @@ class _Sweep:
         self,
         look: float,
         patience: float,
+        accept: float,
         found: Callable[[LeftBehind], None],
         sighted: Callable[[str], None],
         elsewhere: Callable[[str, bytes], None],
@@ -275,6 +283,7 @@ class _Sweep:
     ) -> None:
         self._look = look
         self._patience = patience
+        self._accept = accept
         self._found = found
         self._sighted = sighted
         self._elsewhere = elsewhere
@@ -299,7 +308,6 @@ class _Sweep:
         now = time.monotonic()
         if not self.has_begun:
             self._deadline = now + max(self._look, LOOK_LONGEST)
-            self._awaits_until = now + max(self._look, AWAIT_LONGEST)
         self.has_begun = True
         self._node = node
         self._domain = int(node.context.get_domain_id())
@@ -489,7 +497,10 @@ class _Sweep:
             self._meet_elsewhere(sent.action, sent.goal_id)
         for sent in list(self._unanswered.new(self._left, self._calls)):
             self._calls.setdefault(sent.action, RollCall(time.monotonic()))
-            left = LeftBehind(sent.action, sent.goal_id, sent.author.pid, awaited=True)
+            takes = max(DENIED_FOR_GOOD, self._accept, sent.accept)
+            until = time.monotonic() + max(self._look, takes + AWAIT_LONGER)
+            self._awaits_until = max(self._awaits_until, until)
+            left = LeftBehind(sent.action, sent.goal_id, sent.author.pid, takes=takes, awaited=True)
             self._left[sent.goal_id] = left
             self._found(left)
         self._unanswered.judge(self._left, self._calls)

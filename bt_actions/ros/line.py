@@ -296,7 +296,7 @@ class Line:
             self._tell_who_waits()
         for command in commands:
             self._carry_out(ticket, command, message)
-        if self._is_answered(ticket):
+        if _is_answered(ticket):
             ledger.strike(goal.id)
         elif goal.lost != was_lost and goal.id in ledger:
             self._put_on_record(ticket)
@@ -340,21 +340,11 @@ class Line:
             else:
                 self._warn_once(f"{command.name} could not be sent", error)
 
-    @staticmethod
-    def _is_answered(ticket: Ticket) -> bool:
-        """Whether it need not be on record any more: whoever got it shows it, or will not run it.
-
-        One that two servers got is accepted by one of them first. And a server that has gone may
-        only stand still, for longer than this process is there.
-        """
-        goal = ticket.goal
-        shown = goal.accepted and len(ticket.testimony.sent_to) <= 1
-        return shown or (ticket.accounted_for and goal.end is not End.SERVER_GONE)
-
     def _put_on_record(self, ticket: Ticket) -> None:
         goal, sent_to = ticket.goal, ticket.testimony.sent_to
         domain = self.traffic.domain.number
-        ledger.enter(goal.id, self.name, domain, sent_to, lost=goal.lost)
+        accept = goal.timeouts.accept
+        ledger.enter(goal.id, self.name, domain, sent_to, accept=accept, lost=goal.lost)
 
     def _tell_who_waits(self) -> None:
         """Wake those of all nodes whose goals a change here may have let go on."""
@@ -705,6 +695,17 @@ class Line:
                 wait = min(wait, due)
         self._bound_the_lost()
         return max(wait, 0.001)
+
+
+def _is_answered(ticket: Ticket) -> bool:
+    """Whether it need not be on record any more: whoever got it shows it, or will not run it.
+
+    One that two servers got is accepted by one of them first. And a server that has gone may only
+    stand still, for longer than this process is there.
+    """
+    goal = ticket.goal
+    shown = goal.accepted and len(ticket.testimony.sent_to) <= 1
+    return shown or (ticket.accounted_for and goal.end is not End.SERVER_GONE)
 
 
 def _in_the_way(goal: Goal) -> tuple[bool, ...]:

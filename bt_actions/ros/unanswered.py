@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_actions.goal import DENIED_FOR_GOOD
 from bt_actions.ledger import Sent, left_behind, mark_lost, strike_left
 from bt_actions.roll_call import RollCall
 
@@ -56,8 +55,8 @@ class Unanswered:
             awaited = left.get(goal_id)
             if awaited is None or not awaited.awaited:
                 continue
-            if awaited.denial.for_good:
-                awaited.is_nowhere(f"denied for {DENIED_FOR_GOOD:g} s")
+            if awaited.denial.lasted >= awaited.takes:
+                awaited.is_nowhere(f"denied for {awaited.takes:g} s")
             elif calls[sent.action].known and self._is_gone(sent, calls):
                 awaited.is_nowhere("its server is gone")
                 awaited.server_is_gone = True

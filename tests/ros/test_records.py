@@ -27,8 +27,16 @@ class Recorder:
         self.entered: list[bytes] = []
 
     def enter(
-        self, goal_id: bytes, action: str, domain: int, servers: Collection[bytes], *, lost: bool
+        self,
+        goal_id: bytes,
+        action: str,
+        domain: int,
+        servers: Collection[bytes],
+        *,
+        accept: float | None,
+        lost: bool,
     ) -> None:
+        assert accept == 5.0, "as the tree says"
         self.entered.append(goal_id)
         self.open[goal_id] = action, domain, frozenset(servers), lost
 
@@ -152,7 +160,7 @@ def test_when_it_need_not_be_on_record(
         testimony=SimpleNamespace(sent_to=[b"gid"] * servers),
         accounted_for=accounted_for,
     )
-    assert module.Line._is_answered(ticket) is is_answered
+    assert module._is_answered(ticket) is is_answered
 
 
 def test_when_the_node_goes_what_is_not_accounted_for_stays_and_what_is_goes(

@@ -22,16 +22,16 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions.goal_ids import new_goal_id
 from bt_actions.ledger import Ledger
 from bt_actions.ros.graph import servers
-action, domain, distance, lost = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
+action, domain, distance, known, lost = sys.argv[1:]
+domain, distance, lost = int(domain), float(distance), lost == "1"
+known = [known.encode()] if known else []
 rclpy.init()
 node, goal_id = rclpy.create_node("sender"), new_goal_id()
-client, known = ActionClient(node, MoveRobot, action), []
+client = ActionClient(node, MoveRobot, action)
 if distance:
     client.wait_for_server()
     known = servers(node, action)
-if lost:
-    known = [b"another server's"]
-Ledger(print).enter(goal_id, action, domain, known, lost=lost == ["lost"])
+Ledger(print).enter(goal_id, action, domain, known, lost=lost)
 if distance:
     goal = MoveRobot.Goal(distance=distance)
     client.send_goal_async(goal, goal_uuid=UUID(uuid=list(goal_id)))
@@ -56,9 +56,14 @@ def leave(start_program: Callable[..., Process], name: str, domain: int) -> Leav
     """Have a program send a goal, or only say so, and kill it; return the goal's id."""
 
     def leave_behind(
-        distance: float, *lost: str, journal: Journal | None = None, elsewhere: int = 0
+        distance: float,
+        *,
+        servers: str = "",
+        lost: bool = False,
+        journal: Journal | None = None,
+        elsewhere: int = 0,
     ) -> str:
-        arguments = [name, str(domain + elsewhere), str(distance), *lost]
+        arguments = [name, str(domain + elsewhere), str(distance), servers, str(int(lost))]
         sender = start_program("-c", SEND, *arguments)
         goal = sender.line()
         if journal is not None:
@@ -139,7 +144,7 @@ def test_one_whose_sender_dies_meanwhile_is_found(
     domain: int,
 ) -> None:
     journal = serve("1:delay_accept=10")
-    sender = start_program("-c", SEND, name, str(domain), "90.0")
+    sender = start_program("-c", SEND, name, str(domain), "90.0", "", "0")
     goal = sender.line()
     journal.wait_for("received", within=20.0)
 
@@ -148,7 +153,7 @@ def test_one_whose_sender_dies_meanwhile_is_found(
             sender.send(signal.SIGKILL)
             sender.popen.wait()
 
-    swept, found, _ = sweep(sighted=sighted)
+    swept, found, _ = sweep(sighted=sighted, wanted=[name])
     assert [left.end for left in swept.left] == [End.CANCELED]
     assert found == [f"awaited {goal}", f"shown {goal}"]
 
@@ -157,7 +162,7 @@ def test_one_whose_server_was_known_to_be_gone_is_not_awaited(
     serve: Callable[..., Journal], leave: Leave, records: Path
 ) -> None:
     serve()
-    leave(0.0, "lost")
+    leave(0.0, servers="another's", lost=True)
     swept, found, missing = sweep()
     assert (swept.left, found, missing) == ([], [], [])
 
@@ -166,12 +171,35 @@ def test_one_whose_server_is_not_in_sight_is_looked_for_and_told_once(
     leave: Leave, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "LOOK_LONGEST", 3.0)
-    leave(0.0, "lost once")
+    leave(0.0, servers="another's")
     first, _, missing = sweep()
     assert [left.is_over for left in first.left] == [False]
     assert missing == [name]
     swept, found, missing = sweep()
     assert (swept.left, found, missing) == ([], [], [])
+
+
+@pytest.mark.parametrize(
+    ("given", "on_record", "takes"), [(0.0, "0", 2.0), (5.0, "3.0", 5.0), (1.0, "7.0", 7.0)]
+)
+def test_how_long_one_has_to_be_denied(
+    given: float,
+    on_record: str,
+    takes: float,
+    serve: Callable[..., Journal],
+    leave: Leave,
+    records: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The server has never got it."""
+    monkeypatch.setattr(module, "DENIED_FOR_GOOD", 2.0)
+    serve()
+    leave(0.0)
+    [path] = records.iterdir()
+    path.write_text(path.read_text().replace('"accept": 0.0', f'"accept": {on_record}').rstrip())
+    swept, _, _ = sweep(accept=given)
+    assert [left.nothing_left for left in swept.left] == [f"denied for {takes:g} s"]
+    assert list(records.iterdir()) == []
 
 
 @pytest.mark.parametrize("how", ["stopped", "no participant"])
