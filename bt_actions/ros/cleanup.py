@@ -131,10 +131,9 @@ def cleanup(
 
     Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
     canceled to end. `found` is called with each at once, and again where it was `awaited` when it
-    turns up; `sighted` with the name of each action of which a
-    server is in sight, and `elsewhere` with the action and the id of each unfinished goal
-    of a bt_actions process on another machine, or in another container, of which nobody here can
-    tell whether it is alive. The actions in `wanted`, whose relative names belong to `namespace`
+    turns up; `sighted` with the name of each action of which a server is in sight, and `elsewhere`
+    with the action and the id of each unfinished goal of a bt_actions process on another machine,
+    or in another container, of which nobody here can tell whether it is alive. The actions in `wanted`, whose relative names belong to `namespace`
     (None: all in sight), and those of goals that were found, are looked at until they are known,
     for LOOK_LONGEST seconds at most, or `look`, if that is more; `missing` is called with those
     that are not, in the beginning of waiting for one that is silent, and in the end if it was in
