@@ -133,11 +133,12 @@ def cleanup(
     canceled to end. `found` is called with each at once, and again where it was `awaited` when it
     turns up; `sighted` with the name of each action of which a server is in sight, and `elsewhere`
     with the action and the id of each unfinished goal of a bt_actions process on another machine,
-    or in another container, of which nobody here can tell whether it is alive. The actions in `wanted`, whose relative names belong to `namespace`
-    (None: all in sight), and those of goals that were found, are looked at until they are known,
-    for LOOK_LONGEST seconds at most, or `look`, if that is more; `missing` is called with those
-    that are not, in the beginning of waiting for one that is silent, and in the end if it was in
-    vain, as it is told. Ends in the next turn when `stopped` says so. Blocks.
+    or in another container, of which nobody here can tell whether it is alive. The actions in
+    `wanted`, whose relative names belong to `namespace` (None: all in sight), and those of goals
+    that were found, are looked at until they are known, for LOOK_LONGEST seconds at most, or
+    `look`, if that is more; `missing` is called with those that are not, in the beginning of
+    waiting for one that is silent, and in the end if it was in vain, as it is told. Ends in the
+    next turn when `stopped` says so. Blocks.
 
     A goal that was sent and not answered is awaited: until it has been denied for `accept` seconds,
     for as long as its sender gave the server to decide, and for DENIED_FOR_GOOD, whichever is most.
