@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 DOMAINS = range(70, 90)
 OUR_OWN = ("bt_actions-alarm", "bt_actions-log", "bt_actions-lookout")
 """Threads that outlive what they were started for, and end by themselves or with the process."""
-_names = itertools.count(1)
+_names, _directories = itertools.count(1), itertools.count(1)
 STUCK = 900.0
 """Seconds after which a test hangs where no Python runs any more, nor pytest's own timeout:
 with several participants in one process Fast DDS was seen not to return from destroying a node."""
@@ -48,12 +48,15 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _records(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """What is sent here and not answered is nobody's business (bt_actions/ledger.py)."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("BT_ACTIONS_LEDGER", str(tmp_path_factory.mktemp("ledger")))
-        yield
+@pytest.fixture(scope="session")
+def _all_records(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("ledger")
+
+
+@pytest.fixture(autouse=True)
+def _records(_all_records: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a test's programs send and nobody answers is no other test's (bt_actions/ledger.py)."""
+    monkeypatch.setenv("BT_ACTIONS_LEDGER", str(_all_records / str(next(_directories))))
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -241,7 +241,7 @@ def test_a_goal_that_has_ended_at_one_server_of_two_is_kept_in_mind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found: list[LeftBehind] = []
-    told = module._Sweep(0.0, 0.0, found.append, print, print, print, lambda: False)
+    told = module._Sweep(0.0, 0.0, 0.0, found.append, print, print, print, lambda: False)
     told._calls["/move"] = call = RollCall(0.0)
     call.sees(frozenset({b"a", b"b"}), 0.0)
     author = module.Author(here=True, pid=2**22 + 1, started=b"ab")
