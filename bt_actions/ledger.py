@@ -40,7 +40,7 @@ SERVERS_AT_MOST = 8
 ACCEPT_LONGEST = KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up, also those of a suspended
 machine, whatever becomes of its wall clock."""
-TIDIED_AT_MOST = 64
+TIDIED_AT_MOST = 16
 """Files that a process which opens its own looks at, whether they can be removed."""
 _BLANK = b" " * (LENGTH - 1)
 _PREFIX = 12
@@ -97,6 +97,7 @@ class Ledger:
             "lost": lost,
             "at": round(_boot_time(), 1),
         }
+        is_new = goal_id not in self._rows
         text = json.dumps(entry).encode().ljust(LENGTH - 1) + b"\n"
         try:
             if len(text) > LENGTH:
@@ -104,7 +105,8 @@ class Ledger:
             self._see_to_the_file(goal_id[:_PREFIX])
             self._write(goal_id, text)
         except OSError as error:
-            self.strike(goal_id)
+            if is_new:
+                self.strike(goal_id)
             self._fail(error)
 
     def strike(self, goal_id: bytes) -> None:
@@ -123,7 +125,8 @@ class Ledger:
         if self._file is None or self._rows:
             return
         with contextlib.suppress(OSError):
-            self._path.unlink()
+            if not _read(self._path).strip():  # or it is of the program before an exec
+                self._path.unlink()
         self.disown()
 
     def disown(self) -> None:
@@ -153,9 +156,10 @@ class Ledger:
             self.disown()
             self._open(prefix)
         elif self._file is not None and not os.fstat(self._file).st_nlink:
-            rows = self._rows
-            self.disown()
+            gone, rows = self._file, self._rows
             self._open(prefix)
+            os.close(gone)
+            self._rows, self._blank = {}, []
             for goal_id, (_row, text) in rows.items():
                 self._write(goal_id, text)
 
@@ -164,10 +168,10 @@ class Ledger:
         directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         _check(directory)
         _tidy(directory)
-        self._path = directory / (prefix.hex() + _SUFFIX)
+        path = directory / (prefix.hex() + _SUFFIX)
         how = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-        self._file = os.open(self._path, how, 0o600)
-        self._prefix = prefix
+        self._file = os.open(path, how, 0o600)
+        self._path, self._prefix = path, prefix
         # What is there is of the program that this one has replaced (exec).
         self._unused = -(-os.fstat(self._file).st_size // LENGTH)
 
@@ -205,21 +209,36 @@ class Sent:
     row: int
 
 
-def left_behind(passed_over: Collection[Path] = ()) -> Iterator[tuple[Path, list[Sent]]]:
+def left_behind(
+    failed: Callable[[OSError], None], passed_over: Collection[Path] = ()
+) -> Iterator[tuple[Path, list[Sent]]]:
     """Find the files of this user's processes that are dead, or elsewhere, and what is in them.
 
-    Those in `passed_over` are not read. What is damaged is skipped. Raises OSError where what there
-    is cannot be read, or others may have put it there.
+    Those in `passed_over` are not read. What is damaged is skipped. `failed` is called with what
+    cannot be read, or others may have put there.
     """
     directory = _directory()
     try:
         _check(directory)
+        paths = sorted(directory.glob("*" + _SUFFIX))
     except FileNotFoundError:
         return
-    for path in sorted(directory.glob("*" + _SUFFIX)):
+    except OSError as error:
+        failed(error)
+        return
+    for path in paths:
         author = _author(path)
-        if path not in passed_over and author is not None and not (author.here and author.alive):
-            yield path, _parse_all(path, author)
+        if path in passed_over or author is None or (author.here and author.alive):
+            continue
+        try:
+            goals, damaged = _parse_all(path, author)
+        except OSError as error:
+            failed(error)
+            continue
+        if damaged and author.here:
+            what = "damaged, or of another version (remove it when nothing runs there)"
+            failed(OSError(errno.EBADMSG, what, str(path)))
+        yield path, goals
 
 
 def strike_left(goals: Iterable[Sent]) -> None:
@@ -298,11 +317,12 @@ def _read(path: Path) -> bytes:
         os.close(file)
 
 
-def _parse_all(path: Path, author: Author) -> list[Sent]:
+def _parse_all(path: Path, author: Author) -> tuple[list[Sent], bool]:
+    """Return what is in a file, and whether anything else is."""
     text = _read(path)
     rows = (text[start : start + LENGTH] for start in range(0, len(text), LENGTH))
-    found = (_parse(path, author, row, text) for row, text in enumerate(rows) if text.strip())
-    return [sent for sent in found if sent is not None]
+    found = [_parse(path, author, row, text) for row, text in enumerate(rows) if text.strip()]
+    return [sent for sent in found if sent is not None], None in found
 
 
 def _parse(path: Path, author: Author, row: int, text: bytes) -> Sent | None:
@@ -319,7 +339,7 @@ def _parse(path: Path, author: Author, row: int, text: bytes) -> Sent | None:
         return None
     if type(domain) is not int or type(lost) is not bool:
         return None
-    if not 0.0 <= accept <= ACCEPT_LONGEST:
+    if not (0.0 <= accept <= ACCEPT_LONGEST and 0.0 <= at < float("inf")):
         return None
     return Sent(goal_id, action, domain, servers, accept, lost, at, author, path, row)
 
@@ -333,10 +353,10 @@ def _tidy(directory: Path) -> None:
             if author is None or (author.here and author.alive):
                 continue
             with contextlib.suppress(OSError):
-                left, now = _parse_all(path, author), _boot_time()
-                if left:
-                    is_over = all(now - sent.at > KEPT_FOR for sent in left)
-                else:
-                    is_over = author.here and not _read(path).strip()
+                (left, damaged), now = _parse_all(path, author), _boot_time()
+                if author.here and not damaged and all(sent.at <= now for sent in left):
+                    is_over = all(now - sent.at > KEPT_FOR for sent in left)  # also if none is
+                else:  # its clock is another one, or unknown
+                    is_over = time.time() - path.lstat().st_mtime > KEPT_FOR
                 if is_over:
                     path.unlink()

@@ -46,6 +46,7 @@ os._exit(1)
 @pytest.fixture(autouse=True)
 def directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where the records are."""
+    troubles.clear()
     path = tmp_path / "records" / "here"
     monkeypatch.setenv(module.DIRECTORY, str(path))
     return path
@@ -65,6 +66,10 @@ def ledger(complaints: list[str]) -> Iterator[Ledger]:
     ours.disown()
 
 
+troubles: list[OSError] = []
+"""What could not be read in this test."""
+
+
 def die() -> list[str]:
     """Run LEAVES; return the ids of its goals."""
     gone = subprocess.run([sys.executable, "-c", LEAVES], capture_output=True, text=True)
@@ -74,7 +79,7 @@ def die() -> list[str]:
 
 def found() -> list[Sent]:
     """All that the dead have left."""
-    return [sent for _, goals in left_behind() for sent in goals]
+    return [sent for _, goals in left_behind(troubles.append) for sent in goals]
 
 
 def rows(directory: Path) -> list[str]:
@@ -116,8 +121,8 @@ def test_that_a_server_is_not_in_sight_is_kept() -> None:
 
 def test_a_file_is_passed_over() -> None:
     die()
-    ((path, _),) = left_behind()
-    assert list(left_behind({path})) == []
+    ((path, _),) = left_behind(troubles.append)
+    assert list(left_behind(troubles.append, {path})) == []
 
 
 def test_nothing_is_found_of_who_is_alive(ledger: Ledger, directory: Path) -> None:
@@ -238,8 +243,8 @@ def test_a_directory_that_others_may_have_made_is_not_used(
     ledger.enter(new_goal_id(), "/move", 0, SERVERS)
     ledger.enter(new_goal_id(), "/move", 0, SERVERS)
     assert len(complaints) == 1
-    with pytest.raises(OSError, match=str(directory)):
-        list(left_behind())
+    assert found() == []
+    assert [trouble.filename for trouble in troubles] == [str(directory)]
     if directory.is_dir():
         assert list(directory.iterdir()) == []
 
@@ -249,17 +254,21 @@ def test_where_nobody_has_sent_anything_there_is_nothing_to_read(directory: Path
     assert found() == []
 
 
-def test_a_record_that_cannot_be_read_is_no_empty_one(
+def test_a_record_that_cannot_be_read_is_no_empty_one_and_hides_no_other(
     directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    die()
+    ids = [die(), die()]
+    real, sooner = module._read, min(directory.iterdir())
 
-    def fail(*_: object) -> bytes:
-        raise OSError(24, "Too many open files")
+    def fail(path: Path) -> bytes:
+        if path == sooner:
+            raise OSError(24, "Too many open files")
+        return real(path)
 
-    monkeypatch.setattr(module.os, "pread", fail)
-    with pytest.raises(OSError, match="Too many open files"):
-        found()
+    monkeypatch.setattr(module, "_read", fail)
+    [other] = [each for each in ids if not sooner.name.startswith(each[0][:24])]
+    assert [sent.goal_id.hex() for sent in found()] == [other[0], other[2], other[3]]
+    assert [trouble.strerror for trouble in troubles] == ["Too many open files"]
 
 
 def test_what_cannot_be_opened_once_is_tried_again(
@@ -295,6 +304,36 @@ def test_who_has_replaced_a_program_goes_on_behind_what_that_has_left(
     ledger.disown()
     ledger.enter(second, "/move", 0, SERVERS)
     assert [json.loads(row)["goal"] for row in rows(directory)] == [first.hex(), second.hex()]
+    ledger.strike(second)
+    ledger.close()
+    assert [json.loads(row)["goal"] for row in rows(directory)] == [first.hex()]
+
+
+def test_a_file_that_cannot_be_written_again_at_once_is_later(
+    ledger: Ledger, complaints: list[str], directory: Path
+) -> None:
+    first, second, third = (new_goal_id() for _ in range(3))
+    ledger.enter(first, "/move", 0, SERVERS)
+    shutil.rmtree(directory)
+    directory.touch()
+    ledger.enter(second, "/move", 0, SERVERS)
+    assert len(complaints) == 1
+    directory.unlink()
+    ledger.enter(third, "/move", 0, SERVERS)
+    assert [json.loads(row)["goal"] for row in rows(directory)] == [first.hex(), third.hex()]
+
+
+def test_what_cannot_be_added_does_not_take_a_goal_off(
+    ledger: Ledger, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goal_id = new_goal_id()
+    ledger.enter(goal_id, "/move", 0, SERVERS)
+    with monkeypatch.context() as patch:
+        patch.setattr(module.os, "pwrite", lambda *_: 0)
+        ledger.enter(goal_id, "/move", 0, SERVERS, lost=True)
+    assert [json.loads(row)["lost"] for row in rows(directory)] == [False]
+    ledger.strike(goal_id)
+    assert rows(directory) == []
 
 
 def test_nothing_is_written_through_a_link(
@@ -334,6 +373,7 @@ def test_what_is_no_row_is_skipped(text: bytes, directory: Path) -> None:
     good = path.read_bytes()[2 * LENGTH : 3 * LENGTH]
     path.write_bytes(text.ljust(LENGTH) + good)
     assert [sent.goal_id.hex() for sent in found()] == [ids[2]]
+    assert [trouble.filename for trouble in troubles] == [str(path)]
 
 
 @pytest.mark.parametrize(
@@ -355,6 +395,8 @@ def test_what_is_no_row_is_skipped(text: bytes, directory: Path) -> None:
         ("lost", 0),
         ("at", "x"),
         ("at", 10**400),
+        ("at", float("nan")),
+        ("at", float("inf")),
         ("accept", "no"),
         ("accept", -1.0),
         ("accept", float("nan")),
@@ -430,6 +472,27 @@ def test_the_next_process_removes_what_is_over_and_what_nobody_wants(
     assert recent.exists()
     assert damaged.exists()
     assert not blank.exists()
+
+
+@pytest.mark.parametrize("clock", ["another machine's", "set back by a start", "damaged"])
+def test_whose_age_no_clock_of_ours_tells_is_removed_by_that_of_its_file(
+    clock: str, ledger: Ledger, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    die()
+    (path,) = directory.iterdir()
+    if clock == "another machine's":
+        monkeypatch.setenv("BT_ACTIONS_MACHINE", "another")
+    elif clock == "damaged":
+        path.write_bytes(b"a newer form")
+    later = 1.0 if clock == "set back by a start" else 1e9
+    monkeypatch.setattr(module, "_boot_time", lambda: later)
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert path.exists()
+    ledger.disown()
+    past = time.time() - KEPT_FOR - 1.0
+    os.utime(path, (past, past))
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert not path.exists()
 
 
 def test_it_does_not_look_at_all_of_many(ledger: Ledger, directory: Path) -> None:

@@ -93,6 +93,11 @@ class LeftBehind:
         """No server has it, nor will."""
         self.awaited, self.nothing_left = False, why
 
+    def is_awaited_again(self) -> None:
+        """A server that may have it is in sight after all."""
+        self.awaited, self.nothing_left, self.server_is_gone = True, "", False
+        self.denial.begin()
+
 
 @dataclass(frozen=True, slots=True)
 class Swept:
@@ -319,6 +324,7 @@ class _Sweep:
             call.begin(now)
         for left in self._left.values():
             left.denial.begin()
+            self._prolong(left)
         for name in names:
             self._calls.setdefault(name, RollCall(now))
         self._find()  # before the first status: one that tells an end comes once
@@ -498,14 +504,20 @@ class _Sweep:
         for sent in list(self._unanswered.new(self._left, self._calls)):
             self._calls.setdefault(sent.action, RollCall(time.monotonic()))
             takes = max(DENIED_FOR_GOOD, self._accept, sent.accept)
-            until = time.monotonic() + max(self._look, takes + AWAIT_LONGER)
-            self._awaits_until = max(self._awaits_until, until)
             left = LeftBehind(sent.action, sent.goal_id, sent.author.pid, takes=takes, awaited=True)
             self._left[sent.goal_id] = left
+            self._prolong(left)
             self._found(left)
-        self._unanswered.judge(self._left, self._calls)
+        for left in self._unanswered.judge(self._left, self._calls):
+            self._prolong(left)
         for left in self._left.values():
             left.servers = len(self._calls[left.action].servers)
+
+    def _prolong(self, left: LeftBehind) -> None:
+        """Have time enough to await it from now on."""
+        if left.awaited:
+            until = time.monotonic() + max(self._look, left.takes + AWAIT_LONGER)
+            self._awaits_until = max(self._awaits_until, until)
 
     def _turns_up(self, left: LeftBehind) -> None:
         """A server has it: it tells the end in a status."""

@@ -27,16 +27,16 @@ class Unanswered:
 
     def read(self, domain: int) -> Iterator[Sent]:
         """Read the records of those that have died since; return goals that are elsewhere's."""
-        try:
-            for path, goals in left_behind(self._read):
-                self._read.add(path)
-                for sent in goals:
-                    if sent.domain == domain and sent.author.here:
-                        self._sent[sent.goal_id] = sent
-                    elif sent.domain == domain:
-                        yield sent
-        except OSError as error:
-            self.trouble = error
+        troubles: list[OSError] = []
+        for path, goals in left_behind(troubles.append, self._read):
+            if not troubles:
+                self._read.add(path)  # else it may be the one: again
+            for sent in goals:
+                if sent.domain == domain and sent.author.here:
+                    self._sent[sent.goal_id] = sent
+                elif sent.domain == domain:
+                    yield sent
+        self.trouble = troubles[0] if troubles else None
 
     def new(
         self, left: Mapping[bytes, LeftBehind], calls: Mapping[str, RollCall]
@@ -49,10 +49,15 @@ class Unanswered:
             if goal_id not in left and not (sent.lost and self._is_gone(sent, calls)):
                 yield sent
 
-    def judge(self, left: Mapping[bytes, LeftBehind], calls: Mapping[str, RollCall]) -> None:
-        """See which of them need not be awaited any more."""
+    def judge(
+        self, left: Mapping[bytes, LeftBehind], calls: Mapping[str, RollCall]
+    ) -> Iterator[LeftBehind]:
+        """See which of them need not be awaited any more; return those that are to be again."""
         for goal_id, sent in self._sent.items():
             awaited = left.get(goal_id)
+            if awaited is not None and awaited.server_is_gone and not self._is_gone(sent, calls):
+                awaited.is_awaited_again()
+                yield awaited
             if awaited is None or not awaited.awaited:
                 continue
             if awaited.denial.lasted >= awaited.takes:
@@ -74,8 +79,12 @@ class Unanswered:
         and be in sight another time, it is awaited again.
         """
         met = [(sent, left[goal_id]) for goal_id, sent in self._sent.items() if goal_id in left]
-        settled = [sent for sent, goal in met if not (goal.awaited or goal.server_is_gone)]
-        strike_left(settled)
+        strike_left(
+            sent
+            for sent, goal in met
+            if not (goal.awaited or goal.server_is_gone)
+            and (len(sent.servers) <= 1 or goal.nothing_left)  # another may not have decided
+        )
         mark_lost(
             sent
             for sent, goal in met

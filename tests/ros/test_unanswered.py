@@ -9,9 +9,14 @@ from typing import Any
 
 import pytest
 
+from bt_actions.goal_ids import Author
+from bt_actions.ledger import Sent
 from bt_actions.policy import End
+from bt_actions.roll_call import RollCall
 from bt_actions.ros import cleanup as module
+from bt_actions.ros import unanswered as module_of_unanswered
 from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
+from bt_actions.ros.unanswered import Unanswered
 from tests.support.processes import Journal, Process
 
 SEND = """
@@ -236,3 +241,50 @@ def test_records_that_cannot_be_read_are_told(
     swept, found, _ = sweep()
     assert found == []
     assert isinstance(swept.trouble, PermissionError)
+
+
+def record(*servers: bytes) -> Sent:
+    """What is on record of a goal that was sent to these."""
+    author = Author(here=True, pid=2**22 + 1, started=b"ab")
+    return Sent(b"goal", "/move", 0, frozenset(servers), 0.0, False, 0.0, author, Path("x"), 0)
+
+
+@pytest.fixture
+def unanswered(monkeypatch: pytest.MonkeyPatch) -> tuple[Unanswered, list[Sent]]:
+    """One that has read nothing yet, and what is struck off."""
+    struck: list[Sent] = []
+    monkeypatch.setattr(module_of_unanswered, "strike_left", struck.extend)
+    monkeypatch.setattr(module_of_unanswered, "mark_lost", list)
+    return Unanswered(), struck
+
+
+def test_one_whose_server_comes_in_sight_after_all_is_awaited_again(
+    unanswered: tuple[Unanswered, list[Sent]],
+) -> None:
+    told, _ = unanswered
+    told._sent[b"goal"] = record(b"own")
+    left = LeftBehind("/move", b"goal", 1, awaited=True)
+    call = RollCall(0.0)
+    call._settled = frozenset({b"other"})
+    call.sees(frozenset({b"other"}), 0.0)
+    calls = {"/move": call}
+    assert list(told.judge({b"goal": left}, calls)) == []
+    assert (left.is_over, left.nothing_left) == (True, "its server is gone")
+    call.sees(frozenset({b"other", b"own"}), 1.0)
+    assert list(told.judge({b"goal": left}, calls)) == [left]
+    assert (left.awaited, left.is_over) == (True, False)
+
+
+@pytest.mark.parametrize("servers", [[b"a"], [b"a", b"b"]])
+def test_what_one_of_two_servers_shows_stays_on_record(
+    servers: list[bytes], unanswered: tuple[Unanswered, list[Sent]]
+) -> None:
+    told, struck = unanswered
+    told._sent[b"goal"] = sent = record(*servers)
+    left = LeftBehind("/move", b"goal", 1, shown=End.CANCELED)
+    calls = {"/move": RollCall(0.0)}
+    told.strike({b"goal": left}, calls, was_looked_for=True)
+    assert struck == ([sent] if len(servers) == 1 else [])
+    left.is_nowhere("denied for 30 s")
+    told.strike({b"goal": left}, calls, was_looked_for=True)
+    assert struck[-1:] == [sent]
