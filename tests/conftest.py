@@ -54,9 +54,14 @@ def _all_records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _records(_all_records: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a test's programs send and nobody answers is no other test's (bt_actions/ledger.py)."""
-    monkeypatch.setenv("BT_ACTIONS_LEDGER", str(_all_records / str(next(_directories))))
+def _records(_all_records: Path) -> Iterator[None]:
+    """What a test's programs send and nobody answers is no other test's (bt_actions/ledger.py).
+
+    With a patch of its own: the test's has to be undone before what other fixtures have patched.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BT_ACTIONS_LEDGER", str(_all_records / str(next(_directories))))
+        yield
 
 
 @pytest.fixture(scope="module", autouse=True)
