@@ -64,6 +64,7 @@ class Ledger:
         self._file: int | None = None
         self._path = Path()
         self._prefix = b""
+        self._identity = (0, 0)
         self._rows: dict[bytes, tuple[int, bytes]] = {}
         self._blank: list[int] = []
         self._unused = 0
@@ -116,7 +117,8 @@ class Ledger:
             return
         self._blank.append(row)
         try:
-            os.pwrite(self._file, _BLANK, row * LENGTH)
+            if self._is_ours():
+                os.pwrite(self._file, _BLANK, row * LENGTH)
         except OSError as error:
             self._fail(error)
 
@@ -131,7 +133,7 @@ class Ledger:
 
     def disown(self) -> None:
         """Let go of the file, as the child of a fork: it is the parent's."""
-        if self._file is not None:
+        if self._file is not None and self._is_ours():
             with contextlib.suppress(OSError):
                 os.close(self._file)
         self._file, self._prefix = None, b""
@@ -155,13 +157,26 @@ class Ledger:
         if prefix != self._prefix:
             self.disown()
             self._open(prefix)
-        elif self._file is not None and not os.fstat(self._file).st_nlink:
-            gone, rows = self._file, self._rows
+        elif self._file is not None and not (self._is_ours() and os.fstat(self._file).st_nlink):
+            gone, rows = self._file if self._is_ours() else None, self._rows
+            before, unused = self._identity, self._unused
             self._open(prefix)
-            os.close(gone)
+            if gone is not None:
+                os.close(gone)
+            if self._identity == before:  # it was closed, and is as it was
+                self._unused = unused
+                return
             self._rows, self._blank = {}, []
             for goal_id, (_row, text) in rows.items():
                 self._write(goal_id, text)
+
+    def _is_ours(self) -> bool:
+        """Whether the descriptor is still our file: who closes all may have closed it, too."""
+        try:
+            seen = os.fstat(-1 if self._file is None else self._file)
+        except OSError:
+            return False
+        return (seen.st_dev, seen.st_ino) == self._identity
 
     def _open(self, prefix: bytes) -> None:
         directory = _directory()
@@ -172,8 +187,10 @@ class Ledger:
         how = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
         self._file = os.open(path, how, 0o600)
         self._path, self._prefix = path, prefix
+        seen = os.fstat(self._file)
+        self._identity = seen.st_dev, seen.st_ino
         # What is there is of the program that this one has replaced (exec).
-        self._unused = -(-os.fstat(self._file).st_size // LENGTH)
+        self._unused = -(-seen.st_size // LENGTH)
 
     def _fail(self, error: OSError) -> None:
         if not self._complained:
@@ -217,8 +234,8 @@ def left_behind(
     Those in `passed_over` are not read. What is damaged is skipped. `failed` is called with what
     cannot be read, or others may have put there.
     """
-    directory = _directory()
     try:
+        directory = _directory()
         _check(directory)
         paths = sorted(directory.glob("*" + _SUFFIX))
     except FileNotFoundError:
@@ -273,10 +290,13 @@ def mark_lost(goals: Iterable[Sent]) -> None:
 
 
 def _directory() -> Path:
+    """Return where the records are. Raises OSError where that depends on where one stands."""
     named = os.environ.get(DIRECTORY)
+    if named and not Path(named).is_absolute():
+        raise OSError(errno.EINVAL, f"{DIRECTORY} is no absolute path", named)
     # What others may have made there is not used: _check
     shared = "/dev/shm"  # nosec B108
-    return Path(named or f"{shared}/bt_actions-{os.geteuid()}").absolute()
+    return Path(named or f"{shared}/bt_actions-{os.geteuid()}")
 
 
 def _boot_time() -> float:

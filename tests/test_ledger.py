@@ -336,6 +336,58 @@ def test_what_cannot_be_added_does_not_take_a_goal_off(
     assert rows(directory) == []
 
 
+@pytest.mark.parametrize("reused", [True, False])
+def test_who_closes_its_descriptor_loses_neither_the_record_nor_a_file_of_his(
+    reused: bool, ledger: Ledger, complaints: list[str], directory: Path, tmp_path: Path
+) -> None:
+    first, second = new_goal_id(), new_goal_id()
+    ledger.enter(first, "/move", 0, SERVERS)
+    number = ledger._file
+    assert number is not None
+    os.close(number)
+    theirs = tmp_path / "theirs"
+    theirs.write_text("theirs")
+    if reused:
+        other = os.open(theirs, os.O_RDWR)
+        assert other == number
+    ledger.enter(second, "/move", 0, SERVERS)
+    ledger.strike(second)
+    if reused:
+        assert os.pread(number, 100, 0) == b"theirs"
+        os.close(number)
+    assert theirs.read_text() == "theirs"
+    assert [json.loads(row)["goal"] for row in rows(directory)] == [first.hex()]
+    assert complaints == []
+
+
+def test_to_strike_a_goal_writes_nothing_into_a_file_of_others(
+    ledger: Ledger, directory: Path, tmp_path: Path
+) -> None:
+    goal_id = new_goal_id()
+    ledger.enter(goal_id, "/move", 0, SERVERS)
+    number = ledger._file
+    assert number is not None
+    os.close(number)
+    theirs = tmp_path / "theirs"
+    theirs.write_text("theirs")
+    other = os.open(theirs, os.O_RDWR)
+    assert other == number
+    ledger.strike(goal_id)
+    ledger.disown()
+    assert os.pread(other, 100, 0) == b"theirs"
+    os.close(other)
+
+
+def test_a_directory_that_depends_on_where_one_stands_is_refused(
+    ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(module.DIRECTORY, "records")
+    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    assert "no absolute path" in complaints[0]
+    assert found() == []
+    assert [trouble.filename for trouble in troubles] == ["records"]
+
+
 def test_nothing_is_written_through_a_link(
     ledger: Ledger, complaints: list[str], directory: Path, tmp_path: Path
 ) -> None:
