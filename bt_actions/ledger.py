@@ -37,9 +37,11 @@ ROWS_AT_MOST = 4096
 """Goals on record at a time; no more are read, either."""
 SERVERS_AT_MOST = 8
 """Servers of a goal on record; where there are more, none is."""
-ACCEPT_LONGEST = KEPT_FOR = 86400.0
+KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up, also those of a suspended
 machine, whatever becomes of its wall clock."""
+ACCEPT_LONGEST = KEPT_FOR
+"""Seconds that a server may be given to decide, as far as the record goes."""
 TIDIED_AT_MOST = 16
 """Files that a process which opens its own looks at, whether they can be removed."""
 _BLANK = b" " * (LENGTH - 1)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +15,7 @@ from bt_actions.policy import End
 from bt_actions.ros import line as module
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
-from tests.support.processes import HostFactory
+from tests.support.processes import Host, HostFactory
 from tests.support.trees import state
 from tests.support.waiting import until
 
@@ -52,6 +53,19 @@ def ledger(monkeypatch: pytest.MonkeyPatch) -> Recorder:
     recorder = Recorder()
     monkeypatch.setattr(module, "ledger", recorder)
     return recorder
+
+
+@contextmanager
+def losing(host: Host, name: str, node: Any) -> Iterator[MoveRobot]:
+    """Run a leaf whose server is killed while it decides, and knows it as lost."""
+    journal = host.open(name, "1:delay_accept=60")
+    leaf = MoveRobot("m", 0.1, action_name=name)
+    with TreeRunner(leaf, node=node) as runner:
+        runner.start()
+        journal.wait_for("received")
+        host.kill()
+        until(lambda: leaf.outcome is not None, 40.0)
+        yield leaf
 
 
 def test_a_goal_is_on_record_until_it_is_accepted(
@@ -123,14 +137,7 @@ def test_what_is_not_accounted_for_stays(
 def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
     new_host: HostFactory, name: str, node: Any, ledger: Recorder
 ) -> None:
-    host = new_host()
-    journal = host.open(name, "1:delay_accept=60")
-    leaf = MoveRobot("m", 0.1, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
-        journal.wait_for("received")
-        host.kill()
-        until(lambda: leaf.outcome is not None, 40.0)
+    with losing(new_host(), name, node) as leaf:
         [(*_, lost)] = ledger.open.values()
         assert lost
         with lock:
@@ -163,7 +170,7 @@ def test_when_it_need_not_be_on_record(
     assert module._is_answered(ticket) is is_answered
 
 
-def test_when_the_node_goes_what_is_not_accounted_for_stays_and_what_is_goes(
+def test_when_the_node_goes_what_is_not_accounted_for_stays(
     serve: Any, name: str, node: Any, ledger: Recorder
 ) -> None:
     """As a foreign loop leaves it that does not wait: Traffic.destroy sends LEFT, and CLOSED."""
@@ -183,14 +190,8 @@ def test_when_the_node_goes_what_is_not_accounted_for_stays_and_what_is_goes(
 def test_what_is_put_away_as_gone_stays_marked_as_lost(
     new_host: HostFactory, name: str, node: Any, ledger: Recorder
 ) -> None:
-    host = new_host()
-    journal = host.open(name, "1:delay_accept=60")
-    leaf = MoveRobot("m", 0.1, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
-        journal.wait_for("received")
-        host.kill()
-        until(lambda: leaf.outcome is not None, 40.0)
+    with losing(new_host(), name, node):
+        pass
     assert [lost for *_, lost in ledger.open.values()] == [True]
 
 
@@ -202,12 +203,5 @@ def test_of_many_that_were_lost_the_newest_stay(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "LOST_KEPT", -1)  # all but the newest -1: the oldest one goes
-    host = new_host()
-    journal = host.open(name, "1:delay_accept=60")
-    leaf = MoveRobot("m", 0.1, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
-        journal.wait_for("received")
-        host.kill()
-        until(lambda: leaf.outcome is not None, 40.0)
+    with losing(new_host(), name, node):
         until(lambda: ledger.open == {})
