@@ -19,26 +19,21 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from action_msgs.msg import GoalStatusArray
-from action_msgs.srv import CancelGoal
 from rclpy.context import Context
 from rclpy.exceptions import NameValidationException, NotInitializedException
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_full_topic_name import validate_full_topic_name
-from unique_identifier_msgs.msg import UUID
 
 from bt_actions.goal import DENIED_FOR_GOOD
 from bt_actions.goal_ids import Author, author_of
 from bt_actions.goal_terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
 from bt_actions.policy import End
 from bt_actions.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
-from bt_actions.ros.graph import servers
+from bt_actions.ros.sight import STATUS, Sight
 from bt_actions.ros.unanswered import Unanswered
 from bt_actions.standstill import AT_MOST, STOOD_STILL, Standstill
 
-STATUS = "/_action/status"
 TURN = 0.05
 """Seconds between two looks for what has come in;"""
 GLANCE = 0.1
@@ -49,8 +44,6 @@ AWAIT_LONGER = LOOK_LONGEST + 2 * SETTLE
 """Seconds by which a goal is awaited longer, at most, than it has to be denied."""
 LOOK_AGAIN = 10.0
 """Seconds after which, at the latest, a participant that is not answered gives way to another."""
-DEPTH = 100
-"""Of our ends: with a depth of 1 the status of one server would displace that of another."""
 CANCELS_A_TURN = 5
 """So many goals of an action at once: a server keeps its last ten requests only."""
 
@@ -207,71 +200,6 @@ def _full_name(name: str, node: Node) -> str:
     return full
 
 
-class _Sight:
-    """One action, as one node sees it."""
-
-    def __init__(self, node: Node, action: str) -> None:
-        self._node = node
-        self._action = action
-        # In this order: a server that drops us half-way answers nothing, rather than tell nothing.
-        self._client = node.create_client(
-            CancelGoal,
-            f"{action}/_action/cancel_goal",
-            qos_profile=QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE),
-        )
-        self._status = node.create_subscription(
-            GoalStatusArray,
-            action + STATUS,
-            lambda _: None,
-            QoSProfile(
-                depth=DEPTH,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            ),
-        )
-
-    def servers(self) -> frozenset[bytes]:
-        """Return the GIDs of the servers that are shown."""
-        return servers(self._node, self._action)
-
-    def is_published(self) -> bool:
-        """Whether a status is; where it is not, there are mere clients."""
-        return bool(self._node.count_publishers(self._action + STATUS))
-
-    def statuses(self) -> Iterator[Any]:
-        """Take the statuses that have come in."""
-        handle = self._status.handle
-        with handle:
-            for _ in range(DEPTH):
-                taken = handle.take_message(GoalStatusArray, False)
-                if taken is None:
-                    return
-                yield taken[0]
-
-    def answers(self) -> Iterator[tuple[int, int]]:
-        """Take the answers that have come in: the number of the question, and the return code.
-
-        rclpy's futures hear the first answer alone, where each server gives one.
-        """
-        handle = self._client.handle
-        with handle:
-            for _ in range(DEPTH):
-                header, response = handle.take_response(CancelGoal.Response)
-                if header is None:
-                    return
-                yield header.request_id.sequence_number, response.return_code
-
-    def cancel(self, goal_id: bytes) -> int | None:
-        """Ask all servers to cancel this goal; return the question's number, None: nobody hears."""
-        if not self._client.service_is_ready():
-            return None
-        request = CancelGoal.Request()
-        request.goal_info.goal_id = UUID(uuid=list(goal_id))
-        handle = self._client.handle
-        with handle:
-            return int(handle.send_request(request))
-
-
 class _Sweep:
     """What was found, in one participant after another."""
 
@@ -317,7 +245,7 @@ class _Sweep:
         self._node = node
         self._domain = int(node.context.get_domain_id())
         self._wanted = None if wanted is None else frozenset(names)
-        self._sights: dict[str, _Sight] = {}
+        self._sights: dict[str, Sight] = {}
         self._glanced_at = float("-inf")
         self._questions: dict[tuple[str, int], LeftBehind] = {}
         for call in self._calls.values():
@@ -435,7 +363,7 @@ class _Sweep:
                     call.asked(question, now)
         self._cancel(now)
 
-    def _hear(self, action: str, sight: _Sight) -> None:
+    def _hear(self, action: str, sight: Sight) -> None:
         for number, code in sight.answers():
             now = time.monotonic()
             self._calls[action].answered(number, now)
@@ -454,7 +382,7 @@ class _Sweep:
         for topic, _types in self._node.get_topic_names_and_types():
             action = topic.removesuffix(STATUS)
             if topic.endswith(STATUS) and action not in self._sights:
-                self._sights[action] = _Sight(self._node, action)
+                self._sights[action] = Sight(self._node, action)
                 self._calls.setdefault(action, RollCall(now))
         for action, sight in self._sights.items():
             call = self._calls[action]

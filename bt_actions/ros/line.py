@@ -30,6 +30,7 @@ from bt_actions.ros.alive import is_valid
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.past import Past
+from bt_actions.ros.predecessors import Predecessors
 from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, ledger, lock
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
@@ -85,6 +86,7 @@ class Line:
         self._looked_out_at = time.monotonic()
         self._last_probes: deque[int] = deque()
         self.past = Past(self)
+        self.predecessors = Predecessors(name)
         self._warned_crowd = False
         self._warned_of: set[str] = set()
         self._adopt()
@@ -178,9 +180,11 @@ class Line:
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
         with lock:
-            for goal_id in statuses.keys() - self.goals.keys():
-                if 0 < statuses[goal_id] < STATUS_SUCCEEDED:
-                    self.past.runs(goal_id)
+            others = statuses.keys() - self.goals.keys()
+            running = {each for each in others if 0 < statuses[each] < STATUS_SUCCEEDED}
+            for goal_id in running:
+                self.past.runs(goal_id)
+            self.predecessors.see(running)
             for goal_id in self.goals.keys() & statuses.keys():
                 status = statuses[goal_id]
                 ticket = self._heard_of(goal_id) if status > 0 else None

@@ -91,9 +91,22 @@ def pytest_runtest_makereport(
             record.verdict = f"skipped: {report.longrepr[2].removeprefix('Skipped: ')}"
         elif report.failed:
             record.verdict = "failed"
+            if item.config.getoption("--reliability", None):
+                tell_at_once(item, report)
         elif report.when == "call":
             record.verdict = "passed"
     return report
+
+
+def tell_at_once(item: pytest.Item, report: pytest.TestReport) -> None:
+    """Print why a scenario did not hold: a run of an hour may be cut short before its summary."""
+    terminal = item.config.get_terminal_writer()
+    terminal.line()
+    terminal.sep("_", f"{item.name}, {report.when}")
+    terminal.line(report.longreprtext)
+    for title, text in report.sections:
+        terminal.sep("-", title)
+        terminal.line(text)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -515,6 +515,28 @@ def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
     record.outcome = "cleanup: exit code 0; a second one finds nothing"
 
 
+def test_a_run_says_what_a_killed_one_left_running(
+    launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
+) -> None:
+    """SIGKILL to the orchestrator; the same tree is run again, and nobody cleans up before"""
+    journal = serve("1:slow=10")
+    run = launch("run", str(tree(name, distance=9.0)))
+    run.line("executing on")
+    left = journal.wait_for("accepted").goal
+    run.send(signal.SIGKILL)
+    run.wait()
+    again = launch("run", str(tree(name, distance=0.5)))
+    assert again.wait() == 0, again
+    told = [line for line in again.errors if left in line]
+    assert len(told) == 1, again
+    assert f"process {run.pid}" in told[0]
+    assert "`bt-actions cleanup` cancels it" in told[0]
+    assert journal.ends() == [None, "succeeded"], "it is not asked to cancel, unless somebody wants"
+    assert launch("cleanup").wait() == 0
+    assert journal.ends() == ["canceled", "succeeded"]
+    record.outcome = "the new run names the goal, and cleanup; then SUCCEEDED; then CANCELED"
+
+
 @pytest.mark.chaos
 def test_what_a_killed_container_left_is_found_by_its_name(
     launch: Launch, serve: Serve, tree: Tree, name: str, record: Record

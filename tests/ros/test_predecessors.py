@@ -1,0 +1,47 @@
+"""Who runs a tree is told, once, of goals that a process which has died left running there."""
+
+from __future__ import annotations
+
+import pytest
+
+from bt_actions.goal_ids import new_goal_id
+from bt_actions.ros import predecessors as module
+from bt_actions.ros.predecessors import TOLD_AT_MOST, Predecessors
+
+
+def of_the_dead() -> bytes:
+    """An id that this process would have made, had it begun at another moment."""
+    made = bytearray(new_goal_id())
+    made[10] ^= 0xFF
+    return bytes(made)
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    said = list[str]()
+    monkeypatch.setattr(module.log, "warning", said.append)
+    return said
+
+
+def test_a_goal_of_the_dead_is_named_once_though_statuses_of_two_servers_take_turns(
+    said: list[str],
+) -> None:
+    seen, left = Predecessors("/move"), of_the_dead()
+    for running in ({left}, {left}, set[bytes](), {left}):
+        seen.see(running)
+    [line] = said
+    assert line.startswith("/move: a goal of process ")
+    assert "`bt-actions cleanup`" in line
+    assert left.hex() in line
+
+
+def test_goals_of_the_living_and_of_other_clients_are_nobodys_concern(said: list[str]) -> None:
+    elsewhere = bytearray(of_the_dead())
+    elsewhere[3] ^= 0xFF
+    Predecessors("/move").see({new_goal_id(), bytes(16), b"", bytes(elsewhere)})
+    assert not said
+
+
+def test_of_many_some_are_named(said: list[str]) -> None:
+    Predecessors("/move").see({of_the_dead() for _ in range(3 * TOLD_AT_MOST)})
+    assert len(said) == TOLD_AT_MOST
