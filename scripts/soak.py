@@ -123,6 +123,7 @@ def held() -> dict[str, float]:
         "memory": int(status.partition("VmRSS:")[2].split()[0]) / 1024.0,
         "of it not of files": int(status.partition("RssAnon:")[2].split()[0]) / 1024.0,
         "threads": len(threading.enumerate()),
+        "of the middleware too": sum(1 for _ in Path("/proc/self/task").iterdir()),
         "files": sum(1 for _ in Path("/proc/self/fd").iterdir()),
     }
 
@@ -182,6 +183,8 @@ def run(goals: int, directory: Path) -> list[str]:
                 wrong.append("the tree did not succeed")
             wrong += [f"{report} is unaccounted for" for report in runner.unaccounted]
             soak.close()
+        live = [each for each in journal.live_intervals(journal.read(record)) if each.end is None]
+        wrong += [f"{each.goal}: still runs when all is over" for each in live]
     finally:
         servers.send_signal(signal.SIGINT)
         servers.wait(20.0)
@@ -207,7 +210,11 @@ def compare(said: Path, record: Path) -> list[str]:
         for goal, end in ends.items()
         if goal in known and end not in SAID[known[goal]]
     ]
-    wrong += [f"{g}: we said {e}" for g, e in ends.items() if e is End.UNKNOWN and g not in known]
+    wrong += [
+        f"{goal}: no server has seen it, and we said {end}"
+        for goal, end in ends.items()
+        if goal not in known and end not in SAID["None"]
+    ]
     twice = [goal for goal, times in journal.executions(entries).items() if times > 1]
     return wrong + [f"{goal}: executed twice" for goal in twice]
 

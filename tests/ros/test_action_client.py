@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import uuid
+from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -17,7 +18,7 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import Gripper, MoveRobot
 from bt_actions.ros import action_client
-from bt_actions.ros.action_client import ANSWERS_KEPT, GOALS_KEPT, ActionClient
+from bt_actions.ros.action_client import ANSWERS_KEPT, GOALS_KEPT, TAKE_AT_MOST, ActionClient
 from bt_actions.ros.graph import servers
 from bt_actions.ros.traffic import Traffic
 from tests.support.processes import Host, HostFactory
@@ -303,6 +304,36 @@ def test_of_answers_without_end_to_one_question_the_first_are_kept(client: Actio
         client._file("result", question, (0, number))
     assert [each for _, each in question.answers] == list(range(ANSWERS_KEPT))
     client.forget(question.about)
+
+
+class Endless:
+    """rclpy's low-level client, where of everything there is always more to take."""
+
+    def __init__(self) -> None:
+        self.taken: Counter[str] = Counter()
+
+    def __getattr__(self, name: str) -> Callable[[Any], Any]:
+        def take(kind: Any) -> Any:
+            self.taken[name] += 1
+            return (-1, kind()) if name.endswith("_response") else kind()
+
+        return take
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *error: object) -> None: ...
+
+
+def test_of_messages_without_end_so_many_are_taken_at_a_time(
+    client: ActionClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    endless = Endless()
+    with monkeypatch.context() as patch:
+        patch.setattr(client, "_client_handle", endless)
+        client.take_data()
+    client._inbox.clear()
+    assert set(endless.taken.values()) == {TAKE_AT_MOST}
+    assert len(endless.taken) == 5
 
 
 def test_nothing_stays_filed_for_answered_requests(client: ActionClient, heard: Heard) -> None:

@@ -32,7 +32,7 @@ from bt_actions.ros import alarm, shared, traffic
 from bt_actions.ros import line as module
 from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.line import BESIDE, LEASE, LOOK_WHILE_RUNNING, SILENT_FOR, Line
-from bt_actions.ros.shared import LOST_KEPT, Ticket, lock
+from bt_actions.ros.shared import FEEDBACK_KEPT, LOST_KEPT, Ticket, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.server import PROBES_KEPT, Server, ServerWatch
 from bt_actions.standstill import ANSWERS_TAKE_IN_ALL, AT_MOST, Leniency, Standstill
@@ -582,6 +582,16 @@ def test_a_denial_does_not_make_an_orphan_wait_on(
     word(line)
     line._orphan()
     assert not line.put, "where there is no other"
+
+
+def test_of_feedback_that_no_tick_reads_the_newest_is_kept() -> None:
+    line: Any = Orphan(0.0)
+    line.traffic = SimpleNamespace(notify=lambda _: None)
+    goal = Goal(b"1", "m", Timeouts(), Now(0.0, 0.0))
+    ticket = line.goals[b"1"] = Ticket(goal, line, line.traffic, None, "m", keeps_feedback=True)
+    for number in range(2 * FEEDBACK_KEPT):
+        line.feedback_came(b"1", number)
+    assert list(ticket.feedback) == list(range(FEEDBACK_KEPT, 2 * FEEDBACK_KEPT))
 
 
 def test_an_orphan_finds_out_by_asking_who_lives(monkeypatch: pytest.MonkeyPatch) -> None:
