@@ -42,6 +42,11 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_STDERR] = os.dup(sys.__stderr__.fileno())  # the real one, while none is captured
 
 
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """Call a signal by its name, and not by its number, in the names of tests."""
+    return val.name if isinstance(val, signal.Signals) else None
+
+
 def pytest_collection_finish() -> None:
     """Take what pytest knows of all tests out of each garbage collection, which stops everybody."""
     gc.collect()

@@ -46,6 +46,16 @@ def test_what_does_not_fit_the_action_is_found_in_setup(
     assert message in str(raised.value)
 
 
+def test_a_tick_before_setup_says_what_is_wrong(name: str) -> None:
+    with pytest.raises(RuntimeError, match="setup"):
+        MoveRobot("m", 1.0, action_name=name).tick_once()
+
+
+def test_setup_without_a_node_says_what_is_wrong(name: str) -> None:
+    with pytest.raises(TypeError, match="node"):
+        MoveRobot("m", 1.0, action_name=name).setup()
+
+
 def test_constants_of_a_result_are_known(node: Any, name: str) -> None:
     leaf = MoveRobot("m", 1.0, action_name=name, expect="result.status != result.STATUS_FAULT")
     leaf.setup(node=node)

@@ -11,8 +11,16 @@ from typing import Any
 
 import pytest
 
+from bt_actions.attempts import Attempts
 from tests.support.processes import Host, Journal, Process
-from tests.support.reliability import ON_A_BUSY_MACHINE, Record, sentence, write
+from tests.support.reliability import (
+    ON_A_BUSY_MACHINE,
+    Record,
+    family,
+    first_paragraph,
+    sentence,
+    write,
+)
 
 _RECORDS = pytest.StashKey[list[Record]]()
 _RECORD = pytest.StashKey[Record]()
@@ -30,13 +38,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def record(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Record]:
-    """What this scenario tells the report; it gathers the journals of the servers by itself."""
-    module = request.module
+    """What this scenario tells the report; it gathers journals and attempts by itself.
+
+    Attempts, and not leaves: those must be free to go when the scenario drops them.
+    """
     record = Record(
-        family=(module.__doc__ or module.__name__).splitlines()[0].partition(".")[0],
+        family=family(request.module.__doc__),
         scenario=sentence(request.node.name),
         leniency=1.0 if request.config.getoption("--reliability", None) else ON_A_BUSY_MACHINE,
-        did=" ".join((request.function.__doc__ or "").split("\n\n")[0].split()).rstrip("."),
+        did=first_paragraph(request.function.__doc__),
     )
     faults: list[str] = []
     owners: dict[int, list[Journal]] = {}
@@ -58,7 +68,12 @@ def record(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> I
             journal.killed[host.pid] = moment
         return moment
 
-    real_kill = Host.kill
+    def begin(attempts: Attempts, *given: Any) -> None:
+        real_begin(attempts, *given)
+        record.visits.append(attempts.history)
+
+    real_kill, real_begin = Host.kill, Attempts.__init__
+    monkeypatch.setattr(Attempts, "__init__", begin)
     monkeypatch.setattr(Host, "open", noting(Host.open))
     monkeypatch.setattr(Host, "robot", noting(Host.robot))
     monkeypatch.setattr(Host, "kill", kill)
@@ -67,17 +82,7 @@ def record(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> I
     yield record
     if not record.did and faults:
         record.did = "server's fault: " + ", ".join(faults)
-    record.journals = record.journals or ready_made(request)
-    record.read_journals()
-
-
-def ready_made(request: pytest.FixtureRequest) -> list[Journal]:
-    """The journal of the one among many `programs` of a module that this test is about."""
-    programs = request.node.funcargs.get("programs", {})
-    callspec = getattr(request.node, "callspec", None)
-    words = [] if callspec is None else [str(value) for value in callspec.params.values()]
-    program = programs.get(" ".join(words))
-    return [] if program is None else [program.journal]
+    record.read()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -121,6 +126,18 @@ def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     directory = tmp_path / "ledger"
     monkeypatch.setenv("BT_ACTIONS_LEDGER", str(directory))
     return directory
+
+
+@pytest.fixture
+def spin(node: Any) -> Iterator[Callable[[], None]]:
+    """Spin the node for a moment, on this thread, as a loop of the user's does."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    yield lambda: executor.spin_once(timeout_sec=0.005)
+    executor.shutdown()
+    node.executor = None
 
 
 @pytest.fixture

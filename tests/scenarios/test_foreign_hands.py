@@ -12,7 +12,7 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +25,9 @@ from bt_actions.ros import alarm, shared
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import IN_FLIGHT
 from bt_actions.server import Server
+from tests.support.foreign import PROGRAMS
 from tests.support.processes import PATIENCE, Host, Journal, Process
-from tests.support.reliability import Record
+from tests.support.reliability import Record, first_paragraph
 from tests.support.trees import state, together
 from tests.support.waiting import holds_for, until
 
@@ -63,8 +64,8 @@ END_BY_A_SIGNAL = [
     "spin_until_a_signal_and_clean_up",
     "tick_tock_until_a_signal",
 ]
-RUNNERS = ["wait_for_a_runner", "run_and_clean_up"]
-"""These have a context of their own, so rclpy's signal handlers are not there."""
+RUNNERS = {"wait_for_a_runner": "TERM", "run_and_clean_up": "INT"}
+"""And the signal for each; they have a context of their own, without rclpy's signal handlers."""
 TO_SUCCEED = ["tick_in_a_timer_until_done"]
 CRASHED = {-signal.SIGSEGV, -signal.SIGABRT, -signal.SIGBUS}
 
@@ -80,7 +81,7 @@ def programs(session_host: Host) -> Iterator[dict[str, Program]]:
     """All programs, started at once: they spend their time with starting."""
     names = [*END_BY_THEMSELVES, *TO_SUCCEED, "just_end_soon"]
     names += [f"{each} {number}" for each in END_BY_A_SIGNAL for number in ("INT", "TERM")]
-    names += ["wait_for_a_runner TERM", "run_and_clean_up INT"]
+    names += [f"{each} {number}" for each, number in RUNNERS.items()]
     started: dict[str, Program] = {}
     with contextlib.ExitStack() as stack:
         for number, name in enumerate(names):
@@ -97,9 +98,30 @@ def programs(session_host: Host) -> Iterator[dict[str, Program]]:
         yield started
 
 
+@pytest.fixture
+def program(programs: dict[str, Program], record: Record) -> Callable[..., Program]:
+    """Take one of the programs, of which the report then tells."""
+
+    def take(name: str, number: str = "") -> Program:
+        program = programs[f"{name} {number}".strip()]
+        record.did = first_paragraph(PROGRAMS[name].__doc__) + (f"; SIG{number}" if number else "")
+        record.journals.append(program.journal)
+        return program
+
+    return take
+
+
+def ended(code: int) -> str:
+    """How a process ended, in words."""
+    return f"exit code {code}" if code >= 0 else f"ended by {signal.Signals(-code).name}"
+
+
 @pytest.mark.parametrize("name", END_BY_THEMSELVES)
-def test_a_program_that_ends_leaves_no_goal(programs: dict[str, Program], name: str) -> None:
-    process, journal = programs[name].process, programs[name].journal
+def test_a_program_that_ends_leaves_no_goal(
+    program: Callable[..., Program], name: str, record: Record
+) -> None:
+    taken = program(name)
+    process, journal = taken.process, taken.journal
     process.line("executing", within=60.0)
     if name in TELL:
         assert process.line("end") == "end CANCELED CANCELED", process
@@ -108,68 +130,64 @@ def test_a_program_that_ends_leaves_no_goal(programs: dict[str, Program], name: 
     assert journal.events().count("cancel_requested") >= 1
     assert code in CODES.get(name, {0}), process
     assert "Traceback" not in str(process) or name.startswith("crash")
+    record.outcome = f"canceled; {ended(code)}"
 
 
 @pytest.mark.parametrize("number", ["INT", "TERM"])
 @pytest.mark.parametrize("name", END_BY_A_SIGNAL)
 def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
-    programs: dict[str, Program], name: str, number: str
+    program: Callable[..., Program], name: str, number: str, record: Record
 ) -> None:
-    process, journal = (programs[f"{name} {number}"].process, programs[f"{name} {number}"].journal)
+    taken = program(name, number)
+    process, journal = taken.process, taken.journal
     process.line("executing", within=60.0)
     sent = process.send(signal.Signals[f"SIG{number}"])
     journal.wait_for("canceled", within=10.0)
+    record.took(time.monotonic() - sent)
     code = process.wait()
     assert time.monotonic() - sent < PATIENCE
     assert code not in CRASHED, process
     assert journal.ends() == ["canceled"], process
+    record.outcome = f"canceled; {ended(code)}"
 
 
-@pytest.mark.parametrize(
-    ("name", "number"), list(zip(RUNNERS, (signal.SIGTERM, signal.SIGINT), strict=True))
-)
+@pytest.mark.parametrize(("name", "number"), RUNNERS.items())
 def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
-    programs: dict[str, Program], name: str, number: signal.Signals
+    program: Callable[..., Program], name: str, number: str, record: Record
 ) -> None:
-    program = programs[f"{name} {number.name.removeprefix('SIG')}"]
-    process, journal = program.process, program.journal
+    taken = program(name, number)
+    process, journal = taken.process, taken.journal
     process.line("executing", within=60.0)
-    process.send(number)
+    sent = process.send(signal.Signals[f"SIG{number}"])
     code = process.wait()
-    assert code in (128 + number, -number), process
+    record.took(time.monotonic() - sent)
+    assert code in (128 + signal.Signals[f"SIG{number}"], -signal.Signals[f"SIG{number}"]), process
     assert journal.ends() == ["canceled"], process
+    record.outcome = f"canceled; {ended(code)}"
 
 
-def test_a_program_may_just_succeed(programs: dict[str, Program]) -> None:
-    program = programs[TO_SUCCEED[0]]
-    assert program.process.line("end") == "end SUCCEEDED SUCCEEDED"
-    assert program.process.wait() == 0, program.process
-    assert program.journal.events() == ["received", "accepted", "succeeded"]
-    assert program.process.errors == []
+def test_a_program_may_just_succeed(program: Callable[..., Program], record: Record) -> None:
+    taken = program(TO_SUCCEED[0])
+    assert taken.process.line("end") == "end SUCCEEDED SUCCEEDED"
+    assert taken.process.wait() == 0, taken.process
+    assert taken.journal.events() == ["received", "accepted", "succeeded"]
+    assert taken.process.errors == []
+    record.outcome = "SUCCEEDED; exit code 0"
 
 
-def test_a_goal_that_cannot_be_canceled_at_exit_is_reported(programs: dict[str, Program]) -> None:
-    program = programs["just_end_soon"]
-    program.process.line("executing", within=60.0)
-    assert program.process.wait() == 0
-    assert "not accounted for" in str(program.process)
-    assert "cannot account for it" in str(program.process)
-    assert program.journal.ends() == [None]
+def test_a_goal_that_cannot_be_canceled_at_exit_is_reported(
+    program: Callable[..., Program], record: Record
+) -> None:
+    taken = program("just_end_soon")
+    taken.process.line("executing", within=60.0)
+    assert taken.process.wait() == 0
+    assert "not accounted for" in str(taken.process)
+    assert "cannot account for it" in str(taken.process)
+    assert taken.journal.ends() == [None]
+    record.outcome = "named on standard error; exit code 0"
 
 
 # In this process
-
-
-@pytest.fixture
-def spin(node: Any) -> Iterator[Any]:
-    """Spin the node for a moment, on this thread."""
-    from rclpy.executors import SingleThreadedExecutor
-
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    yield lambda: executor.spin_once(timeout_sec=0.005)
-    executor.shutdown()
-    node.executor = None
 
 
 @pytest.fixture
@@ -182,6 +200,7 @@ def journal(host: Host, name: str) -> Iterator[Journal]:
 def test_setup_twice_for_the_same_node_is_fine(
     journal: Journal, name: str, node: Any, spin: Any
 ) -> None:
+    """setup() twice before the goal and once after it; shutdown() twice"""
     leaf = MoveRobot("m", 0.1, action_name=name)
     tree = py_trees.trees.BehaviourTree(leaf)
     tree.setup(node=node)
@@ -196,6 +215,7 @@ def test_setup_twice_for_the_same_node_is_fine(
 def test_setup_again_after_shutdown_is_fine(
     journal: Journal, name: str, node: Any, spin: Any
 ) -> None:
+    """shutdown() in mid-goal; setup() and ticks again"""
     leaf = MoveRobot("m", 0.5, action_name=name)
     tree = py_trees.trees.BehaviourTree(leaf)
     tree.setup(node=node)
@@ -214,7 +234,8 @@ def test_setup_again_after_shutdown_is_fine(
 def test_a_goal_left_behind_by_a_visit_before_is_drained_too(
     host: Host, name: str, node: Any, spin: Any, accept: float
 ) -> None:
-    """Interrupted before its acceptance, visited again, and shut down"""
+    """Interrupted before it is accepted, 2 s late; visited again; shutdown(); accept deadline 5 s
+    ("as a suspect": 0.5 s)"""
     journal = host.open(name, "1:delay_accept=2")
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=accept))
     tree = py_trees.trees.BehaviourTree(leaf)
@@ -261,9 +282,9 @@ def test_what_a_runner_leaves_is_waited_for_by_another(
 
 
 def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
-    host: Host, name: str, node: Any
+    host: Host, name: str, node: Any, record: Record
 ) -> None:
-    """Another thread has the one lock at that moment"""
+    """os.fork() beside a running goal, while another thread has the one lock"""
     journal = host.open(name)
     leaf = MoveRobot("m", 9.0, action_name=name)
     held, over = threading.Event(), threading.Event()
@@ -291,12 +312,13 @@ def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
         assert alarm.minded()
     assert journal.ends() == ["canceled"]
     host.close_server(name)
+    record.outcome = "CANCELED by the parent; its child knows no goal and gets the lock"
 
 
 def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
-    host: Host, name: str, node: Any, spin: Any, monkeypatch: pytest.MonkeyPatch
+    host: Host, name: str, node: Any, spin: Any, monkeypatch: pytest.MonkeyPatch, record: Record
 ) -> None:
-    """Ctrl-C while the exit hook waits for a goal that cannot be canceled."""
+    """The exit hook's wait for a goal that cannot be canceled is replaced by a KeyboardInterrupt"""
     from bt_actions.ros import traffic
 
     said: list[str] = []
@@ -318,12 +340,13 @@ def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
     host.cancel_all(name)
     leaf.shutdown()
     host.close_server(name)
+    record.outcome = "named in the log as not accounted for"
 
 
 def test_a_tick_after_shutdown_says_what_is_wrong(
-    journal: Journal, name: str, node: Any, spin: Any
+    journal: Journal, name: str, node: Any, spin: Any, record: Record
 ) -> None:
-    """A timer of the user's goes on."""
+    """shutdown() in mid-goal and one more tick, as a timer of the user's goes on"""
     leaf = MoveRobot("m", 5.0, action_name=name)
     tree = py_trees.trees.BehaviourTree(leaf)
     tree.setup(node=node)
@@ -332,22 +355,13 @@ def test_a_tick_after_shutdown_says_what_is_wrong(
     with pytest.raises(RuntimeError, match="setup"):
         tree.tick()
     assert journal.ends() == ["canceled"]
-
-
-def test_a_tick_before_setup_says_what_is_wrong(name: str) -> None:
-    with pytest.raises(RuntimeError, match="setup"):
-        MoveRobot("m", 1.0, action_name=name).tick_once()
-
-
-def test_setup_without_a_node_says_what_is_wrong(name: str) -> None:
-    with pytest.raises(TypeError, match="node"):
-        MoveRobot("m", 1.0, action_name=name).setup()
+    record.outcome = "CANCELED; RuntimeError, which names setup()"
 
 
 def test_the_deadline_of_shutdown_is_one_for_all_goals(
-    host: Host, name: str, node: Any, spin: Any
+    host: Host, name: str, node: Any, spin: Any, record: Record
 ) -> None:
-    """And not one for each: five servers refuse to cancel."""
+    """shutdown() in mid-goal of five servers that refuse to cancel; cancel deadlines of 2 s"""
     names = [f"{name}_{number}" for number in range(5)]
     for each in names:
         host.open(each, "1:reject_cancel")
@@ -363,19 +377,27 @@ def test_the_deadline_of_shutdown_is_one_for_all_goals(
     )
     started = time.monotonic()
     tree.shutdown()
-    assert time.monotonic() - started < 7.0
+    took = time.monotonic() - started
+    assert took < 7.0
+    record.took(took)
     assert {(leaf.outcome, leaf.end) for leaf in leaves} == {(Outcome.CANCELED, End.UNKNOWN)}
+    record.outcome = "all CANCELED, end UNKNOWN"
     for each in names:
         host.close_server(each)
 
 
-def test_shutdown_while_the_acceptance_is_open(host: Host, name: str, node: Any, spin: Any) -> None:
+def test_shutdown_while_the_acceptance_is_open(
+    host: Host, name: str, node: Any, spin: Any, record: Record
+) -> None:
+    """shutdown() when the server has received the goal, which it accepts 0.7 s late"""
     journal = host.open(name, "1:delay_accept=0.7")
     leaf = MoveRobot("m", 5.0, action_name=name)
     tree = py_trees.trees.BehaviourTree(leaf)
     tree.setup(node=node)
     until(lambda: journal.count("received"), meanwhile=lambda: (spin(), tree.tick()))
+    began = time.monotonic()
     tree.shutdown()
+    record.took(time.monotonic() - began)
     assert journal.ends() == ["canceled"]
     assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.CANCELED)
     host.close_server(name)
@@ -384,7 +406,7 @@ def test_shutdown_while_the_acceptance_is_open(host: Host, name: str, node: Any,
 def test_two_trees_with_the_same_names_never_have_two_goals_live(
     journal: Journal, name: str, context: Any, node: Any, spin: Any
 ) -> None:
-    """On one node, and on two: resources are held by the process."""
+    """Four trees that are ticked in turn, two on each of two nodes, with one action"""
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
 
@@ -416,7 +438,7 @@ def test_two_trees_with_the_same_names_never_have_two_goals_live(
 def test_an_action_shared_by_twenty_leaves(
     journal: Journal, name: str, node: Any, spin: Any, busy: str
 ) -> None:
-    """As many as would overrun the queue of the server's service, which holds ten."""
+    """Twenty leaves of a parallel: twice what the queue of the server's service holds"""
     leaves = [MoveRobot(f"m{i}", 0.05, action_name=name, busy=busy) for i in range(20)]
     tree = py_trees.trees.BehaviourTree(together(*leaves))
     tree.setup(node=node)
@@ -472,6 +494,7 @@ def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_no
 def test_nobody_ticks_any_more_and_the_goal_is_drained_by_its_deadline(
     journal: Journal, name: str, node: Any, spin: Any
 ) -> None:
+    """The ticks end in mid-goal, while the node is spun; result deadline 0.4 s"""
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=0.4)
     leaf.setup(node=node)
     until(lambda: state(leaf) == "EXECUTING", meanwhile=lambda: (spin(), leaf.tick_once()))

@@ -13,6 +13,7 @@ from py_trees.common import Status
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.ros import alarm
 from tests.support.processes import Host, Journal
+from tests.support.reliability import Record, rounded
 from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, state, together
 from tests.support.waiting import until
 
@@ -20,16 +21,19 @@ Serve = Callable[..., Journal]
 
 
 def test_interrupted_before_acceptance_is_canceled_and_not_completed(
-    serve: Serve, name: str, node: Any, executor: str
+    serve: Serve, name: str, node: Any, executor: str, record: Record
 ) -> None:
+    """interrupt() of a runner when the server has received its goal, which it accepts 1 s late"""
     journal = serve("1:delay_accept=1")
     leaf = MoveRobot("m", 1.0, action_name=name)
     with TreeRunner(leaf, node=node, executor=executor) as runner:
         runner.start()
         journal.wait_for("received")
         assert state(leaf) == "SENDING"
+        interrupted = time.monotonic()
         runner.interrupt()
         assert runner.wait(5.0) is Status.INVALID
+        record.took(time.monotonic() - interrupted)
         assert runner.unaccounted == []
     assert journal.ends() == ["canceled"]
     assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.CANCELED)
@@ -38,6 +42,7 @@ def test_interrupted_before_acceptance_is_canceled_and_not_completed(
 def test_a_retry_after_a_timeout_waits_for_a_server_that_is_slow_to_cancel(
     serve: Serve, name: str, node: Any, executor: str
 ) -> None:
+    """A server that takes 1 s to cancel; result deadline 0.3 s, three tries"""
     journal = serve("*:delay_cancel=1")
     leaf = MoveRobot("m", 5.0, action_name=name, timeout=0.3, retry=3)
     with TreeRunner(leaf, node=node, executor=executor) as runner:
@@ -54,7 +59,7 @@ PHASES = ["QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING", "CANCELING", "
 def test_preempted_by_a_reactive_sibling_and_entered_again_at_once(
     host: Host, serve: Serve, name: str, node: Any, phase: str
 ) -> None:
-    """The second visit waits for what the first has left; never are two goals live."""
+    """A guard preempts the first leaf in the phase named; the second one has the same server"""
     from bt_actions import Retry
 
     journal = None
@@ -110,8 +115,9 @@ def test_preempted_by_a_reactive_sibling_and_entered_again_at_once(
 
 
 def test_ticks_go_on_while_the_second_visit_waits_for_the_first_to_end(
-    serve: Serve, name: str, node: Any
+    serve: Serve, name: str, node: Any, spin: Any, record: Record
 ) -> None:
+    """A leaf is stopped in mid-goal and ticked on; the server takes 3 s to cancel"""
     journal = serve("1:delay_cancel=3")
     leaf = MoveRobot("m", 0.4, action_name=name)
     tree = py_trees.trees.BehaviourTree(leaf)
@@ -123,24 +129,20 @@ def test_ticks_go_on_while_the_second_visit_waits_for_the_first_to_end(
         tree.tick()
         longest = max(longest, time.monotonic() - started)
 
-    from rclpy.executors import SingleThreadedExecutor
-
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
+    spin_and_tick = lambda: (spin(), tick())  # noqa: E731
     tree.setup(node=node)
-    spin = lambda: (executor.spin_once(timeout_sec=0.005), tick())  # noqa: E731
-    until(lambda: state(leaf) == "EXECUTING", meanwhile=spin)
+    until(lambda: state(leaf) == "EXECUTING", meanwhile=spin_and_tick)
     leaf.stop(Status.INVALID)
-    until(lambda: leaf.status is Status.SUCCESS, meanwhile=spin)
+    until(lambda: leaf.status is Status.SUCCESS, meanwhile=spin_and_tick)
     assert longest < 1.5, "a tick that waited would have taken 3 s"
     assert journal.ends() == ["canceled", "succeeded"]
     assert journal.max_live == 1
     tree.shutdown()
-    executor.shutdown()
-    node.executor = None
+    record.outcome = "CANCELED; then SUCCEEDED; the longest tick took " + rounded(longest)
 
 
 def test_preempted_and_entered_again_ten_times(serve: Serve, name: str, node: Any) -> None:
+    """A guard holds and does no more, ten times; every second time in mid-goal"""
     journal = serve()
     guard = Guard()
     leaf = MoveRobot("m", 5.0, action_name=name)
@@ -167,6 +169,7 @@ def test_preempted_and_entered_again_ten_times(serve: Serve, name: str, node: An
 def test_a_parallel_with_a_failing_branch_cancels_the_others(
     serve: Serve, name: str, node: Any
 ) -> None:
+    """Four servers; one of them aborts when it has executed its goal for 0.5 s"""
     failing = serve("1:abort=0.5", name=f"{name}_failing")
     others = [serve(name=f"{name}_{number}") for number in range(3)]
     leaves = [MoveRobot(f"m{i}", 5.0, action_name=f"{name}_{i}") for i in range(3)]
@@ -182,6 +185,7 @@ class TestPyTreesDecorators:
     """They cannot wait for a cancel; the leaf does it for them."""
 
     def test_timeout_cancels_the_goal(self, serve: Serve, name: str, node: Any) -> None:
+        """py_trees' Timeout of 0.4 s around the leaf"""
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name)
         tree = py_trees.decorators.Timeout("limit", child=leaf, duration=0.4)
@@ -194,6 +198,7 @@ class TestPyTreesDecorators:
     def test_retry_of_timeout_never_has_two_goals_live(
         self, serve: Serve, name: str, node: Any, executor: str
     ) -> None:
+        """py_trees' Retry, three times, of its Timeout of 1 s; the server takes 0.7 s to cancel"""
         journal = serve("*:delay_cancel=0.7")
         leaf = MoveRobot("m", 5.0, action_name=name)
         limited = py_trees.decorators.Timeout("limit", child=leaf, duration=1.0)
@@ -205,6 +210,7 @@ class TestPyTreesDecorators:
         assert set(journal.ends()) == {"canceled"}
 
     def test_retry_begins_a_new_visit_each_time(self, serve: Serve, name: str, node: Any) -> None:
+        """py_trees' Retry around the leaf; the server aborts the first goal, rejects the second"""
         journal = serve("1:abort", "2:reject")
         leaf = MoveRobot("m", 0.1, action_name=name)
         tree = py_trees.decorators.Retry("again", child=leaf, num_failures=3)
@@ -214,11 +220,16 @@ class TestPyTreesDecorators:
         assert len(leaf.history) == 1
 
 
+NAMED = "TreeError, which names the behaviour"
+NAMED_AND_CANCELED = f"{NAMED}; the leaf CANCELED"
+
+
 class TestABehaviourThatRaises:
     @pytest.mark.parametrize("method", ["setup", "initialise", "update"])
     def test_fails_the_tree_names_itself_and_the_goals_are_drained(
-        self, serve: Serve, name: str, node: Any, method: str, executor: str
+        self, serve: Serve, name: str, node: Any, method: str, executor: str, record: Record
     ) -> None:
+        """A Behaviour raises in the method named beside a goal that runs"""
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name)
         culprit = Raises("culprit", method, when=lambda: True)
@@ -233,12 +244,13 @@ class TestABehaviourThatRaises:
                 runner.wait(5.0)
             assert runner.unaccounted == []
         assert journal.ends() == ([] if method == "setup" else ["canceled"])
+        record.outcome = NAMED if method == "setup" else NAMED_AND_CANCELED
 
     @pytest.mark.parametrize("method", ["initialise", "update"])
     def test_in_the_tick_that_sends_a_goal(
-        self, serve: Serve, name: str, node: Any, method: str
+        self, serve: Serve, name: str, node: Any, method: str, record: Record
     ) -> None:
-        """The goals are drained when run() raises, and not only at shutdown."""
+        """A Behaviour raises in the method named, in the tick that sends the goal beside it"""
         journal = serve("1:delay_accept=0.3")
         warm = MoveRobot("warm", 0.0, action_name=name)
         warm.setup(node=node)  # so that the server is known, and the first tick sends
@@ -254,9 +266,10 @@ class TestABehaviourThatRaises:
             assert leaf.status is Status.INVALID
             assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.CANCELED)
         warm.shutdown()
+        record.outcome = NAMED_AND_CANCELED + " before run() raises"
 
-    def test_in_terminate(self, serve: Serve, name: str, node: Any) -> None:
-        """Its own branch is stopped by a guard, while a goal runs beside it."""
+    def test_in_terminate(self, serve: Serve, name: str, node: Any, record: Record) -> None:
+        """A Behaviour raises in terminate() when a guard stops it beside a goal that runs"""
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name)
         guard = Guard()
@@ -269,21 +282,26 @@ class TestABehaviourThatRaises:
             with pytest.raises(TreeError, match=r"root/branch/culprit: .*on purpose"):
                 runner.wait(5.0)
         assert journal.ends() == ["canceled"]
+        record.outcome = NAMED_AND_CANCELED
 
     def test_in_terminate_while_the_tree_is_being_interrupted(
-        self, serve: Serve, name: str, node: Any
+        self, serve: Serve, name: str, node: Any, record: Record
     ) -> None:
+        """A Behaviour raises in terminate() when the tree is interrupted beside a goal that runs"""
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(Raises("culprit", "terminate"), leaf, name="root")
         with TreeRunner(root, node=node) as runner:
             runner.start()
             until(lambda: state(leaf) == "EXECUTING")
+            interrupted = time.monotonic()
             runner.interrupt()
             runner.wait(5.0)
+            record.took(time.monotonic() - interrupted)
         assert journal.ends() == ["canceled"]
 
     def test_in_shutdown(self, serve: Serve, name: str, node: Any) -> None:
+        """A Behaviour raises in shutdown() beside a goal that runs"""
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(Raises("culprit", "shutdown"), leaf, name="root")
@@ -292,7 +310,8 @@ class TestABehaviourThatRaises:
             until(lambda: state(leaf) == "EXECUTING")
         assert journal.ends() == ["canceled"]
 
-    def test_in_on_feedback(self, serve: Serve, name: str, node: Any) -> None:
+    def test_in_on_feedback(self, serve: Serve, name: str, node: Any, record: Record) -> None:
+        """The leaf's own on_feedback raises"""
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name, on_feedback=lambda feedback: 1 / 0)
         with (
@@ -301,8 +320,10 @@ class TestABehaviourThatRaises:
         ):
             runner.run(timeout=5.0)
         assert journal.ends() == ["canceled"]
+        record.outcome = NAMED_AND_CANCELED
 
-    def test_in_expect(self, serve: Serve, name: str, node: Any) -> None:
+    def test_in_expect(self, serve: Serve, name: str, node: Any, record: Record) -> None:
+        """The leaf's own `expect` raises on the result"""
         serve()
         leaf = MoveRobot("m", 0.1, action_name=name, expect=lambda result: 1 / 0)
         with (
@@ -311,30 +332,30 @@ class TestABehaviourThatRaises:
         ):
             runner.run(timeout=5.0)
         assert leaf.end is End.SUCCEEDED
+        record.outcome = f"{NAMED}; end SUCCEEDED"
 
 
-def test_a_pruned_subtree_lets_go_of_its_goal(serve: Serve, name: str, node: Any) -> None:
-    from rclpy.executors import SingleThreadedExecutor
-
+def test_a_pruned_subtree_lets_go_of_its_goal(
+    serve: Serve, name: str, node: Any, spin: Any, record: Record
+) -> None:
+    """prune_subtree() of a branch in mid-goal; a loop of the user's goes on"""
     journal = serve()
     leaf = MoveRobot("m", 5.0, action_name=name)
     branch = in_sequence(leaf, name="branch")
     tree = py_trees.trees.BehaviourTree(together(branch, Gate(), name="root"))
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
     tree.setup(node=node)
-    spin = lambda: (executor.spin_once(timeout_sec=0.005), tree.tick())  # noqa: E731
-    until(lambda: state(leaf) == "EXECUTING", meanwhile=spin)
+    spin_and_tick = lambda: (spin(), tree.tick())  # noqa: E731
+    until(lambda: state(leaf) == "EXECUTING", meanwhile=spin_and_tick)
+    pruned = time.monotonic()
     tree.prune_subtree(branch.id)
-    until(lambda: journal.ends() == ["canceled"], meanwhile=spin)
+    until(lambda: journal.ends() == ["canceled"], meanwhile=spin_and_tick)
+    record.took(time.monotonic() - pruned)
     tree.shutdown()
     leaf.shutdown()
-    executor.shutdown()
-    node.executor = None
 
 
 def test_a_tree_replaced_while_running_leaves_no_goal(serve: Serve, name: str, node: Any) -> None:
-    """The old tree is thrown away without a word; its runner was interrupted by shutdown."""
+    """shutdown() of a runner in mid-goal, without a word to its tree; another tree is run"""
     journal = serve()
     old, new = (MoveRobot(each, 0.5, action_name=name) for each in ("old", "new"))
     with TreeRunner(old, node=node) as runner:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import signal
 import textwrap
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -85,8 +86,9 @@ def test_rclpys_signal_handlers_are_in_force_again_after_a_run(
     body = LOOP_AFTER_A_RUN.replace("rclpy.init()", own) if own_handler else LOOP_AFTER_A_RUN
     process = program(body)
     process.line("executing", within=60.0)
-    process.send(number)
+    sent = process.send(number)
     process.wait()
+    record.took(time.monotonic() - sent)
     assert journal.ends() == ["succeeded", "canceled"], process
     record.outcome = "canceled, by the loop that rclpy's handler ended"
 
@@ -116,8 +118,9 @@ def test_a_node_of_its_own_in_the_users_context_ends_its_goals_before_a_signal_t
     journal = host.open(name)
     process = program(ON_THE_USERS_CONTEXT)
     process.line("executing", within=60.0)
-    process.send(number)
+    sent = process.send(number)
     process.wait()
+    record.took(time.monotonic() - sent)
     assert journal.ends() == ["canceled"], process
     record.outcome = "canceled, then the signal takes effect"
 
@@ -147,8 +150,9 @@ def test_a_signal_that_ends_a_process_ends_the_goals_of_all_its_runners(
     process = program(TWO_RUNNERS)
     for _ in journals:
         process.line("executing", within=60.0)
-    process.send(number)
+    sent = process.send(number)
     assert process.wait() == -number
+    record.took(time.monotonic() - sent)
     assert [journal.ends() for journal in journals] == [["canceled"]] * 2, process
     record.outcome = "both canceled, then the process ends by the signal"
 

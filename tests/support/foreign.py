@@ -1,7 +1,8 @@
 """Programs as a user writes them, with node, executor and loop: ``python -m … PROGRAM ACTION``.
 
 Each sends a long goal, says "executing" when it runs, and ends in its own way, good or bad. None
-of them is kinder to our leaf than py_trees' contract asks for.
+of them is kinder to our leaf than py_trees' contract asks for. What a program does, its docstring
+tells the report of the scenarios.
 """
 
 from __future__ import annotations
@@ -64,6 +65,7 @@ class User:
 
 
 def shut_down_and_destroy_on_the_next_line(user: User) -> None:
+    """shutdown() of the tree, destroy_node() and rclpy.shutdown(), line by line."""
     user.work()
     user.tree.shutdown()
     user.node.destroy_node()
@@ -72,6 +74,7 @@ def shut_down_and_destroy_on_the_next_line(user: User) -> None:
 
 
 def destroy_while_another_thread_spins(user: User) -> None:
+    """shutdown() of the tree and destroy_node(), while a MultiThreadedExecutor spins."""
     executor = MultiThreadedExecutor(3)
     executor.add_node(user.node)
     thread = threading.Thread(target=executor.spin)
@@ -105,14 +108,17 @@ def _shut_down_in_a_timer(user: User, executor: Any) -> None:
 
 
 def shut_down_in_a_timer(user: User) -> None:
+    """shutdown() of the tree and destroy_node() in a timer of a SingleThreadedExecutor."""
     _shut_down_in_a_timer(user, SingleThreadedExecutor())
 
 
 def shut_down_in_a_timer_of_a_multithreaded_executor(user: User) -> None:
+    """shutdown() of the tree and destroy_node() in a timer of a MultiThreadedExecutor."""
     _shut_down_in_a_timer(user, MultiThreadedExecutor(3))
 
 
 def tick_tock(user: User) -> None:
+    """tick_tock() of the tree until its interrupt(), while a thread spins; then shutdown()."""
     executor = SingleThreadedExecutor()
     executor.add_node(user.node)
     thread = threading.Thread(target=executor.spin, daemon=True)
@@ -132,7 +138,7 @@ def tick_tock(user: User) -> None:
 
 
 def tick_in_a_timer_until_done(user: User) -> None:
-    """The one that lets the goal succeed."""
+    """Ticks in a timer of a MultiThreadedExecutor; the one that lets the goal succeed."""
     user.leaf.goal = {"distance": 0.3}
     done = rclpy.task.Future()
 
@@ -154,7 +160,7 @@ def tick_in_a_timer_until_done(user: User) -> None:
 
 
 def shut_down_by_the_context(user: User) -> None:
-    """It calls back with its own lock held."""
+    """shutdown() of the tree by the context's on_shutdown(), which holds its own lock then."""
     user.node.context.on_shutdown(user.tree.shutdown)
     user.work()
     rclpy.shutdown()
@@ -163,22 +169,25 @@ def shut_down_by_the_context(user: User) -> None:
 
 
 def never_shut_down(user: User) -> None:
+    """destroy_node() and rclpy.shutdown(), but never shutdown() of the tree."""
     user.work()
     user.node.destroy_node()
     rclpy.shutdown()
 
 
 def just_end(user: User) -> None:
+    """The program ends in mid-goal; nothing is shut down or destroyed."""
     user.work()
 
 
 def just_end_soon(user: User) -> None:
-    """Whatever the server says."""
+    """The program ends in mid-goal, whatever the server says; it refuses to cancel."""
     user.leaf.timeouts = Timeouts(cancel=2.0, server=30.0, accept=30.0)
     user.work()
 
 
 def end_with_a_spinning_daemon_thread(user: User) -> None:
+    """The program ends in mid-goal beside a daemon thread in spin(), for which rclpy may abort."""
     executor = SingleThreadedExecutor()
     executor.add_node(user.node)
     threading.Thread(target=executor.spin, daemon=True).start()
@@ -188,11 +197,14 @@ def end_with_a_spinning_daemon_thread(user: User) -> None:
 
 
 def crash(user: User) -> None:
+    """An exception on the main thread in mid-goal."""
     user.work()
     raise RuntimeError("on purpose")
 
 
 def crash_in_a_timer(user: User) -> None:
+    """An exception in a timer, which ends rclpy.spin() in mid-goal."""
+
     def callback() -> None:
         user.tree.tick()
         if user.executing():
@@ -203,6 +215,8 @@ def crash_in_a_timer(user: User) -> None:
 
 
 def exit_in_a_timer(user: User) -> None:
+    """sys.exit(7) in a timer, which ends rclpy.spin() in mid-goal."""
+
     def callback() -> None:
         user.tree.tick()
         if user.executing():
@@ -213,15 +227,18 @@ def exit_in_a_timer(user: User) -> None:
 
 
 def loop_until_a_signal(user: User) -> None:
+    """A loop of spin_once() and tick(), in mid-goal."""
     user.work_for_ever()
 
 
 def spin_until_a_signal(user: User) -> None:
+    """Ticks in a timer, rclpy.spin(), in mid-goal."""
     user.node.create_timer(0.02, user.tick)
     rclpy.spin(user.node)
 
 
 def spin_until_a_signal_and_clean_up(user: User) -> None:
+    """The same, and shutdown(), destroy_node() and try_shutdown() after it."""
     user.node.create_timer(0.02, user.tick)
     try:
         rclpy.spin(user.node)
@@ -235,6 +252,7 @@ def spin_until_a_signal_and_clean_up(user: User) -> None:
 
 
 def tick_tock_until_a_signal(user: User) -> None:
+    """tick_tock() of the tree while rclpy.ok() and a thread spins, then shutdown()."""
     executor = SingleThreadedExecutor()
     executor.add_node(user.node)
     thread = threading.Thread(target=executor.spin, daemon=True)
@@ -271,19 +289,23 @@ def _started(action: str) -> TreeRunner:
 
 
 def crash_beside_a_runner(action: str) -> NoReturn:
+    """An exception on the main thread beside a TreeRunner that was started."""
     _started(action)
     raise RuntimeError("on purpose")
 
 
 def end_beside_a_runner(action: str) -> None:
+    """The main thread ends beside a TreeRunner that was started."""
     _started(action)
 
 
 def wait_for_a_runner(action: str) -> None:
+    """start() and wait() of a TreeRunner, in mid-goal."""
     _started(action).wait()
 
 
 def run_and_clean_up(action: str) -> None:
+    """run() of a TreeRunner in a with-block, in mid-goal."""
     leaf = MoveRobot("m", 60.0, action_name=action, timeout=PATIENT)
     with TreeRunner(leaf) as runner:
         runner.observe(

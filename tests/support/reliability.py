@@ -7,23 +7,27 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
+from bt_actions.attempts import AttemptRecord
 from bt_actions.simulation import journal
 from tests.support.processes import Journal
 
 HEAD = """\
 # Reliability: what was tried, and what became of the goals
 
-Written by `make chaos` from its last run; do not edit. Each row is one scenario with real
-processes, real signals and real network cuts. What a server did is read from its journal, a file it
-writes as each goal is received, accepted, canceled and finished: the client's own view is not
-believed. Times are rounded. All talk over UDP (on loopback, or on the link between two network
-namespaces) but the servers "with Fast DDS as it comes". How to get the short lease for servers of
-your own: [reliability-settings.md](reliability-settings.md).
+Written by `make chaos` from its last run; do not edit. Each row is one scenario on the real
+middleware. The processes, signals and network cuts that a row names are real; what only takes the
+place of something is named as that. What a server did is read from its journal, a file it writes as
+each goal is received, accepted, canceled and finished ("–": no server took part): the client's own
+view is not believed. It stands beside that as the outcome, with the end of a goal where that is
+another. The time is the one from what was done to the outcome, where it was measured, rounded. All
+talk over UDP (on loopback, or on the link between two network namespaces) but the servers "with
+Fast DDS as it comes". How to get the short lease for servers of your own:
+[reliability-settings.md](reliability-settings.md).
 """
 ON_A_BUSY_MACHINE = 3.0
 """Times longer than a scenario's limit is good enough where no report is written: `make test` runs
@@ -34,7 +38,7 @@ SHOWN = 4
 
 @dataclass
 class Record:
-    """One scenario, as it fills itself in; what it leaves out, its name and journals tell."""
+    """One scenario, as it fills itself in; what it leaves out, its journals and leaves tell."""
 
     family: str
     scenario: str
@@ -46,6 +50,8 @@ class Record:
     shows: str = ""
     verdict: str = "failed"
     journals: list[Journal] = field(default_factory=list)
+    visits: list[list[AttemptRecord]] = field(default_factory=list)
+    """The attempts of each visit to a leaf of the scenario's own process."""
 
     def took(self, seconds: float, limit: float | None = None) -> None:
         """Note the time to the outcome; with `limit`, fail the scenario when it took longer."""
@@ -54,8 +60,9 @@ class Record:
             allowed = limit * self.leniency
             assert seconds <= allowed, f"took {seconds:.2f} s, allowed are {allowed:g} s"
 
-    def read_journals(self) -> None:
-        """Say what the journals show, unless the scenario has said it."""
+    def read(self) -> None:
+        """Say what the journals show and how the visits ended, unless the scenario has said it."""
+        self.outcome = self.outcome or stood(self.visits)
         if not self.shows:
             told = [(each, summary([each])) for each in self.journals]
             many = len(told) > 1
@@ -74,6 +81,25 @@ class Record:
         outcome = self.outcome if self.verdict == "passed" else f"**{self.verdict}**"
         cells = [self.scenario, self.did or "–", self.shows or "–", outcome or "held", time]
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def stood(visits: Iterable[Sequence[AttemptRecord]]) -> str:
+    """Return in words how each visit to a leaf ended, alike ones as one."""
+    stories = Counter(", then ".join(_in_a_row(map(_stood, each))) for each in visits if each)
+    return "; ".join(_times(stories.items()))
+
+
+def _stood(attempt: AttemptRecord) -> str:
+    outcome, end = str(attempt.outcome), str(attempt.end)
+    return outcome if outcome == end else f"{outcome}, end {end}"
+
+
+def _in_a_row(texts: Iterable[str]) -> list[str]:
+    return _times((text, len(list(same))) for text, same in groupby(texts))
+
+
+def _times(counted: Iterable[tuple[str, int]]) -> list[str]:
+    return [f"{times} × {text}" if times > 1 else text for text, times in counted]
 
 
 def last_part(server: str) -> str:
@@ -104,9 +130,9 @@ def summary(journals: Iterable[Journal]) -> str:
         most = max(most, journal.max_live(entries, killed=each.killed))
     if not goals:
         return "no goal was received"
-    stories = [(text, len(list(same))) for text, same in groupby(map(_once, goals.values()))]
+    stories = _in_a_row(map(_once, goals.values()))
     if len(stories) <= SHOWN:
-        told = "; then ".join(f"{n} × {text}" if n > 1 else text for text, n in stories)
+        told = "; then ".join(stories)
     else:
         told = f"{len(goals)} goals: " + ", ".join(f"{n} {end}" for end, n in ends.items())
     live = ""
@@ -118,6 +144,16 @@ def summary(journals: Iterable[Journal]) -> str:
 def _once(events: list[str]) -> str:
     """Name each event once, in the order of its first time."""
     return ", ".join(dict.fromkeys(events))
+
+
+def family(docstring: str | None) -> str:
+    """Return what the scenarios of a module have in common, as its docstring begins."""
+    return (docstring or "").strip().splitlines()[0].partition(".")[0]
+
+
+def first_paragraph(docstring: str | None) -> str:
+    """Return the first paragraph on one line, without a full stop at its end."""
+    return " ".join((docstring or "").split("\n\n")[0].split()).rstrip(".")
 
 
 def sentence(name: str) -> str:
@@ -139,10 +175,20 @@ def write(path: Path, records: Iterable[Record]) -> None:
     skipped = sum(record.verdict.startswith("skipped") for record in ran)
     lines = [HEAD, f"{count} scenarios: {good} held, {count - good - skipped} did not"]
     lines[-1] += f", {skipped} were skipped.\n" if skipped else ".\n"
-    for family, rows in families.items():
-        lines += [f"## {family}\n"]
+    for title, rows in families.items():
+        lines += [f"## {title}\n"]
         lines += ["| scenario | what was done | the journal shows | outcome | time to outcome |"]
         lines += ["|---|---|---|---|---|"]
         lines += [record.row for record in rows]
         lines += [""]
     path.write_text("\n".join(lines), encoding="utf-8")
+
+
+def names(report: str) -> list[tuple[str, str]]:
+    """Return the family and the scenario of each row of a report."""
+    tables = [section.partition("\n") for section in report.split("\n## ")[1:]]
+    return [
+        (title, row.replace("\\|", "|"))
+        for title, _, table in tables
+        for row in re.findall(r"^\| (.*?) \| ", table, re.MULTILINE)[1:]
+    ]
