@@ -354,6 +354,36 @@ def test_a_pruned_subtree_lets_go_of_its_goal(
     leaf.shutdown()
 
 
+@pytest.mark.parametrize("loop", ["our runner", "a foreign loop"])
+def test_a_leaf_that_is_replaced_makes_way_for_the_new_one(
+    serve: Serve, name: str, node: Any, loop: str, request: pytest.FixtureRequest
+) -> None:
+    """replace_subtree() in mid-goal, by a leaf for the same server, which takes 0.5 s to cancel"""
+    journal = serve("1:delay_cancel=0.5")
+    old, new = (MoveRobot(each, 0.5, action_name=name) for each in ("old", "new"))
+    tree = py_trees.trees.BehaviourTree(in_sequence(old))
+    new.setup(node=node)
+
+    def replace(tree: py_trees.trees.BehaviourTree) -> None:
+        if old.parent is not None and state(old) == "EXECUTING":
+            tree.replace_subtree(old.id, new)
+
+    tree.add_post_tick_handler(replace)
+    if loop == "our runner":
+        with TreeRunner(tree, node=node) as runner:
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+            assert runner.unaccounted == []
+    else:
+        spin = request.getfixturevalue("spin")
+        tree.setup(node=node)
+        until(lambda: new.outcome is not None, meanwhile=lambda: (spin(), tree.tick()))
+        tree.shutdown()
+    assert journal.ends() == ["canceled", "succeeded"]
+    assert journal.max_live == 1
+    assert (old.outcome, old.end) == (Outcome.CANCELED, End.CANCELED)
+    assert (new.outcome, new.end) == (Outcome.SUCCEEDED, End.SUCCEEDED)
+
+
 def test_a_tree_replaced_while_running_leaves_no_goal(serve: Serve, name: str, node: Any) -> None:
     """shutdown() of a runner in mid-goal, without a word to its tree; another tree is run"""
     journal = serve()
