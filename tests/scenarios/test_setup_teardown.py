@@ -19,6 +19,9 @@ MEMORY = 0.05
 ONE_ARENA = {"MALLOC_ARENA_MAX": "1"}
 """glibc gives threads that get in each other's way an arena each, which grows at first. Growth with
 one is a third (12 runs); 4 and 8 MB in 20 cycles were seen with more, where 200 added less."""
+ALL_WARNINGS = {"PYTHONWARNINGS": "default,ignore::DeprecationWarning:lark.utils"}
+"""Python hides most, such as the ResourceWarning of what was not closed. lark, which rclpy imports,
+imports what is deprecated."""
 AT_RANDOM = 2
 """Cycles, those that added most, that are not counted: a second participant, say, where its server
 did not answer for two seconds."""
@@ -33,14 +36,17 @@ def test_cycles_in_one_process_leave_nothing(
     """Create, run, shut down, so many times in one process; "user": in a user's own context"""
     began = time.monotonic()
     program = launch(
-        how, str(cycles), program=("-m", "tests.support.cycles"), environment=ONE_ARENA
+        how,
+        str(cycles),
+        program=("-m", "tests.support.cycles"),
+        environment=ONE_ARENA | ALL_WARNINGS,
     )
     assert program.wait(patience(cycles) + 10.0) == 0, str(program)  # in full: where it hangs
     told = json.loads(program.lines[-1])
     warm, after = told["warm"], told["after"]
     assert program.errors == [], "no warning"
     assert program.lines[:-1] == []
-    assert after["threads"] == warm["threads"]
+    assert after["threads"] <= warm["threads"]
     assert after["files"] <= warm["files"]
     grown = sum(sorted(told["grown"])[:-AT_RANDOM])
     assert grown < MEMORY * cycles, f"{grown:.2f} MB: {told['grown']}"
