@@ -250,6 +250,27 @@ def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
     assert "  CANCELED, end UNKNOWN  " in run.out.getvalue()
 
 
+def test_a_second_signal_after_the_end_of_all_goals_leaves_none_unknown(story: Story) -> None:
+    """It is left while node and context are still being closed."""
+    run, closed = Run(FakeRunner(waits=True)), threading.Event()
+    run.runner.before = executing(run, story)
+
+    def takes_long_to_close() -> Iterator[Event]:
+        yield from canceled(run, story)
+        while not run.runner.released.wait(SAME_WISH / 2):
+            os.kill(os.getpid(), signal.SIGINT)
+        closed.set()
+
+    run.runner.after = takes_long_to_close()
+    with Signals():  # so that a signal after the end does not hit the test
+        with killed_when(run.runner.playing, signal.SIGINT):
+            ended = run.go()
+        run.runner.released.set()
+        closed.wait()
+    assert (ended.code, ended.abandoned) == (Exit.SIGINT, True)
+    assert "not accounted for" not in run.out.getvalue()
+
+
 def test_one_wish_that_arrives_twice_is_one_wish(story: Story) -> None:
     run = Run(FakeRunner(waits=True))
     run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
