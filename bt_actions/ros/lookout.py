@@ -16,7 +16,6 @@ from __future__ import annotations
 import atexit
 import itertools
 import os
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -49,7 +48,7 @@ AHEAD = 0.7
 _number = itertools.count(1)
 _sights: set[Sight] = set()
 _threads: set[threading.Thread] = set()
-_lookouts: dict[int, Lookout] = {}
+_lookouts: dict[tuple[int, str], Lookout] = {}
 _closing = False  # the process ends
 
 
@@ -78,10 +77,10 @@ class Seeker(Protocol):
 class Sight:
     """A participant of our own, and who uses it."""
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, enclave: str) -> None:
         """Raises what rclpy raises where it cannot be made."""
         context = Context()
-        context.init(args=_enclave(), domain_id=domain)
+        context.init(args=["--ros-args", "--enclave", enclave], domain_id=domain)
         name = f"bt_actions_lookout_{os.getpid()}_{next(_number)}"
         try:
             self.node = Node(
@@ -124,27 +123,29 @@ class Sight:
         self._context.try_shutdown()
 
 
-def look_for(line: Seeker, domain: int, *, at_once: bool = False) -> None:
+def look_for(line: Seeker, domain: int, enclave: str, *, at_once: bool = False) -> None:
     """Look for what this line misses, until it misses nothing; the caller holds the lock.
 
+    In the enclave of its node, which may be allowed to look where others are not.
     With `at_once`, whatever pause between two looks for others has been reached begins anew.
     """
-    lookout = _lookouts.get(domain)
+    lookout = _lookouts.get((domain, enclave))
     if lookout is None:
-        lookout = _lookouts[domain] = Lookout(domain)
+        lookout = _lookouts[domain, enclave] = Lookout(domain, enclave)
     lookout.add(line, at_once=at_once)
 
 
 class Lookout:
-    """Looks for the servers that lines of one ROS domain miss.
+    """Looks for the servers that lines of one ROS domain, and one enclave, miss.
 
     On one thread, which waits from then on for the next to be missed: looks on threads of their own
     would each leave another megabyte behind, because glibc keeps what a thread took for the threads
     that come later.
     """
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, enclave: str) -> None:
         self._domain = domain
+        self._enclave = enclave
         self._missing: set[Seeker] = set()
         self._bell = threading.Condition(lock)
         self._thread: threading.Thread | None = None
@@ -218,7 +219,7 @@ class Lookout:
 
     def _look(self) -> bool:
         """Make a participant, and wait until clients in it are ready that ours are missing."""
-        sight = Sight(self._domain)
+        sight = Sight(self._domain, self._enclave)
         look = _Look(sight)
         try:
             until = time.monotonic() + LASTS
@@ -271,14 +272,6 @@ class _Look:
         for client in self._clients.values():
             client.destroy()
         self._clients.clear()
-
-
-def _enclave() -> list[str]:
-    """What must be the same in every context of a process; all else is about other nodes."""
-    words = sys.argv
-    if "--enclave" not in words[:-1]:
-        return []
-    return ["--ros-args", "--enclave", words[words.index("--enclave") + 1]]
 
 
 def _start(what: Callable[[], None]) -> threading.Thread | None:

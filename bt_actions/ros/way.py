@@ -9,6 +9,7 @@ are told that their server is to be asked anew, and given time for that. All und
 from __future__ import annotations
 
 import contextlib
+import functools
 import time
 import uuid
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from bt_actions.hearing import NEVER, TWICE, Hearing
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
-from bt_actions.ros.graph import servers
+from bt_actions.ros.graph import enclave, servers
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for
 from bt_actions.server import LEASE, Server
@@ -100,7 +101,11 @@ class Way:
         """Have another way looked for, where this one fails."""
         if self.misses():
             domain = self._line.traffic.domain
-            look_for(self, domain.number, at_once=self.in_doubt(now) > 0.0)
+            look_for(self, domain.number, self._enclave, at_once=self.in_doubt(now) > 0.0)
+
+    @functools.cached_property
+    def _enclave(self) -> str:
+        return enclave(self._line.traffic.node)
 
     # What the lookout asks, and does
 

@@ -188,6 +188,23 @@ class TestExitCode1:
 
 
 class TestExitCode2:
+    @pytest.mark.parametrize(
+        "words",
+        ["run pick_and_place", "run pick_and_place --ros-args -p pick_at:=1", "sim", "cleanup"],
+    )
+    def test_without_what_ros_needs_to_be_secure_nothing_starts_and_one_line_says_why(
+        self, words: str, start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+        monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
+        monkeypatch.setenv("ROS_SECURITY_KEYSTORE", str(tmp_path))
+        program = start(*words.split())
+        assert program.wait() == 2, program
+        assert program.lines == []
+        [line] = program.errors
+        assert line.startswith("bt-actions: ")
+        assert f"SECURITY ERROR: directory '{tmp_path}/enclaves' does not exist" in line
+
     def refused(self, capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         assert main(["run", *arguments]) == 2
         said = capsys.readouterr()

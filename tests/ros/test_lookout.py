@@ -17,6 +17,7 @@ import pytest
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros import alarm, lookout, way
 from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.graph import enclave
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight
 from bt_actions.ros.shared import lock
@@ -140,7 +141,7 @@ def test_nobody_looks_where_nothing_was_ever_lost(
 def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
     name: str, node: Any, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    def refused(_domain: int) -> Sight:
+    def refused(_domain: int, _enclave: str) -> Sight:
         raise OSError("no space left")
 
     monkeypatch.setattr(_domain(node), "lost_sight", True)
@@ -173,7 +174,7 @@ class TestMoves:
         serve()
         leaf = MoveRobot("keeps the line", 0.1, action_name=name)
         leaf.setup(node=node)
-        sight = Sight(_domain(node).number)
+        sight = Sight(_domain(node).number, "/")
         sight.looking = False
         with lock:
             leaf._line.way.move_to(sight, leaf._line.way.client_in(sight))
@@ -267,7 +268,7 @@ def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
     service = node.create_service(Trigger, f"{name}/_action/send_goal", print)
     seeker = Seeker()
     seeker.name = name
-    looks = lookout.Lookout(_domain(node).number)
+    looks = lookout.Lookout(_domain(node).number, "/")
     looks._missing = {seeker}
     assert looks._look() is False
     assert seeker.tried > 1
@@ -327,6 +328,33 @@ def test_whoever_else_reads_goal_requests_moves_nobody(
     context.shutdown()
 
 
+@pytest.mark.parametrize("flag", ["--enclave", "-e"])
+def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
+    name: str, domain: int, monkeypatch: pytest.MonkeyPatch, flag: str
+) -> None:
+    """Here, that of arguments which are not the program's."""
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+    enclaves = list[str]()
+    monkeypatch.setattr(way.Way, "misses", lambda self: self.name == name)
+    monkeypatch.setattr(way, "look_for", lambda *to, at_once: enclaves.append(to[2]))
+    context = Context()
+    context.init(args=["--ros-args", flag, "/kitchen/robot"], domain_id=domain)
+    leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
+    leaf.setup(node=secure)
+    with lock:
+        leaf._line.way.seek(now())
+    sight = Sight(domain, enclaves[0])
+    sight.looking = False
+    assert {enclave(secure), enclave(sight.node)} == {"/kitchen/robot"}
+    sight.close()
+    leaf.shutdown()
+    secure.destroy_node()
+    assert enclave(secure) == "/", "it is gone"
+    context.shutdown()
+
+
 def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
     """A participant without the rules would find another robot."""
     from rclpy.context import Context
@@ -361,7 +389,7 @@ def test_without_a_pause_to_break_off_a_look_begins_as_soon_as_ever() -> None:
         def _still_missing(self) -> bool:
             raise StopIteration
 
-    pauses, looks = list[float](), Looks(0)
+    pauses, looks = list[float](), Looks(0, "/")
     looks._thread = threading.current_thread()
     with lock:
         looks.add(Missing(), at_once=True)  # type: ignore[arg-type]
@@ -381,7 +409,7 @@ class Missing:
 
 
 def test_who_is_in_doubt_waits_for_no_pause_that_others_have_reached() -> None:
-    looks = lookout.Lookout(0)
+    looks = lookout.Lookout(0, "/")
     first, second = Missing(), Missing()
     looks._missing = {first}  # type: ignore[arg-type]
     looks._thread = threading.current_thread()
