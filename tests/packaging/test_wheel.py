@@ -10,6 +10,8 @@ from zipfile import ZipFile
 
 import pytest
 
+from bt_actions.ros.environment import SHORT_LEASE
+
 ROOT = Path(__file__).resolve().parents[2]
 DATA = "bt_actions-0.1.0.data/data"
 
@@ -48,7 +50,7 @@ def test_the_command_is_installed(wheel: ZipFile) -> None:
     assert "bt-actions = bt_actions.cli:main" in entry_points
 
 
-def test_modules_the_page_and_the_mark_of_a_typed_package_are_in_the_wheel(
+def test_modules_the_page_the_lease_and_the_mark_of_a_typed_package_are_in_the_wheel(
     wheel: ZipFile,
 ) -> None:
     if "editable" in str(wheel.filename):
@@ -57,7 +59,8 @@ def test_modules_the_page_and_the_mark_of_a_typed_package_are_in_the_wheel(
     sources = {str(path.relative_to(ROOT)) for path in package.rglob("*.py")}
     page = {str(path.relative_to(ROOT)) for path in package.glob("render/page*.*")}
     assert {Path(path).suffix for path in page} == {".py", ".html", ".css", ".js"}
-    assert sources | page | {"bt_actions/py.typed"} <= set(wheel.namelist())
+    others = {"bt_actions/py.typed", str(SHORT_LEASE.relative_to(ROOT))}
+    assert sources | page | others <= set(wheel.namelist())
 
 
 def test_it_refuses_a_python_that_ros_2_jazzy_has_no_wheels_for(wheel: ZipFile) -> None:

@@ -5,9 +5,11 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from bt_actions import cli
 from bt_actions.ros.environment import SHORT_LEASE, Reach, prepare
 from tests.support.middleware import on_loopback
 
@@ -36,6 +38,24 @@ def test_the_short_lease_is_given_where_the_user_has_no_profile() -> None:
     assert _get("FASTRTPS_DEFAULT_PROFILES_FILE") == str(SHORT_LEASE)
     assert SHORT_LEASE.exists()
     assert _get("FASTDDS_BUILTIN_TRANSPORTS") == "UDPv4"
+
+
+@pytest.mark.parametrize("profile", ["", "/theirs.xml"])
+@pytest.mark.parametrize("words", ["run t", "run t --sim", "send s T", "sim", "cleanup"])
+def test_each_of_our_programs_has_the_short_lease_before_it_does_anything(
+    words: str, profile: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unless the user has given it another."""
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", profile)
+    given = list[str]()
+    command = words.split()[0]
+    does = SimpleNamespace(
+        add_parser=cli.COMMANDS[command].add_parser,
+        run=lambda _: given.append(_get("FASTRTPS_DEFAULT_PROFILES_FILE")) or 0,
+    )
+    monkeypatch.setitem(cli.COMMANDS, command, does)
+    assert cli.main(words.split()) == 0
+    assert given == [profile or str(SHORT_LEASE)]
 
 
 def test_transports_that_the_user_chose_stand(monkeypatch: pytest.MonkeyPatch) -> None:

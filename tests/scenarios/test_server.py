@@ -9,6 +9,8 @@ from __future__ import annotations
 import gc
 import signal
 import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import py_trees
@@ -24,8 +26,8 @@ from bt_actions.ros.shared import Change, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.ros.way import Way
 from bt_actions.server import NOT_READY_FOR, PROBE_EVERY, SLOWEST_START, Server, ServerWatch
-from tests.support.middleware import AS_IT_COMES
-from tests.support.processes import Host, HostFactory, Journal
+from tests.support.middleware import AS_IT_COMES, NOTHING_SET
+from tests.support.processes import Host, HostFactory, Journal, Process
 from tests.support.reliability import Record
 from tests.support.trees import Gate, in_sequence, in_turn, state
 from tests.support.waiting import holds_for, until
@@ -134,6 +136,35 @@ class TestKilled:
             assert runner.unaccounted == []
         wanted = Outcome.RESULT_TIMEOUT if phase == "CANCELING" else Outcome.SERVER_LOST
         assert stood(leaf) == (wanted, End.SERVER_GONE)
+        record.outcome = f"{leaf.outcome}, end {leaf.end}"
+
+    @pytest.mark.chaos
+    def test_killed_with_the_lease_that_our_programs_give_themselves(
+        self,
+        start_program: Callable[..., Process],
+        tmp_path: Path,
+        name: str,
+        node: Any,
+        record: Record,
+    ) -> None:
+        """SIGKILL to `bt-actions sim`, for which nobody has set a profile"""
+        robot, path = name.rpartition("/")[0], tmp_path / "journal"
+        arguments = ("sim", "--namespace", robot, "--journal", str(path))
+        victim = start_program("-m", "bt_actions.cli", *arguments, environment=NOTHING_SET)
+        victim.line("ready: ")
+        journal = Journal(path, f"{robot}/move_robot")
+        record.journals.append(journal)
+        leaf = MoveRobot("m", 9.0, action_name=journal.server)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: state(leaf) == "EXECUTING")
+            journal.wait_for("accepted")
+            killed = victim.send(signal.SIGKILL)
+            until(lambda: leaf.outcome is not None, STOCK)
+            record.took(time.monotonic() - killed, SHORT)
+            assert runner.wait(9.0) is Status.FAILURE
+        assert stood(leaf) == (Outcome.SERVER_LOST, End.SERVER_GONE)
+        assert journal.ends() == [None]
         record.outcome = f"{leaf.outcome}, end {leaf.end}"
 
     @pytest.mark.chaos

@@ -13,12 +13,14 @@ import tempfile
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from bt_actions.ros.environment import PROFILE, SHORT_LEASE
+from bt_actions.ros.environment import _PROFILES, _RANGES, PROFILE, SHORT_LEASE
 
 LEFT_TO_THE_PROFILE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}
 """With LOCALHOST, rmw_fastrtps adds shared memory whatever the profile says."""
 AS_IT_COMES = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", PROFILE: ""}
 """For the scenarios that are about Fast DDS without any settings: shared memory and all."""
+NOTHING_SET = dict.fromkeys((*_RANGES, *_PROFILES), "")
+"""For those that are about what our programs set for themselves where the user has set nothing."""
 _NAMESPACE = "http://www.eprosima.com"
 _TRANSPORT = """\
 <transport_descriptors xmlns="http://www.eprosima.com">
