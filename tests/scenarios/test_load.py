@@ -13,27 +13,15 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions import End, Gripper, MoveRobot, Retry, Timeouts, TreeRunner
-from bt_actions.events import Event, GoalChanged
-from bt_actions.simulation.journal import Entry, executions, live_intervals, max_live, read
-from bt_actions.simulation.journal import ends as ends_of
+from bt_actions import Gripper, MoveRobot, Retry, Timeouts, TreeRunner
+from bt_actions.simulation.journal import live_intervals, max_live, read
 from tests.scenarios.conftest import Launch
+from tests.support.accounts import Report, compare
 from tests.support.reliability import Record
 from tests.support.trees import together
 
 PATIENT = Timeouts(queue=60.0, server=60.0, accept=30.0, result=120.0, cancel=30.0)
 """Fifty robots on two slow cores are not quick; nothing here may fail for that."""
-
-
-class Report:
-    """The last that the orchestrator said of each goal."""
-
-    def __init__(self) -> None:
-        self.goals: dict[str, GoalChanged] = {}
-
-    def observe(self, event: Event) -> None:
-        if isinstance(event, GoalChanged):
-            self.goals[event.goal_id] = event
 
 
 def cycles_of(namespace: str, cycles: int, retry: Retry) -> Behaviour:
@@ -51,22 +39,6 @@ def cycles_of(namespace: str, cycles: int, retry: Retry) -> Behaviour:
         ],
     )
     return py_trees.decorators.Repeat(f"robot {namespace}", child=once, num_success=cycles)
-
-
-def compare(report: Report, entries: list[Entry]) -> dict[str, str]:
-    """Fail unless report and journal agree on every goal; return the ends by goal."""
-    journal = {goal: str(end) for goal, end in ends_of(entries).items()}
-    unknown = {goal for goal, event in report.goals.items() if event.end is End.UNKNOWN}
-    assert unknown == set()
-    never = {g for g, event in report.goals.items() if event.end is End.NEVER_STARTED}
-    said = {"rejected": End.NEVER_STARTED, "succeeded": End.SUCCEEDED}
-    said |= {"aborted": End.ABORTED, "canceled": End.CANCELED}
-    assert journal.keys() <= report.goals.keys(), "a goal that the report does not know"
-    assert report.goals.keys() - never <= journal.keys(), "a goal that no server has seen"
-    wrong = [goal for goal, end in journal.items() if report.goals[goal].end is not said[end]]
-    assert wrong == []
-    assert [goal for goal, times in executions(entries).items() if times > 1] == []
-    return journal
 
 
 @pytest.mark.parametrize(
