@@ -34,6 +34,25 @@ def _nothing() -> None:
     pass
 
 
+class TellsLate(ScriptedServer):
+    """Executes what it accepts, and says so many seconds later that it has accepted it.
+
+    For goals that are struck by ``drop_accept``, which loses the answer otherwise.
+    """
+
+    tells_after: float | None = None
+
+    def on_request(self, kind: str, taken: Any) -> bool:
+        is_answered = super().on_request(kind, taken)
+        if kind == "goal" and not is_answered and self.tells_after is not None:
+            self.stepper.call_at(self.stepper.now() + self.tells_after, lambda _: self._tell(taken))
+        return is_answered
+
+    def _tell(self, taken: Any) -> None:
+        answer = self.action_type.Impl.SendGoalService.Response(accepted=True)
+        self._wire._handle.send_goal_response(taken[0], answer)
+
+
 class Serving:
     """The servers of this process, by the name that they were opened with."""
 
@@ -49,11 +68,13 @@ class Serving:
         step_period: float = 0.05,
         thinks: float = 0.0,
         busy: float = 0.0,
+        tells_after: float | None = None,
         **script: Any,
     ) -> None:
         """Serve MoveRobot under `name`: a goal takes as many seconds as its distance says.
 
-        It answers nobody for `thinks` seconds before it accepts one, and for `busy` s after that.
+        It answers nobody for `thinks` seconds before it accepts one, and for `busy` s after that;
+        for `tells_after`, see TellsLate.
         """
 
         def refusal(goal: MoveRobot.Goal) -> str | None:
@@ -64,7 +85,7 @@ class Serving:
             time.sleep(busy)
             return abs(float(goal.distance))
 
-        self.servers[name] = ScriptedServer(
+        self.servers[name] = server = TellsLate(
             self.node,
             MoveRobot,
             name,
@@ -81,6 +102,7 @@ class Serving:
             on_death=lambda: os.kill(os.getpid(), signal.SIGKILL),
             result_timeout=20.0,
         )
+        server.tells_after = tells_after
 
     def robot(
         self, name: str, journal: str, faults: list[str], speed: float, battery: bool = True
