@@ -30,6 +30,7 @@ from bt_actions.goal_ids import Author, author_of
 from bt_actions.goal_terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
 from bt_actions.policy import End
 from bt_actions.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
+from bt_actions.ros import participant
 from bt_actions.ros.sight import STATUS, Sight
 from bt_actions.ros.unanswered import Unanswered
 from bt_actions.standstill import AT_MOST, STOOD_STILL, Standstill
@@ -185,9 +186,10 @@ def _participant(context: Context | None, namespace: str) -> Iterator[Node]:
     try:
         yield node
     finally:
-        node.destroy_node()
         if context is None:
-            own.try_shutdown()
+            participant.close(node, own)
+        else:
+            node.destroy_node()
 
 
 def _full_name(name: str, node: Node) -> str:

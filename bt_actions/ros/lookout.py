@@ -24,6 +24,7 @@ from typing import Protocol
 from rclpy.context import Context
 from rclpy.node import Node
 
+from bt_actions.ros import participant
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.graph import servers
 from bt_actions.ros.log import log
@@ -119,8 +120,7 @@ class Sight:
                 return
             self.closed = True
             _sights.discard(self)
-        self.node.destroy_node()
-        self._context.try_shutdown()
+        participant.close(self.node, self._context)
 
 
 def look_for(line: Seeker, domain: int, enclave: str, *, at_once: bool = False) -> None:

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from rclpy.context import Context
 from rclpy.node import Node
 
+from bt_actions.ros import participant
+
 __all__ = ["parameters_in"]
 
 _OF_EVERY_NODE = frozenset({"use_sim_time", "start_type_description_service"})
@@ -35,7 +37,7 @@ def parameters_in(words: Sequence[str], namespace: str = "") -> dict[str, object
             automatically_declare_parameters_from_overrides=True,
         )
         found = node.get_parameters_by_prefix("")
-        node.destroy_node()
+        participant.close(node, context)
     except RuntimeError as error:  # rclpy's RCLError
         if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
             unknown = shlex.join(ast.literal_eval(str(error)))

@@ -24,6 +24,7 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 
+from bt_actions.ros import participant
 from bt_actions.ros.executor import OnceExecutor
 from bt_actions.ros.log import log
 from bt_actions.ros.traffic import Traffic
@@ -211,10 +212,10 @@ class Spinner:
         before_nodes()
         if self._own_node:
             self._traffic.destroy()
-            self.node.destroy_node()
-        if self._context is not None:
-            with contextlib.suppress(RuntimeError):
-                self._context.shutdown()
+            if self._context is not None:
+                participant.close(self.node, self._context)
+            else:
+                self.node.destroy_node()
 
 
 def _nothing() -> None:

@@ -32,6 +32,7 @@ from bt_actions.ros import alarm, shared, traffic
 from bt_actions.ros import line as module
 from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.line import BESIDE, LEASE, LOOK_WHILE_RUNNING, SILENT_FOR, Line
+from bt_actions.ros.predecessors import Predecessors
 from bt_actions.ros.shared import FEEDBACK_KEPT, LOST_KEPT, Ticket, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.server import PROBES_KEPT, Server, ServerWatch
@@ -537,6 +538,7 @@ class Orphan(Line):
         self.watch = watch(OURS, *shown)
         self.cancels, self._generation = Cancels(), shared.generation
         self.orphaned, self.put = True, False
+        self.predecessors = Predecessors("m")
         self._heard_at = time.monotonic() - silent
 
     def put_away(self, *, all_of_them: bool = False) -> None:

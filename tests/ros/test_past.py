@@ -23,6 +23,7 @@ from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.line import Line
 from bt_actions.ros.past import QUESTIONS, STALE, Ended, Past
+from bt_actions.ros.predecessors import Predecessors
 from bt_actions.ros.shared import Ticket
 from bt_actions.server import ServerWatch
 
@@ -41,6 +42,7 @@ class OfPast(Line):
         twin: Any = SimpleNamespace(goal=SimpleNamespace(id=GOAL), testimony=shown)
         self.goals = {}
         self.past = Past(self)
+        self.predecessors = Predecessors("m")
         self.past._ended[GOAL] = Ended(lambda: None, True, 10.0, twin, said)
         self.watch: Any = SimpleNamespace(gids=frozenset({ONE}), two_answered=lambda: None)
         self.watch.heard = lambda _: None

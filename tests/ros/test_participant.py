@@ -1,0 +1,84 @@
+"""How a participant of our own is taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.utilities import get_rmw_implementation_identifier
+from std_msgs.msg import String
+
+from bt_actions import TreeRunner
+from bt_actions.ros import participant
+from bt_actions.ros.lookout import Sight
+from tests.support.trees import Gate
+from tests.support.waiting import holds_for, until
+
+
+@pytest.fixture
+def ours(domain: int) -> Iterator[Node]:
+    context = Context()
+    context.init(domain_id=domain)
+    node = Node("ours", context=context)
+    yield node
+    participant.close(node, context)
+
+
+@pytest.mark.skipif(
+    get_rmw_implementation_identifier() != "rmw_fastrtps_cpp", reason="it is about Fast DDS"
+)
+def test_who_falls_silent_discovers_nobody_any_more(ours: Node, node: Any, name: str) -> None:
+    before = node.create_publisher(String, f"{name}/before", 1)
+    until(lambda: ours.count_publishers(f"{name}/before"))
+    assert participant.fall_silent(ours)
+    assert participant.fall_silent(ours), "again does no harm"
+    after = node.create_publisher(String, f"{name}/after", 1)
+    until(lambda: node.count_publishers(f"{name}/after"))
+    assert holds_for(lambda: not ours.count_publishers(f"{name}/after"), 0.3)
+    for each in (before, after):
+        node.destroy_publisher(each)
+
+
+def test_a_node_that_is_gone_need_not_fall_silent(domain: int) -> None:
+    context = Context()
+    context.init(domain_id=domain)
+    node = Node("ours", context=context)
+    participant.close(node, context)
+    assert not context.ok()
+    assert not participant.fall_silent(node)
+
+
+def test_another_rmw_is_left_alone(monkeypatch: pytest.MonkeyPatch, ours: Node) -> None:
+    monkeypatch.setattr(participant, "get_rmw_implementation_identifier", lambda: "rmw_other")
+    monkeypatch.setattr(participant, "_call", participant._call.__wrapped__)
+    assert not participant.fall_silent(ours)
+
+
+@pytest.mark.parametrize("missing", ["_PARTICIPANT_OF", "_SET_LISTENER"])
+def test_so_is_one_of_another_release(
+    monkeypatch: pytest.MonkeyPatch, ours: Node, missing: str
+) -> None:
+    monkeypatch.setattr(participant, missing, "not_there")
+    monkeypatch.setattr(participant, "_call", participant._call.__wrapped__)
+    assert not participant.fall_silent(ours)
+
+
+def test_the_participants_of_runners_and_lookouts_fall_silent_before_they_go(
+    monkeypatch: pytest.MonkeyPatch, domain: int
+) -> None:
+    seen = list[str]()
+
+    def fall_silent(node: Node) -> bool:
+        seen.append(node.get_name())  # it is there
+        return True
+
+    monkeypatch.setattr(participant, "fall_silent", fall_silent)
+    with TreeRunner(Gate()) as runner:
+        ours = runner.node.get_name()
+    sight = Sight(domain, "/")
+    sight.looking = False
+    sight.close()
+    assert seen == [ours, sight.node.get_name()]
