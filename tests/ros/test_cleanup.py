@@ -13,12 +13,13 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from rclpy.context import Context
 from unique_identifier_msgs.msg import UUID
 
+from bt_actions import MoveRobot
 from bt_actions.policy import End
 from bt_actions.roll_call import RollCall
 from bt_actions.ros import cleanup as module
 from bt_actions.ros import sight
 from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
-from bt_actions.standstill import Standstill
+from bt_actions.standstill import OUT_OF_SIGHT, Standstill
 from tests.support.processes import HostFactory, Journal, Process
 
 SEND = (
@@ -253,3 +254,109 @@ def test_a_goal_that_has_ended_at_one_server_of_two_is_kept_in_mind(
         told._read("/move", message)
     told._find()
     assert [(goal.servers, goal.end) for goal in found] == [(2, End.UNKNOWN)]
+
+
+def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
+    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `ros2 launch` gives a node as its namespace is in force for relative names, too."""
+    monkeypatch.setattr(module, "LOOK_LONGEST", 0.2)
+    context, told = Context(), list[tuple[list[str], bool]]()
+    context.init(args=["--ros-args", "-r", "__ns:=/r1"], domain_id=domain)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "999")
+    swept = cleanup(
+        look=0.1,
+        patience=0.1,
+        wanted={"move", "/r2/move"},
+        missing=lambda actions, in_vain: told.append((actions, in_vain)),
+        context=context,
+    )
+    context.shutdown()
+    assert told == [(["/r1/move", "/r2/move"], False), (["/r1/move", "/r2/move"], True)]
+    assert swept.domain == domain, "the one in force"
+
+
+def test_cleanup_does_not_take_silence_for_nothing(
+    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LOOK_LONGEST", 6.0)
+    host = new_host(short_lease=False)
+    host.open(name)
+    told = list[tuple[list[str], bool]]()
+
+    def look(wanted: list[str] | None) -> None:
+        cleanup(
+            look=1.0,
+            sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
+            missing=lambda actions, in_vain: told.append((actions, in_vain)),
+            wanted=wanted,
+        )
+        host.send(signal.SIGCONT)
+
+    look(wanted=[])
+    assert told == [], "who wants no action is in no server's way"
+    look(wanted=None)
+    assert [(name in actions, in_vain) for actions, in_vain in told] == [
+        (True, False),
+        (True, True),
+    ]
+
+
+def test_cleanup_sees_no_server_where_there_is_a_client_only(
+    name: str, node: Any, domain: int
+) -> None:
+    sighted: list[str] = []
+    leaf = MoveRobot("client", 1.0, action_name=name)
+    leaf.setup(node=node)
+    assert cleanup(look=1.0, sighted=sighted.append).left == []
+    assert name not in sighted
+    leaf.shutdown()
+
+
+def test_cleanup_that_cannot_look_again_says_who_has_not_answered(
+    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it has found by then is told."""
+
+    class Once(module.Node):  # type: ignore[misc]  # rclpy is not typed
+        def __init__(self, name: str, **how: Any) -> None:
+            monkeypatch.setattr(module, "Node", no_more)
+            super().__init__(name, **how)
+
+    def no_more(*_: object, **__: object) -> None:
+        raise RuntimeError("no descriptors")
+
+    monkeypatch.setattr(module, "Node", Once)
+    host, told = new_host(short_lease=False), list[tuple[list[str], bool]]()
+    host.open(name)
+    swept = cleanup(
+        look=1.0,
+        sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
+        missing=lambda actions, in_vain: told.append((actions, in_vain)),
+    )
+    host.send(signal.SIGCONT)
+    assert swept.left == []
+    assert [(name in actions, in_vain) for actions, in_vain in told] == [
+        (True, False),
+        (True, True),
+    ]
+    with pytest.raises(CannotStart, match="no descriptors"):
+        cleanup()
+
+
+def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(
+    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What announces itself just before is what may be dropped by a server for good."""
+    made = list[str]()
+
+    class Slow(module.Node):  # type: ignore[misc]  # rclpy is not typed
+        def __init__(self, name: str, **how: Any) -> None:
+            super().__init__(name, **how)
+            if not made:
+                time.sleep(OUT_OF_SIGHT + 0.1)
+            made.append(name)
+
+    monkeypatch.setattr(module, "Node", Slow)
+    assert cleanup(look=0.1, patience=0.1).left == []
+    assert len(made) == 2

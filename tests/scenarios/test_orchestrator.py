@@ -20,7 +20,6 @@ import pytest
 from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
-from bt_actions.standstill import OUT_OF_SIGHT
 from tests.scenarios.conftest import Launch
 from tests.support.processes import PATIENCE, ROOT, HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -658,30 +657,6 @@ def test_cleanup_first_runs_nothing_where_a_server_cannot_be_seen(
     record.outcome = "nothing is run; exit code 3"
 
 
-def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
-    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What `ros2 launch` gives a node as its namespace is in force for relative names, too."""
-    from rclpy.context import Context
-
-    from bt_actions.ros import cleanup
-
-    monkeypatch.setattr(cleanup, "LOOK_LONGEST", 0.2)
-    context, told = Context(), list[tuple[list[str], bool]]()
-    context.init(args=["--ros-args", "-r", "__ns:=/r1"], domain_id=domain)
-    monkeypatch.setenv("ROS_DOMAIN_ID", "999")
-    swept = cleanup.cleanup(
-        look=0.1,
-        patience=0.1,
-        wanted={"move", "/r2/move"},
-        missing=lambda actions, in_vain: told.append((actions, in_vain)),
-        context=context,
-    )
-    context.shutdown()
-    assert told == [(["/r1/move", "/r2/move"], False), (["/r1/move", "/r2/move"], True)]
-    assert swept.domain == domain, "the one in force"
-
-
 def test_cleanup_that_was_stopped_looks_again(
     launch: Launch, new_host: HostFactory, tree: Tree, name: str, node: Any, record: Record
 ) -> None:
@@ -725,99 +700,6 @@ def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
     assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
     assert journal.ends() == ["canceled"]
     record.outcome = "CANCELED"
-
-
-def test_cleanup_does_not_take_silence_for_nothing(
-    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from bt_actions.ros import cleanup
-
-    monkeypatch.setattr(cleanup, "LOOK_LONGEST", 6.0)
-    host = new_host(short_lease=False)
-    host.open(name)
-    told = list[tuple[list[str], bool]]()
-
-    def look(wanted: list[str] | None) -> None:
-        cleanup.cleanup(
-            look=1.0,
-            sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
-            missing=lambda actions, in_vain: told.append((actions, in_vain)),
-            wanted=wanted,
-        )
-        host.send(signal.SIGCONT)
-
-    look(wanted=[])
-    assert told == [], "who wants no action is in no server's way"
-    look(wanted=None)
-    assert [(name in actions, in_vain) for actions, in_vain in told] == [
-        (True, False),
-        (True, True),
-    ]
-
-
-def test_cleanup_sees_no_server_where_there_is_a_client_only(
-    name: str, node: Any, domain: int
-) -> None:
-    from bt_actions.ros.cleanup import cleanup
-
-    sighted: list[str] = []
-    leaf = MoveRobot("client", 1.0, action_name=name)
-    leaf.setup(node=node)
-    assert cleanup(look=1.0, sighted=sighted.append).left == []
-    assert name not in sighted
-    leaf.shutdown()
-
-
-def test_cleanup_that_cannot_look_again_says_who_has_not_answered(
-    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What it has found by then is told."""
-    from bt_actions.ros import cleanup
-
-    class Once(cleanup.Node):  # type: ignore[misc]  # rclpy is not typed
-        def __init__(self, name: str, **how: Any) -> None:
-            monkeypatch.setattr(cleanup, "Node", no_more)
-            super().__init__(name, **how)
-
-    def no_more(*_: object, **__: object) -> None:
-        raise RuntimeError("no descriptors")
-
-    monkeypatch.setattr(cleanup, "Node", Once)
-    host, told = new_host(short_lease=False), list[tuple[list[str], bool]]()
-    host.open(name)
-    swept = cleanup.cleanup(
-        look=1.0,
-        sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
-        missing=lambda actions, in_vain: told.append((actions, in_vain)),
-    )
-    host.send(signal.SIGCONT)
-    assert swept.left == []
-    assert [(name in actions, in_vain) for actions, in_vain in told] == [
-        (True, False),
-        (True, True),
-    ]
-    with pytest.raises(cleanup.CannotStart, match="no descriptors"):
-        cleanup.cleanup()
-
-
-def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(
-    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What announces itself just before is what may be dropped by a server for good."""
-    from bt_actions.ros import cleanup
-
-    made = list[str]()
-
-    class Slow(cleanup.Node):  # type: ignore[misc]  # rclpy is not typed
-        def __init__(self, name: str, **how: Any) -> None:
-            super().__init__(name, **how)
-            if not made:
-                time.sleep(OUT_OF_SIGHT + 0.1)
-            made.append(name)
-
-    monkeypatch.setattr(cleanup, "Node", Slow)
-    assert cleanup.cleanup(look=0.1, patience=0.1).left == []
-    assert len(made) == 2
 
 
 def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
