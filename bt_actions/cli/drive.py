@@ -118,8 +118,6 @@ class Drive:
         self._error: BaseException | None = None
         self._stop: _Stop | None = None
         self._abandoned = False
-        self._knows_all = False
-        """Whether no goal was left to wait for when it was abandoned, only its teardown."""
         self._waits_since: float | None = None
         """When the tree was first seen to have ended; NaN once it is said what is waited for."""
         self._lost = False
@@ -194,7 +192,6 @@ class Drive:
             self._end(_EXITS[signal], f"interrupted by {signal.name}", now)
         elif now - self._stop.at > SAME_WISH:
             self._abandoned = True
-            self._knows_all = self._report.finished
 
     def _say_what_is_waited_for(self, now: float) -> None:
         """Say once why a tree that has ended is not over."""
@@ -296,7 +293,7 @@ class Drive:
         self._report.not_accounted_for(lines)
 
     def _code(self) -> Exit:
-        if self._report.unaccounted or (self._abandoned and not self._knows_all):
+        if self._report.unaccounted or (self._abandoned and not self._report.finished):
             return Exit.UNKNOWN
         if self._stop is not None:
             return self._stop.code

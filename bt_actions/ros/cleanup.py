@@ -31,7 +31,7 @@ from bt_actions.goal_terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
 from bt_actions.policy import End
 from bt_actions.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
 from bt_actions.ros import participant
-from bt_actions.ros.sight import STATUS, Sight
+from bt_actions.ros.action_view import STATUS, ActionView
 from bt_actions.ros.unanswered import Unanswered
 from bt_actions.standstill import AT_MOST, STOOD_STILL, Standstill
 
@@ -247,7 +247,7 @@ class _Sweep:
         self._node = node
         self._domain = int(node.context.get_domain_id())
         self._wanted = None if wanted is None else frozenset(names)
-        self._sights: dict[str, Sight] = {}
+        self._views: dict[str, ActionView] = {}
         self._glanced_at = float("-inf")
         self._questions: dict[tuple[str, int], LeftBehind] = {}
         for call in self._calls.values():
@@ -344,11 +344,11 @@ class _Sweep:
 
     def _turn(self, still: Standstill) -> None:
         """Take all that has come in, then look around, and ask."""
-        for action, sight in self._sights.items():
-            self._hear(action, sight)
+        for action, view in self._views.items():
+            self._hear(action, view)
             for message in sight.statuses():  # there may be many, each of thousands of goals
                 self._read(action, message)
-                self._hear(action, sight)
+                self._hear(action, view)
                 still.lives(time.monotonic())
                 if self._stopped():
                     return
@@ -357,15 +357,15 @@ class _Sweep:
             self._glanced_at = now
             self._glance(now)
             self._find()
-        for action, sight in self._sights.items():
+        for action, view in self._views.items():
             call = self._calls[action]
             if call.due(now):  # of a goal that is nobody's: any answer shows that a server lives
-                question = sight.cancel(uuid.uuid4().bytes)
+                question = view.cancel(uuid.uuid4().bytes)
                 if question is not None:
                     call.asked(question, now)
         self._cancel(now)
 
-    def _hear(self, action: str, sight: Sight) -> None:
+    def _hear(self, action: str, view: ActionView) -> None:
         for number, code in sight.answers():
             now = time.monotonic()
             self._calls[action].answered(number, now)
@@ -383,13 +383,13 @@ class _Sweep:
         """See which actions are in sight, and how many servers each has."""
         for topic, _types in self._node.get_topic_names_and_types():
             action = topic.removesuffix(STATUS)
-            if topic.endswith(STATUS) and action not in self._sights:
-                self._sights[action] = Sight(self._node, action)
+            if topic.endswith(STATUS) and action not in self._views:
+                self._views[action] = ActionView(self._node, action)
                 self._calls.setdefault(action, RollCall(now))
-        for action, sight in self._sights.items():
+        for action, view in self._views.items():
             call = self._calls[action]
             first = not call.sighted
-            call.sees(sight.servers(), now, published=sight.is_published())
+            call.sees(view.servers(), now, published=view.is_published())
             if first and call.sighted:
                 self._sighted(action)
 
@@ -464,9 +464,9 @@ class _Sweep:
             if not left.is_over and now - left.asked_at >= ASK_AGAIN:
                 due.setdefault(left.action, []).append(left)
         for action, goals in due.items():
-            sight = self._sights.get(action)
+            view = self._views.get(action)
             for left in sorted(goals, key=lambda goal: goal.asked_at)[:CANCELS_A_TURN]:
-                question = None if sight is None else sight.cancel(left.goal_id)
+                question = None if view is None else view.cancel(left.goal_id)
                 if question is not None:
                     left.asked_at = now
                     if left.awaited:

@@ -36,8 +36,10 @@ def parameters_in(words: Sequence[str], namespace: str = "") -> dict[str, object
             start_parameter_services=False,
             automatically_declare_parameters_from_overrides=True,
         )
-        found = node.get_parameters_by_prefix("")
-        participant.close(node, context)
+        try:
+            found = node.get_parameters_by_prefix("")
+        finally:
+            participant.close(node, context)
     except RuntimeError as error:  # rclpy's RCLError
         if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
             unknown = shlex.join(ast.literal_eval(str(error)))

@@ -6,7 +6,7 @@ of them: `bt-actions cleanup`, or `run --cleanup-first`, does (cleanup.py), when
 
 from __future__ import annotations
 
-from bt_actions.goal_ids import author_of
+from bt_actions.goal_ids import Author, author_of
 from bt_actions.ros.log import log
 
 TOLD_AT_MOST = 10
@@ -18,18 +18,22 @@ class Predecessors:
 
     def __init__(self, action: str) -> None:
         self._action = action
-        self._seen: set[bytes] = set()  # at the last status
         self._told: set[bytes] = set()
 
     def see(self, running: set[bytes]) -> None:
         """Take the ids of all goals that a status shows running, but our own."""
-        for goal_id in running - self._seen - self._told:
+        if len(self._told) >= TOLD_AT_MOST:
+            return
+        dead: dict[Author, bool] = {}
+        for goal_id in running - self._told:
             author = author_of(goal_id)
-            is_left = author is not None and author.here and not author.alive
-            if author is not None and is_left and len(self._told) < TOLD_AT_MOST:
+            if author is None or not author.here:
+                continue
+            if author not in dead:  # to ask reads a file
+                dead[author] = not author.alive
+            if dead[author] and len(self._told) < TOLD_AT_MOST:
                 self._told.add(goal_id)
                 log.warning(
                     f"{self._action}: a goal of process {author.pid}, which is dead, still runs "
                     f"there; `bt-actions cleanup` cancels it: {goal_id.hex()}"
                 )
-        self._seen = running

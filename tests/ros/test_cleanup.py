@@ -16,8 +16,8 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions import MoveRobot
 from bt_actions.policy import End
 from bt_actions.roll_call import RollCall
+from bt_actions.ros import action_view
 from bt_actions.ros import cleanup as module
-from bt_actions.ros import sight
 from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
 from bt_actions.standstill import OUT_OF_SIGHT, Standstill
 from tests.support.processes import HostFactory, Journal, Process
@@ -76,7 +76,7 @@ def test_of_two_servers_each_has_to_answer(
     hosts = [new_host(short_lease=False) for _ in range(2)]
     for host in hosts:
         host.open(name)
-    real = sight.servers
+    real = action_view.servers
 
     def stopping(node: Any, action: str) -> frozenset[bytes]:
         shown = real(node, action)
@@ -84,7 +84,7 @@ def test_of_two_servers_each_has_to_answer(
             hosts[0].send(signal.SIGSTOP)
         return shown
 
-    monkeypatch.setattr(sight, "servers", stopping)
+    monkeypatch.setattr(action_view, "servers", stopping)
     swept, told = sweep([name])
     hosts[0].send(signal.SIGCONT)
     assert told == [name]
@@ -115,13 +115,13 @@ def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
     left: str, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It went away meanwhile, frozen perhaps, and may run the goal."""
-    real, found = sight.servers, list[LeftBehind]()
+    real, found = action_view.servers, list[LeftBehind]()
 
     def one_goes(node: Any, action: str) -> frozenset[bytes]:
         shown = real(node, action)
         return shown | {b"another"} if action == name and shown and not found else shown
 
-    monkeypatch.setattr(sight, "servers", one_goes)
+    monkeypatch.setattr(action_view, "servers", one_goes)
     swept, _told = sweep(
         [name],
         found=found.append,

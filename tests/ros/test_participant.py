@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -13,7 +13,9 @@ from std_msgs.msg import String
 
 from bt_actions import TreeRunner
 from bt_actions.ros import participant
+from bt_actions.ros.cleanup import cleanup
 from bt_actions.ros.lookout import Sight
+from bt_actions.ros.parameters import parameters_in
 from tests.support.trees import Gate
 from tests.support.waiting import holds_for, until
 
@@ -66,8 +68,29 @@ def test_so_is_one_of_another_release(
     assert not participant.fall_silent(ours)
 
 
-def test_the_participants_of_runners_and_lookouts_fall_silent_before_they_go(
-    monkeypatch: pytest.MonkeyPatch, domain: int
+def of_a_runner(_: int) -> None:
+    with TreeRunner(Gate()):
+        pass
+
+
+def of_a_lookout(domain: int) -> None:
+    sight = Sight(domain, "/")
+    sight.looking = False
+    sight.close()
+
+
+@pytest.mark.parametrize(
+    ("come_and_go", "name"),
+    [
+        (of_a_runner, "bt_actions_"),
+        (of_a_lookout, "bt_actions_lookout_"),
+        (lambda _: cleanup(look=0.1, patience=0.1, wanted=[]), "bt_actions_cleanup"),
+        (lambda _: parameters_in(["-p", "a:=1"]), "bt_actions_"),
+    ],
+    ids=["runner", "lookout", "cleanup", "parameters"],
+)
+def test_participants_of_our_own_fall_silent_before_they_go(
+    monkeypatch: pytest.MonkeyPatch, domain: int, come_and_go: Callable[[int], object], name: str
 ) -> None:
     seen = list[str]()
 
@@ -76,9 +99,6 @@ def test_the_participants_of_runners_and_lookouts_fall_silent_before_they_go(
         return True
 
     monkeypatch.setattr(participant, "fall_silent", fall_silent)
-    with TreeRunner(Gate()) as runner:
-        ours = runner.node.get_name()
-    sight = Sight(domain, "/")
-    sight.looking = False
-    sight.close()
-    assert seen == [ours, sight.node.get_name()]
+    come_and_go(domain)
+    [node] = seen
+    assert node.startswith(name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.goal_ids import new_goal_id
+from bt_actions.goal_ids import Author, new_goal_id
 from bt_actions.ros import predecessors as module
 from bt_actions.ros.predecessors import TOLD_AT_MOST, Predecessors
 
@@ -39,6 +39,27 @@ def test_goals_of_the_living_and_of_other_clients_are_nobodys_concern(said: list
     elsewhere = bytearray(of_the_dead())
     elsewhere[3] ^= 0xFF
     Predecessors("/move").see({new_goal_id(), bytes(16), b"", bytes(elsewhere)})
+    assert not said
+
+
+def test_who_dies_later_is_found_at_the_next_status(
+    said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen, goal = Predecessors("/move"), new_goal_id()
+    seen.see({goal})
+    assert not said
+    monkeypatch.setattr(Author, "alive", False)
+    seen.see({goal})
+    assert len(said) == 1
+
+
+def test_of_each_process_it_is_asked_once_whether_it_lives(
+    said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = list[Author]()
+    monkeypatch.setattr(Author, "alive", property(lambda author: not asked.append(author)))
+    Predecessors("/move").see({new_goal_id() for _ in range(100)})
+    assert len(asked) == 1
     assert not said
 
 

@@ -24,6 +24,7 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.goal import ASK_AGAIN
+from bt_actions.ros.action_client import TAKE_AT_MOST
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import FEEDBACK_KEPT
 from bt_actions.simulation.journal import live_intervals
@@ -133,15 +134,16 @@ def test_a_flood_of_feedback(
         runner.interrupt()
         runner.wait(5.0)
     usual = pauses[len(pauses) * 95 // 100]
+    enough = GETS_THROUGH * 1000 * seconds / record.leniency
     assert leaf.outcome is Outcome.SUCCEEDED
     assert journal.ends() == ["succeeded"]
-    assert len(came) >= GETS_THROUGH * 1000 * seconds
+    assert len(came) >= enough
     assert usual < USUAL * record.leniency
     assert pauses[-1] < LATEST * record.leniency
     assert kept <= FEEDBACK_KEPT
     assert grown < FLAT
     assert reading == sorted(reading)
-    assert len(reading) >= GETS_THROUGH * 1000 * seconds or not reads
+    assert len(reading) >= enough or not reads
     record.outcome = f"SUCCEEDED; 95 of 100 ticks within {USUAL:g} s, memory within {FLAT:g} MB"
 
 
@@ -178,7 +180,8 @@ def test_a_flood_while_the_tree_does_not_read(
         finally:
             holds.let_go.set()
         assert runner.wait(9.0) is Status.SUCCESS
-    assert 0 < kept <= 2 * FEEDBACK_KEPT, "those that wait to be read, and some under way"
+    at_most = FEEDBACK_KEPT + TAKE_AT_MOST + 2
+    assert 0 < kept <= at_most, "those that wait to be read, and one take of what is under way"
     assert journal.ends() == ["succeeded"]
     record.outcome = f"SUCCEEDED; the newest {FEEDBACK_KEPT} messages were kept, and no more"
 
@@ -313,7 +316,7 @@ def test_feedback_that_stops(
     record.outcome = "STALLED, end CANCELED"
 
 
-@pytest.mark.parametrize("after", [None, 1.0])
+@pytest.mark.parametrize("after", [None, 2.5])
 def test_a_result_that_overtakes_the_acceptance(
     serve: Serve,
     name: str,
@@ -325,7 +328,7 @@ def test_a_result_that_overtakes_the_acceptance(
     """A goal of 0.3 s whose acceptance is told after so many seconds, or never (None)"""
     told = noted(monkeypatch, "goal_answered")
     journal = serve("1:drop_accept", tells_after=after)
-    leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(accept=3.0))
+    leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(accept=5.0))
     with TreeRunner(leaf, node=node) as runner:
         assert runner.run(timeout=9.0) is Status.SUCCESS
         assert told == [], "it has succeeded before it was answered"

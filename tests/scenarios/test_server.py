@@ -319,13 +319,13 @@ class TestStopped:
         host = new_host()
         late = ends == "interrupted-late"  # so its first deadline ends with the look-out
         journal = host.open(name, *(["1:delay_cancel=1"] if late else []))
-        leaf = MoveRobot("m", 30.0, action_name=name, timeout=Timeouts(cancel=2.0 if late else 5.0))
+        leaf = MoveRobot("m", 30.0, action_name=name, timeout=Timeouts(cancel=3.0 if late else 5.0))
         with TreeRunner(leaf, node=node) as runner:
             runner.start()
             until(lambda: leaf.progress().feedback is not None)
             host.send(signal.SIGSTOP)
             if late:
-                assert holds_for(lambda: leaf.outcome is None, 2.0)
+                assert holds_for(lambda: leaf.outcome is None, 1.0)
             if ends != "by-itself":
                 runner.interrupt()
             until(lambda: leaf.end is End.SERVER_GONE, 9.0)

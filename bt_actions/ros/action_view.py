@@ -22,7 +22,7 @@ DEPTH = 100
 """Of our ends: with a depth of 1 the status of one server would displace that of another."""
 
 
-class Sight:
+class ActionView:
     """One action, as one node sees it; what has come in is taken by hand, nobody spins."""
 
     def __init__(self, node: Node, action: str) -> None:
