@@ -21,6 +21,9 @@ QUESTIONS = 10
 SETTLE = 4.0
 """Seconds of answers within which a server's status must have been received; where a client was
 just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
+SETTLE_AFTER_SILENCE = 7.0
+"""The same where a server was silent before: what a stopped one, or a machine without time for it,
+offers may be lost twice."""
 
 
 class RollCall:
@@ -35,10 +38,13 @@ class RollCall:
         self.sighted = False
         """Whether anything of a server was."""
         self._settled: frozenset[bytes] | None = None  # those that had the time; None: nobody had
+        self._settle = SETTLE
         self.begin(now)
 
     def begin(self, now: float) -> None:
         """Go on in a new participant, which has nothing in sight yet."""
+        if self.sighted and not self.known:
+            self._settle = SETTLE_AFTER_SILENCE
         self._shown: frozenset[bytes] = frozenset()
         self._in_sight = False
         self._begin_anew(now)
@@ -91,6 +97,8 @@ class RollCall:
         """The question of this number was asked."""
         if not self._complete or now - self._asked_at > LATE or self._since is None:
             self._since = now
+            if self._number is not None:
+                self._settle = SETTLE_AFTER_SILENCE
         self._number = number
         self._answers_before = self._answers
         self._answers = 0
@@ -108,7 +116,7 @@ class RollCall:
         self._answers += 1
         if self._complete and self._since is not None:
             self._heard_at = now
-            if self._asked_at - self._since >= SETTLE:
+            if self._asked_at - self._since >= self._settle:
                 self._settled = (self._settled or frozenset()) | self._shown
 
 

@@ -6,7 +6,16 @@ from collections.abc import Iterator
 
 import pytest
 
-from bt_actions.roll_call import ASK_AGAIN, LATE, QUESTIONS, SETTLE, SILENT, Denial, RollCall
+from bt_actions.roll_call import (
+    ASK_AGAIN,
+    LATE,
+    QUESTIONS,
+    SETTLE,
+    SETTLE_AFTER_SILENCE,
+    SILENT,
+    Denial,
+    RollCall,
+)
 
 A, B = b"a", b"b"
 
@@ -33,9 +42,11 @@ class Roll(RollCall):
 
     def settle(self, answers: int = 1) -> None:
         """Ask for as long as it takes."""
-        for _ in range(int(SETTLE / ASK_AGAIN) + 1):
-            assert not self.known
+        began = self.now
+        while not self.known:
+            assert self.now - began < SETTLE_AFTER_SILENCE + 2 * ASK_AGAIN
             self.ask(answers)
+        assert self.now - began > SETTLE
 
 
 def test_it_is_known_when_all_questions_were_answered_for_long_enough() -> None:
@@ -58,6 +69,20 @@ def test_an_answer_alone_is_no_proof() -> None:
     assert roll.trouble == "no server of {} answers"
     roll.settle()
     assert roll.known
+
+
+def test_who_was_silent_has_to_answer_for_longer() -> None:
+    """What it offered when it was woken up may have been lost, and is offered again after 3 s."""
+    for silences in (lambda roll: roll.ask(0), lambda roll: roll.begin(roll.now)):
+        roll = Roll()
+        roll.shows(A)
+        silences(roll)
+        roll.shows(A)
+        for _ in range(int(SETTLE_AFTER_SILENCE / ASK_AGAIN)):
+            roll.ask(1)
+            assert not roll.known
+        roll.ask(1)
+        assert roll.known
 
 
 def test_each_server_has_to_answer() -> None:

@@ -346,7 +346,7 @@ class _Sweep:
         """Take all that has come in, then look around, and ask."""
         for action, view in self._views.items():
             self._hear(action, view)
-            for message in sight.statuses():  # there may be many, each of thousands of goals
+            for message in view.statuses():  # there may be many, each of thousands of goals
                 self._read(action, message)
                 self._hear(action, view)
                 still.lives(time.monotonic())
@@ -366,7 +366,7 @@ class _Sweep:
         self._cancel(now)
 
     def _hear(self, action: str, view: ActionView) -> None:
-        for number, code in sight.answers():
+        for number, code in view.answers():
             now = time.monotonic()
             self._calls[action].answered(number, now)
             left = self._questions.get((action, number))
