@@ -11,11 +11,11 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
 from bt_actions.cli.common import (
-    NO_ROS,
     BadInput,
     Exit,
     OutputLost,
     discard_stdout,
+    no_ros,
     note,
     refuse_domain,
     seconds,
@@ -148,7 +148,7 @@ def _sweep(
     try:
         from bt_actions.ros.cleanup import CannotStart, cleanup
     except ImportError as error:
-        raise BadInput(NO_ROS.format(error)) from error
+        raise no_ros(error) from error
 
     refuse_domain()
     foreign: list[str] = []

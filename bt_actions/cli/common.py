@@ -49,10 +49,17 @@ class BadInput(Exception):
         self.prefixed = prefixed
 
 
-NO_ROS = (
-    "ROS 2 cannot be imported ({}); source your workspace, or install bt_actions with its "
-    "dependencies"
-)
+def no_ros(error: ImportError) -> BadInput:
+    """Return what to say where ROS cannot be imported.
+
+    Raises KeyboardInterrupt where that is why: a C extension makes an ImportError of it.
+    """
+    if isinstance(error.__cause__, KeyboardInterrupt):
+        raise error.__cause__
+    return BadInput(
+        f"ROS 2 cannot be imported ({error}); source your workspace, or install bt_actions with "
+        "its dependencies"
+    )
 
 
 class OutputLost(Exception):

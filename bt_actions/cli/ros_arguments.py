@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import BadInput
+from bt_actions.cli.common import BadInput, no_ros
 from bt_actions.suggest import listing
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def parameters(words: Sequence[str], namespace: str = "") -> dict[str, object]:
     try:
         from bt_actions.ros.parameters import parameters_in
     except ImportError as error:
-        raise BadInput(f"--ros-args: ROS 2 cannot be imported ({error})") from error
+        raise no_ros(error) from error
 
     try:
         return parameters_in(words, namespace)

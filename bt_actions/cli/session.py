@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Self
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.cli.common import NO_ROS, BadInput, Exit, note, starting_ros
+from bt_actions.cli.common import BadInput, Exit, no_ros, note, starting_ros
 from bt_actions.cli.drive import Drive, Ended, leave
 from bt_actions.cli.patient_file import gap_text
 from bt_actions.cli.patient_output import PatientOutput
@@ -61,7 +61,7 @@ class Session:
         try:
             import bt_actions.ros.spinning  # noqa: F401 - the runner imports it late
         except ImportError as error:
-            raise BadInput(NO_ROS.format(error)) from error
+            raise no_ros(error) from error
         from bt_actions.runner import TreeRunner as Runner
 
         self.report = Report(root)

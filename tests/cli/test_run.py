@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -289,3 +290,30 @@ class TestPyTreesRender:
         start_program("-c", code).wait()
         dot = (tmp_path / "deliver_the_part.dot").read_text()
         assert "To the shelf" in dot
+
+
+@pytest.mark.parametrize(
+    ("cause", "code", "told"),
+    [(KeyboardInterrupt(), 130, ""), (None, 2, "ROS 2 cannot be imported (initialization failed)")],
+)
+def test_ctrl_c_while_ros_is_imported_is_no_missing_ros(
+    cause: BaseException | None,
+    code: int,
+    told: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A C extension that is interrupted in its import raises ImportError from it."""
+
+    class Interrupted:
+        @staticmethod
+        def find_spec(name: str, *_: object) -> None:
+            if name == "bt_actions.ros.spinning":
+                raise ImportError("initialization failed") from cause
+
+    monkeypatch.delitem(sys.modules, "bt_actions.ros.spinning", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Interrupted, *sys.meta_path])
+    assert main(["run", "pick_and_place", "--sim"]) == code
+    said = capsys.readouterr().err
+    assert told in said
+    assert bool(said) == bool(told)
