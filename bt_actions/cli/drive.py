@@ -37,6 +37,8 @@ FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
 PATIENCE_WHEN_LEFT = 1.0
 """Seconds for the output to be written where the user did not wait for the goals."""
+NEARLY_OVER = 1.0
+"""Seconds for a run with no goal left to wait for to be over, where the user will not wait."""
 SOON = 1.0
 """Seconds after the end of the tree for which nothing is said of goals that have not ended."""
 _LOOK = 0.02
@@ -242,9 +244,12 @@ class Drive:
     def _await_the_list(self) -> None:
         """Let the runner say how its goals stand, which takes a moment, but not for long."""
         self._runner.interrupt(abandon=True)
-        until = self._clock() + SAME_WISH
-        while not self._report.finished and (left := until - self._clock()) > 0.0:
-            self._signals.wait(left)
+        began = self._clock()
+        while not self._report.finished:
+            left = began + (SAME_WISH if self._report.live else NEARLY_OVER) - self._clock()
+            if left <= 0.0:
+                break
+            self._signals.wait(min(left, SAME_WISH))
             self._take_events()
         if not self._report.finished:
             self._runner.catch_up()

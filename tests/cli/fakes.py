@@ -108,6 +108,7 @@ class FakeRunner:
     unaccounted: list[object] = field(default_factory=list)
     error: Exception | None = None
     interrupted: threading.Event = field(default_factory=threading.Event)
+    abandoned: threading.Event = field(default_factory=threading.Event)
     playing: threading.Event = field(default_factory=threading.Event)
     released: threading.Event = field(default_factory=threading.Event)
 
@@ -119,6 +120,8 @@ class FakeRunner:
 
     def interrupt(self, *, abandon: bool = False) -> None:
         self.interrupted.set()
+        if abandon:
+            self.abandoned.set()
 
     def catch_up(self) -> None:
         pass

@@ -271,6 +271,26 @@ def test_a_second_signal_after_the_end_of_all_goals_leaves_none_unknown(story: S
     assert "not accounted for" not in run.out.getvalue()
 
 
+def test_a_second_signal_waits_for_a_run_with_no_goal_left_to_be_over(story: Story) -> None:
+    """The middleware may take its time for what was sent last."""
+    run = Run(FakeRunner(waits=True))
+    run.runner.before = executing(run, story)
+
+    def takes_a_while() -> Iterator[Event]:
+        done, finished = canceled(run, story)
+        yield done
+        while not run.runner.abandoned.wait(SAME_WISH / 2):
+            os.kill(os.getpid(), signal.SIGINT)
+        threading.Event().wait(2 * SAME_WISH)
+        yield finished
+
+    run.runner.after = takes_a_while()
+    with Signals(), killed_when(run.runner.playing, signal.SIGINT):
+        ended = run.go()
+    assert (ended.code, ended.abandoned) == (Exit.SIGINT, True)
+    assert "not accounted for" not in run.out.getvalue()
+
+
 def test_one_wish_that_arrives_twice_is_one_wish(story: Story) -> None:
     run = Run(FakeRunner(waits=True))
     run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
