@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["closest", "did_you_mean", "listing"]
+__all__ = ["closest", "did_you_mean", "folded", "listing"]
 
 _LONGEST = 60
 _MOST = 60
@@ -20,7 +20,7 @@ def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
     """
     if not 0 < len(word) <= _LONGEST:
         return None
-    known, wanted = list(known), _folded(word)
+    known, wanted = list(known), folded(word)
     longer = [name for name in known if len(word) >= _BEGINNING and name.startswith(word)]
     if longer and word not in longer:
         return min(longer, key=len)
@@ -28,15 +28,16 @@ def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
     near = [name for name in known if name != word and abs(len(name) - len(word)) <= slack]
     if len(near) > _MOST:  # comparing takes its time
         near = [name for name in near if name[:1] == word[:1]][:_MOST]
-    folded = {_folded(name): name for name in near}
-    if wanted in folded:
-        return folded[wanted]
-    matches = difflib.get_close_matches(wanted, folded, n=1, cutoff=cutoff)
-    return folded[matches[0]] if matches else None
+    forms = {folded(name): name for name in near}
+    if wanted in forms:
+        return forms[wanted]
+    matches = difflib.get_close_matches(wanted, forms, n=1, cutoff=cutoff)
+    return forms[matches[0]] if matches else None
 
 
-def _folded(word: str) -> str:
-    return word.casefold().replace("-", "_").replace(" ", "_")
+def folded(word: str) -> str:
+    """A word in one form: `ForceSuccess`, `force-success` and `force_success` are the same."""
+    return word.casefold().replace("-", "").replace("_", "").replace(" ", "")
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Mapping as MappingType
 from typing import NamedTuple
 
 from bt_actions.document.build_names import when_of
+from bt_actions.document.elsewhere import notation_here
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import BOOL, TEXT, infer, named
 from bt_actions.document.inner import inner_span
@@ -363,4 +364,4 @@ def _trap(node: Node) -> str | None:
     """What YAML may have made of what was meant."""
     if isinstance(node, Scalar) and node.text in ("on", "off", "yes", "no"):
         return "YAML 1.2 reads this as a text: write true or false"
-    return None
+    return notation_here(node.text) if isinstance(node, Scalar) else None

@@ -193,7 +193,7 @@ def _composed(composer: _Composer, source: Source) -> Node | None:
 class _Open:
     """A collection whose end has not come yet."""
 
-    __slots__ = ("anchor", "height", "items", "key", "keys", "node", "pairs", "size")
+    __slots__ = ("anchor", "height", "items", "key", "keys", "node", "pairs", "refused", "size")
 
     def __init__(self, node: Mapping | Listing, anchor: str | None) -> None:
         self.node = node
@@ -202,6 +202,8 @@ class _Open:
         self.pairs = node.pairs if isinstance(node, Mapping) else []
         self.key: Scalar | None = None
         self.keys: dict[str, Scalar] = {}
+        self.refused = False
+        """Whether a list or a mapping stands as a key."""
         self.size = 1
         self.height = 1
         """Collections inside each other, this one among them."""
@@ -317,6 +319,8 @@ class _Composer:
                 node.end_line, node.end_column = last.end_line, last.end_column
         if isinstance(node, Mapping) and "<<" in done.keys and self._unfold:
             self._merge(node)
+        if done.refused and not done.pairs:
+            self._source.settled.add(span_of(node))
         if done.anchor is not None:
             self._anchors[done.anchor] = (node, done.size, done.height)
         self._add(node, done.size, done.height)
@@ -367,9 +371,10 @@ class _Composer:
 
     def _key(self, frame: _Open, node: Node) -> Scalar:
         if type(node) is not Scalar:
-            hint = "a text that begins with { or [ needs quotes"
+            hint = _braced(node) or "a text that begins with { or [ needs quotes"
             message = "a key is a single word, not a list or a mapping"
             self._source.report("BT109", span_of(node), message, hint=hint)
+            frame.refused = True
             return _REFUSED
         first = frame.keys.setdefault(node.text, node)
         if first is not node and node.text != "<<":
@@ -403,6 +408,16 @@ class _Composer:
 
 
 _REFUSED = Scalar()
+
+
+def _braced(node: Node) -> str | None:
+    """What to write for `{{ x }}`, where the inner braces stand as a key."""
+    if not isinstance(node, Mapping) or len(node.pairs) != 1 or not node.flow:
+        return None
+    key, value = node.pairs[0]
+    empty = isinstance(value, Scalar) and value.plain and not value.text
+    named = re.fullmatch(r"[A-Za-z_][\w.]*", key.text, re.ASCII)
+    return f"a variable is written ${key.text}" if empty and named else None
 
 
 def _nothing(event: Any) -> None:

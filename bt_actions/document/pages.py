@@ -174,8 +174,8 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _move("inputs: {far: float64}\nroot:\n  move: Go\n  goal: {distance: $far}\n"),
         ),
         "BT118": Page(
-            "Inside { } and [ ], an unquoted '[' ends the text before it. Write the index with a "
-            "dot, or put the value in quotes.",
+            "Inside { } and [ ], an unquoted '[' or '{' ends the text before it. Write the index "
+            "with a dot, a variable without braces, or put the value in quotes.",
             _move("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d[0]}\n"),
             _move("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d.0}\n"),
         ),

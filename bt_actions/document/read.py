@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
 
+from bt_actions.document.elsewhere import kind_here
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS, Kind
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
@@ -18,7 +19,7 @@ from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
 from bt_actions.document.values import BAD
-from bt_actions.suggest import closest, did_you_mean, listing
+from bt_actions.suggest import closest, did_you_mean, folded, listing
 
 __all__ = ["read_document", "read_root"]
 
@@ -29,20 +30,6 @@ _NODE_KEYS = frozenset(
 """All that may stand in a node beside its kind."""
 _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
-_MEMORY = "with 'memory: false'"
-_OTHER_NAMES = {
-    "selector": "'fallback'",
-    "reactivesequence": f"'sequence' {_MEMORY}",
-    "reactivefallback": f"'fallback' {_MEMORY}",
-    "reactiveselector": f"'fallback' {_MEMORY}",
-    "oneshot": "'run_once'",
-    "loop": "'repeat', 'while' or 'for_each'",
-    "condition": "'check'",
-    "sleep": "'wait'",
-    "delay": "'wait'",
-    "include": "'subtree'",
-}
-"""What behaviour trees elsewhere call it, in small letters, and what it is called here."""
 
 
 def read_document(source: Source, *, library: bool = False) -> Document | None:
@@ -217,6 +204,7 @@ class _Reader:
         if not words and any(key.text in self._refused for key, _ in written.pairs):
             self._source.unread.actions = True
             return
+        words = words or [key for key, _ in written.pairs if kind_here(key.text)]
         if not words:
             hint = "one key of a node is its kind, such as 'sequence: name'"
             self._source.report("BT111", _first(written), "this node has no kind", hint=hint)
@@ -225,10 +213,11 @@ class _Reader:
         if any(self._doubts.declares(word.text) for word in words):
             return
         known = [*KINDS, *self._actions]
-        meant = (word for word in words if _other_name(word) or closest(word.text, known))
+        meant = (word for word in words if kind_here(word.text) or closest(word.text, known))
         key = next(meant, words[0])
-        other = _other_name(key)
-        near = f"; here it is {other}" if other else did_you_mean(key.text, known)
+        same = folded(key.text) in map(folded, known)
+        here = None if same else kind_here(key.text)
+        near = f"; {here}" if here else did_you_mean(key.text, known)
         own = listing(self._actions)
         hint = f"this tree's actions are {own}" if own else "this tree declares no actions"
         message = f"no kind of node and no action is called {key.text!r}{near}"
@@ -293,7 +282,10 @@ class _Reader:
             message = f"{node.key.text!r} has no {key.text!r}"
             self._source.report("BT107", span_of(key), message, hint=hint)
         else:
-            report_unknown_key(key, keys, self._source)
+            hint = None
+            if key.text == "name" and "name" not in keys:
+                hint = f"the name stands behind '{node.key.text}:'"
+            report_unknown_key(key, keys, self._source, hint)
 
     def _children(self, node: TreeNode, name: str, inner: Node) -> None:
         if name == "child":
@@ -323,7 +315,3 @@ _ACTION_NAME = KINDS["sequence"]
 _ACTION_NEEDS = required_in(ACTION_KEYS)
 _NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
 """The keys that must be there."""
-
-
-def _other_name(word: Scalar) -> str | None:
-    return _OTHER_NAMES.get(word.text.casefold().replace("_", ""))

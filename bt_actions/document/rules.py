@@ -49,7 +49,7 @@ RULES = MappingProxyType(
             Rule("BT115", "a dollar sign that refers to nothing"),
             _warning("BT116", "a text was cut by '#'"),
             Rule("BT117", "{x} is a mapping"),
-            Rule("BT118", "[ ends a text inside { } and [ ]"),
+            Rule("BT118", "[ or { ends a text inside { } and [ ]"),
             Rule("BT119", "an ignore that names no rule"),
             Rule("BT120", "an ignore that silences nothing"),
             Rule("BT121", "a name that ROS does not take"),

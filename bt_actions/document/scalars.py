@@ -10,6 +10,7 @@ import sys
 from dataclasses import dataclass
 
 from bt_actions.document.cut import warn_cut
+from bt_actions.document.elsewhere import notation_here
 from bt_actions.document.nodes import Node, Scalar, span_of
 from bt_actions.document.shape import (
     Schema,
@@ -200,7 +201,8 @@ class Duration:
         try:
             seconds = parse_duration(node.value)
         except ValueError as error:
-            source.report("BT110", span_of(node), str(error))
+            hint = notation_here(node.text)
+            source.report("BT110", span_of(node), str(error), hint=hint)
             return BAD
         if seconds == 0 and not self.zero:
             source.report("BT110", span_of(node), "a duration here is more than zero")
@@ -236,7 +238,7 @@ class Choice:
         if node.text in self.options:
             return node.text
         near = did_you_mean(node.text, self.options)
-        hint = None if near else words or self.words
+        hint = None if near else notation_here(node.text) or words or self.words
         source.report(
             "BT110", span_of(node), f"{words_for(node)} is not known here{near}", hint=hint
         )

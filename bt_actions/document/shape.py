@@ -6,6 +6,7 @@ import re
 from typing import Protocol
 
 from bt_actions.document.braces import report_braces
+from bt_actions.document.elsewhere import notation_here
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD, Computed, read_value
@@ -57,8 +58,15 @@ def wrong_form(shape: Shape, node: Node, source: Source, *, hint: str | None = N
     """Report that a node is not of a form."""
     if report_braces(node, source):
         return BAD
-    if isinstance(node, Scalar) and "text" in shape.words and not isinstance(node.value, str):
+    if (
+        hint is None
+        and isinstance(node, Scalar)
+        and "text" in shape.words
+        and not isinstance(node.value, str)
+    ):
         hint = f'to mean the text, write "{node.text}"' if node.text else None
+    if hint is None and isinstance(node, Scalar):
+        hint = notation_here(node.text)
     message = f"{shape.words} is needed, not {words_for(node)}"
     source.report("BT109", span_of(node), message, hint=hint)
     return BAD

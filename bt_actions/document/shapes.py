@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 
+from bt_actions.document.elsewhere import as_mapping, key_here
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
-from bt_actions.document.scalars import Choice, Name
+from bt_actions.document.scalars import Choice, Name, Place
 from bt_actions.document.shape import Schema, Shape, is_computed, read_computed, wrong_form
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD, read_value
@@ -45,7 +46,8 @@ class Values:
         if is_computed(node):
             return read_computed(self, node, source)
         if not isinstance(node, Mapping):
-            return wrong_form(self, node, source)
+            hint = as_mapping(node.text) if isinstance(node, Scalar) else None
+            return wrong_form(self, node, source, hint=hint)
         return read_value(node, source)
 
     def schema(self) -> Schema:
@@ -105,7 +107,7 @@ class Table:
         if isinstance(node, Scalar) and node.plain and node.text == "":
             return {}
         if not isinstance(node, Mapping):
-            return wrong_form(self, node, source)
+            return wrong_form(self, node, source, hint=self._meant(node))
         found: dict[str, object] = {}
         for key, inner in node.pairs:
             name = Name().read(key, source)
@@ -117,6 +119,14 @@ class Table:
             if value is BAD:
                 source.unread.nodes.append(inner)
         return found
+
+    def _meant(self, node: Node) -> str | None:
+        if isinstance(node, Listing):
+            named = any(isinstance(item, Mapping) for item in node.items)
+            return "each name is a key here, and begins with no '-'" if named else None
+        assert isinstance(node, Scalar)
+        root = next(iter(self.item.roots)) if isinstance(self.item, Place) else None
+        return as_mapping(node.text, "" if isinstance(self.item, Name) else root)
 
     def schema(self) -> Schema:
         return {
@@ -153,6 +163,11 @@ class Record:
     def read(self, node: Node, source: Source) -> object:
         if not isinstance(node, Mapping):
             if self.short is not None and isinstance(node, Scalar):
+                value = node.value
+                if "default" in self.keys and isinstance(value, bool | int | float):
+                    kind = {bool: "bool", int: "int64"}.get(type(value), "float64")
+                    hint = f"write {{type: {kind}, default: {node.text}}}"
+                    return wrong_form(self.keys[self.short].shape, node, source, hint=hint)
                 value = self.keys[self.short].shape.read(node, source)
                 return BAD if value is BAD else {self.short: value}
             return wrong_form(self, node, source)
@@ -216,11 +231,16 @@ def read_keys(
     return values
 
 
-def report_unknown_key(key: Scalar, known: MappingType[str, object], source: Source) -> None:
-    """Report a key that cannot stand where it stands."""
-    near = did_you_mean(key.text, known)
+def report_unknown_key(
+    key: Scalar, known: MappingType[str, object], source: Source, hint: str | None = None
+) -> None:
+    """Report a key that cannot stand where it stands; `hint` says what to do instead, if known."""
+    here, instead = key_here(key.text, known) if hint is None else (None, hint)
+    near = f"; here it is '{here}'" if here else ""
+    if not near and not instead:
+        near = did_you_mean(key.text, known)
     there = f"there is {', '.join(known)}" if known else "no other key can stand here"
-    hint = None if near else there
+    hint = instead or (None if near else there)
     source.report("BT107", span_of(key), f"unknown key {key.text!r}{near}", hint=hint)
 
 

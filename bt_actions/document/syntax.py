@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import yaml
 
+from bt_actions.document.elsewhere import notation_here
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.source import Source
 
@@ -20,6 +21,7 @@ _REACH = 200
 """How much of a line is looked at, before and behind the place."""
 _BRACKETED = re.compile(r"""([^\s,:{}\[\]'"][^,:{}\[\]'"]*)(\[[^\[\]{}]*\]?)""")
 _ELEMENT = re.compile(r"(\$\w[\w.]*|\w+\.[\w.]+)\[(\d+)\]")
+_SHELL = re.compile(r"\$\{[^{}]*\}")
 _BRACED = re.compile(r"\{ *([A-Za-z_]\w*) *\} *$")
 _UNSPACED = re.compile(r" *(?:- +)*([A-Za-z_]\w*):([^\s:#/][^:#]*)$")
 _QUOTES = {
@@ -104,11 +106,15 @@ def _second_colon(source: Source, text: str, span: Span) -> _Said:
 
 
 def _cut_text(problem: str, text: str, span: Span) -> _Said | None:
-    """A text that a bracket ends inside { } and [ ]: ``$a[0] > 2``."""
+    """A text that a bracket or a brace ends inside { } and [ ]: ``$a[0] > 2``, ``${a}``."""
     if "expected ','" not in problem and "cannot start any token" not in problem:
         return None
     at = span.column - 1
     start = max(0, at - _REACH)
+    for match in _SHELL.finditer(text[start : at + _REACH]):
+        if start + match.start() + 1 == at:
+            message = f"'{{' ends a text inside {{ }} and [ ], so {match[0]!r} is cut"
+            return _Said(span, message, notation_here(match[0]), "BT118")
     for match in _BRACKETED.finditer(text[start : at + _REACH]):
         rest = text[start + match.end() : at]
         if start + match.start(2) != at and (start + match.end() > at or rest.strip()):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from bt_actions.document.elsewhere import type_here
 from bt_actions.ros.fields import (
     FLOATS,
     INTEGERS,
@@ -52,7 +53,7 @@ def parse_type(text: str, *, types: bool = True) -> FieldType | None:
     match = _SYNTAX.fullmatch(text)
     listed = "[" in text
     if match is None or listed != (match[5] is not None) or (match[2] and match[1] != "string"):
-        raise TypeNameError(f"{text!r} is no type")
+        raise TypeNameError(f"{text!r} is no type{_instead(text)}")
     item = _item(match[1], int(match[2]) if match[2] else None, types)
     if item is None or not listed:
         return item
@@ -66,12 +67,17 @@ def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
     if name in PLAIN_TYPES:
         return Scalar(name, limit)
     if "/" not in name:
-        near = did_you_mean(name, PLAIN_TYPES)
+        near = _instead(name) or did_you_mean(name, PLAIN_TYPES)
         known = near or f"; there is {', '.join(PLAIN_TYPES)}, and package/msg/Name"
         raise TypeNameError(f"{name!r} is no type{known}")
     if not types:
         return None
     return Message(interface_of(name, "msg"))
+
+
+def _instead(text: str) -> str:
+    here = type_here(text)
+    return f": {here}" if here else ""
 
 
 def interface_of(name: str, kind: Kind) -> type:

@@ -17,6 +17,7 @@ from typing import Final
 from bt_actions.document.bounds import MAX_ITEMS, refuse_large
 from bt_actions.document.braces import report_braces
 from bt_actions.document.cut import cut_hint, warn_cut
+from bt_actions.document.elsewhere import notation_here
 from bt_actions.document.findings import DocumentError
 from bt_actions.document.inner import inner_span
 from bt_actions.document.nodes import (
@@ -220,7 +221,9 @@ def _interpolated(node: Scalar, source: Source) -> object:
             continue
         if match[1] is None:
             span = inner_span(node, source, match.start(), match.end())
-            hint = "write $(name) inside a text, and $$ for a dollar sign"
+            hint = notation_here(text, match.start())
+            if hint is None:
+                hint = "write $(name) inside a text, and $$ for a dollar sign"
             if _lacks_space(text):
                 hint = f"write '= {text[1:]}' with a space to compute it"
             elif _computes(text):
@@ -230,7 +233,7 @@ def _interpolated(node: Scalar, source: Source) -> object:
         written = "$" + match[1].strip()
         if not _VARIABLE.fullmatch(written):
             span = inner_span(node, source, match.start(), match.end())
-            hint = "$(name) or $(name.field)"
+            hint = notation_here(text, match.start()) or "$(name) or $(name.field)"
             source.report("BT115", span, f"{match[0]} holds no variable's name", hint=hint)
             return BAD
         part = _computed(node, source, written, match.start(1) - 1)
@@ -253,7 +256,8 @@ def read_expression(
         return _expression(text, roots)
     except ExpressionError as error:
         span = inner_span(node, source, start + error.column, start + error.end_column)
-        source.report("BT114", span, error.message, hint=cut_hint(node, source))
+        hint = cut_hint(node, source) or notation_here(text, computes=True)
+        source.report("BT114", span, error.message, hint=hint)
         return None
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bt_actions.document.elsewhere import package_here
 from bt_actions.document.find import TreeNotFoundError, find_tree
 from bt_actions.document.findings import DocumentError, Finding, Related
 from bt_actions.document.nodes import Listing, Node, span_of
@@ -135,7 +136,9 @@ class Workspace:
         try:
             path = find_tree(wanted, beside=beside)
         except TreeNotFoundError as error:
-            source.report("BT209", span_of(written), str(error))
+            hint = package_here(wanted)
+            text = f"there is no tree {wanted!r}" if hint else str(error)
+            source.report("BT209", span_of(written), text, hint=hint)
             return None
         if path.suffix not in SUFFIXES and _is_file(path):
             text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"

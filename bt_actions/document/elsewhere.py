@@ -1,0 +1,215 @@
+"""What people write who come from other tools, and what is written here instead.
+
+Tables of words, and the notations of variables and files that other tools have. Whoever reports a
+mistake asks here before it asks what is spelled alike: `Switch` is no 'wait'.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+from collections.abc import Mapping as MappingType
+
+from bt_actions.suggest import folded
+
+__all__ = ["as_mapping", "key_here", "kind_here", "notation_here", "package_here", "type_here"]
+
+
+def _table(rows: MappingType[str, str]) -> dict[str, str]:
+    """What is written here, by each of the words that stand behind it."""
+    return {word: here for here, words in rows.items() for word in words.split()}
+
+
+_OFTEN = "children that succeeded are not run again within a visit"
+_KINDS = _table(
+    {
+        "here it is 'sequence'": "serial series steps block asyncsequence",
+        f"here it is 'sequence': {_OFTEN}": "sequencewithmemory sequencestar memsequence",
+        "here it is 'sequence' with 'memory: false'": "reactivesequence",
+        "here it is 'fallback'": "selector asyncfallback fallbackstar selectorwithmemory try",
+        "here it is 'fallback' with 'memory: false'": "reactivefallback reactiveselector",
+        "here it is 'parallel'": "parallelall parallelnode concurrent all join gather",
+        "here it is 'while'": "whiledoelse eternalguard",
+        "here it is 'invert'": "inverter not negate",
+        "here it is 'retry'": "retryuntilsuccessful retryuntilsuccesful failureisrunning",
+        "here it is 'repeat'": "keeprunninguntilfailure successisrunning",
+        "here it is 'repeat', 'while' or 'for_each'": "loop",
+        "here it is 'for_each'": "for each",
+        "here it is 'force_success'": "succeeder failureissuccess",
+        "here it is 'force_failure'": "failer successisfailure",
+        "here it is 'success'": "alwayssuccess succeed",
+        "here it is 'failure'": "alwaysfailure fail",
+        "here it is 'run_once'": "oneshot once",
+        "here it is 'wait'": "delay sleep timer pause",
+        "here it is 'wait_until'": "waitfor waitforblackboardvariable "
+        "waitforblackboardvariablevalue",
+        "here it is 'wait_for_message'": "subscribe subscriber topic waitfortopic",
+        "here it is 'publish'": "publisher topicpublisher",
+        "here it is 'subtree'": "include tree calltree subtreeplus",
+        "here it is 'set'": "script setblackboard setblackboardvariable setvariable assign",
+        "here it is 'check'": "scriptcondition precondition condition ifcondition guard assert "
+        "checkblackboardvariablevalue",
+        "here it is 'log'": "print echo say debug",
+        "here it is 'service'": "callservice servicecall serviceclient call",
+        "here it is 'action'": "sendgoal actionclient",
+        "write a 'fallback' of 'sequence's, each with its 'check' first": "switch case match",
+        "write a 'fallback' of two 'sequence's: one has the 'check' first, the other its opposite":
+        "if ifthenelse",
+        "write a 'repeat' of a 'sequence' that has a 'wait' last": "every ratecontroller rate "
+        "throttle periodic",
+        "write a 'retry' of a 'fallback': the work, then a 'force_failure' of what recovers":
+        "recover recovery recoverynode",
+        "write a 'fallback' of 'sequence's, each with a 'check' of whose turn it is and a 'set' of "
+        "the next": "roundrobin",
+        "write a 'parallel' in which a 'repeat' does the earlier part again": "pipeline "
+        "pipelinesequence",
+    }
+)  # fmt: skip
+"""What a kind of node is called elsewhere, in small letters and without underscores."""
+_FIELDS = ("goal", "request", "message", "with", "arguments", "inputs")
+_AGAIN = "retry: {attempts: 3, backoff: 2 s}"
+_KEYS: dict[str, tuple[str, ...]] = {
+    word: here
+    for words, here in {
+        "name id": ("tree", "topic", "server"),
+        "params parameters args fields": _FIELDS,
+        "input inputs": ("with", *_FIELDS),
+        "vars variables arg": ("inputs", "with"),
+        "output outputs register": ("save",),
+        "retries restart numattempts maxattempts maxretries tries": ("attempts", "retry"),
+        "numcycles cycles count": ("times", "attempts"),
+        "delay delayms pause": ("after", "backoff", _AGAIN),
+        "msec seconds duration timeoutms": ("after", "timeout"),
+        "until successcondition condition": ("expect", "when", "until"),
+        "threshold successthreshold successcount": ("policy",),
+        "actionname servername servicename remap remappings": ("server",),
+        "topicname": ("topic",),
+        "interface actiontype servicetype topictype messagetype msgtype": ("type",),
+        "msg data": ("message", "request", "goal"),
+        "nodes steps tasks body do": ("children", "child"),
+        "items over list": ("in",),
+        "var loopvar": ("as",),
+    }.items()
+    for word in words.split()
+}
+"""What a key is called elsewhere, and the keys here: the first that can stand in the place."""
+_INSTEAD: dict[str, tuple[str, str]] = {
+    word: (beside, here)
+    for words, beside, here in (
+        ("loop withitems", "", "put the node into a 'for_each'"),
+        ("when if onlyif skipif precondition", "",
+         "put a 'check' before the node, in a 'sequence'"),
+        ("onsuccess post", "", "put a 'set' behind the node, in a 'sequence'"),
+        ("dependson requires", "", "the children of a 'sequence' run one after the other"),
+        ("environment env envfile", "",
+         "a tree starts no programs: set their environment where they start"),
+        ("launch", "actions", "a tree starts no programs: that is for ROS launch"),
+        ("version apiversion btcppformat", "actions", "a tree has no version: leave it away"),
+        ("pkg package", "type", "the package is a part of the type, as in std_msgs/msg/Bool"),
+        ("min max minimum maximum range", "default",
+         "an input has no limits: begin the tree with a 'check'"),
+    )
+    for word in words.split()
+}  # fmt: skip
+"""What to do in the place of a key that there is not, where another key could stand beside it."""
+_TYPES = _table(
+    {
+        "write float64": "double real",
+        "write float32 or float64": "float number",
+        "write int32 or int64": "int integer",
+        "write uint32 or uint64": "uint unsigned",
+        "write int64": "long",
+        "write int16": "short",
+        "write uint8": "char",
+        "write bool": "boolean",
+        "write string": "str text",
+        "write float64 for seconds": "duration time",
+        "a list is written float64[], string[], ...": "list array vector tuple sequence",
+        "a mapping is written as a message's type: package/msg/Name": "dict map object mapping any",
+    }
+)
+"""What a type is called elsewhere."""
+_REACH = 300
+"""So much of a text is looked at."""
+_ASSIGNED = re.compile(r"\$?([A-Za-z]\w*)\s*:?=\s*([^\s=][^=]*)", re.ASCII)
+_PACKAGE = re.compile(r"\$\(find(?:-pkg-share)? +([\w-]+)\)/*(\S+)", re.ASCII)
+_NOTATION = re.compile(
+    r"""(?P<environment> \$\{ \w+ :?[-=?+] [^{}]* \} | \$\( (?:opt)?env \s [^()]* \) )
+    | (?P<launch> \$\( (?:find|find-pkg-\w+|eval|command) \b [^()]* \) )
+    | \$\( (?:var|arg) \s+ (?P<arg>[A-Za-z_][\w.]*) \s* \)
+    | (?:\$\{|\{\{?\ *@?) \ * (?P<name>[A-Za-z_][\w.]*) \ * \}\}?""",
+    re.VERBOSE | re.ASCII,
+)
+
+
+def kind_here(word: str) -> str | None:
+    """What to write for a kind of node that is called so elsewhere: ``here it is 'fallback'``."""
+    wanted = folded(word)
+    return _KINDS.get(wanted) or _KINDS.get(wanted.rstrip("0123456789"))  # BehaviorTree's Switch2
+
+
+def key_here(word: str, known: Container[str]) -> tuple[str | None, str | None]:
+    """What to write for a key where `known` can stand: another key, or something else to do."""
+    wanted = folded(word)
+    for key in _KEYS.get(wanted, ()):
+        if key.partition(":")[0] in known:
+            return key, None
+    beside, instead = _INSTEAD.get(wanted, ("", ""))
+    return None, instead if not beside or beside in known else None
+
+
+def type_here(text: str) -> str | None:
+    """What to write for a type that is called so elsewhere: ``write float64``."""
+    word = re.match("[A-Za-z]+", text)
+    return _TYPES.get(folded(word[0])) if word is not None and "/" not in text else None
+
+
+def notation_here(text: str, at: int | None = None, *, computes: bool = False) -> str | None:
+    """What to write for a variable in the notation of other tools: ``{x}``, ``${x}``, ``{{ x }}``.
+
+    Looks at the place `at`, or for the first. `computes` says that the text is an expression, in
+    which a variable is never `$(x)`.
+    """
+    find = _NOTATION.search if at is None else _NOTATION.match
+    found = find(text, at or 0, (at or 0) + _REACH)
+    if found is None:
+        return None
+    if found["environment"]:
+        return "the environment is not read: write the value, or '$name' for an input"
+    if found["launch"]:
+        return "what ROS launch puts in is not read: write the value, or '$name' for an input"
+    name = found["name"] or found["arg"]
+    rest = ", and the environment is not read" if name.isupper() else ""
+    if computes or found[0] == text.strip():
+        return f"a variable is written ${name}{rest}"
+    return f"inside a text a variable is written $({name}){rest}"
+
+
+def package_here(text: str) -> str | None:
+    """What to write for a tree's file as ROS launch finds it in a package."""
+    found = _PACKAGE.match(text[:_REACH])
+    return None if found is None else f"write package://{found[1]}/{found[2]}"
+
+
+def as_mapping(text: str, root: str | None = None) -> str | None:
+    """What to write for a mapping that was written as ``a=1, b=2``.
+
+    With `root`, a name by itself is meant as its part: `x` as `{x: result.x}`.
+    """
+    if text.startswith("{") and ":" in text and text.endswith("}"):
+        return "without its quotes it is a mapping"
+    pairs = [_pair(part.strip(), root) for part in text[:_REACH].split(",")]
+    told = [pair for pair in pairs if pair is not None]
+    return f"write {{{', '.join(told)}}}" if told == pairs and len(text) <= _REACH else None
+
+
+def _pair(part: str, root: str | None) -> str | None:
+    found = _ASSIGNED.fullmatch(part)
+    if found is not None:
+        name, value = found.groups()
+        computes = "$" in value and re.fullmatch(r"\$[\w.]+", value) is None
+        return f"{name}: {'= ' if computes and root is None else ''}{value}"
+    name = part.rpartition(".")[2]
+    if root is None or re.fullmatch("[A-Za-z][A-Za-z0-9_.]*", part) is None or not name:
+        return None
+    return f"{name}: {part if '.' in part or not root else f'{root}.{part}'}"
