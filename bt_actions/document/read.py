@@ -7,14 +7,15 @@ part that was reported stands as BAD, so that nothing is said about it twice.
 from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
+from itertools import chain
 
 from bt_actions.document.elsewhere import kind_here
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS, Kind
 from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
 from bt_actions.document.scalars import Name
-from bt_actions.document.shape import words_for
-from bt_actions.document.shapes import Key, read_keys, report_unknown_key, required_in
+from bt_actions.document.shape import words_for, wrong_form
+from bt_actions.document.shapes import Key, Table, read_keys, report_unknown_key, required_in
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
@@ -30,6 +31,10 @@ _NODE_KEYS = frozenset(
 """All that may stand in a node beside its kind."""
 _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
+_BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
+"""Kinds that are taken for keys in a node whose kind stands behind 'type:'."""
+_FIELDS = ("goal", "request", "message")
+"""Keys for the fields of what a node sends."""
 
 
 def read_document(source: Source, *, library: bool = False) -> Document | None:
@@ -160,7 +165,7 @@ class _Reader:
             message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
             source.report("BT111", span_of(written), message, hint=hint)
             return None
-        key = self._kind_key(written)
+        key = None if self._typed(written) else self._kind_key(written)
         if key is None:
             self._only_children(written)
             return None
@@ -172,6 +177,29 @@ class _Reader:
         else:
             self._fill(node, kind.keys, kind, _NEEDS[kind.name])
         return node
+
+    def _typed(self, written: Mapping) -> bool:
+        """Whether a node says its kind behind 'type:', which is reported."""
+        said = written.get("type")
+        if not isinstance(said, Scalar) or "/" in said.text:
+            return False
+        kinds = {folded(kind): kind for kind in (*KINDS, *self._actions)}
+        word, here = kinds.get(folded(said.text)), kind_here(said.text)
+        keys = {key.text for key, _ in written.pairs if key.text in kinds.values()}
+        if not (word or (here and "action" not in keys)) or keys - _BESIDE_TYPE:
+            return False
+        name, action = written.get("name"), written.get("action")
+        if word == "action" and isinstance(action, Scalar):
+            if action.text in self._actions or name is not None:
+                word = action.text
+            else:
+                name = action
+        if word:
+            here = f"write '{word}: {name.text if isinstance(name, Scalar) else '...'}'"
+        key = next(key for key, inner in written.pairs if inner is said)
+        self._source.report("BT111", span_of(key), "a node's kind is its key", hint=here)
+        self._source.unread.actions = True
+        return True
 
     def _kind_key(self, written: Mapping) -> Scalar | None:
         """The one key that is a kind or an alias, or None after reporting."""
@@ -195,8 +223,15 @@ class _Reader:
             return None
         words = [key for key, _ in written.pairs if key.text not in _NODE_KEYS]
         beside = [key for key, _ in written.pairs if key.text in _BESIDE_CHILD]
-        if len(beside) == 1 and not words and written.get("children") is not None:
-            return beside[0]  # with 'children' in the place of 'child'
+        if (
+            len(beside) == 1
+            and not words
+            and (
+                written.get("children") is not None
+                or self._holds_nodes(written.get(beside[0].text))
+            )
+        ):
+            return beside[0]  # with what it holds in the place of 'child'
         self._report_no_kind(written, words)
         return None
 
@@ -235,11 +270,18 @@ class _Reader:
     ) -> None:
         source = self._source
         unknown = False
-        for key, inner in node.node.pairs:
+        beside: list[tuple[Scalar, Node]] = []
+        for key, inner in chain(node.node.pairs, beside):
             name = key.text
             if key is node.key:
                 node.written[name] = inner
-                value = kind.value.read(inner, source)
+                hint = None
+                if not isinstance(inner, Scalar):
+                    hint = self._below_name(node, inner, kind, keys, beside)
+                if hint is None:
+                    value = kind.value.read(inner, source)
+                else:
+                    value = wrong_form(kind.value, inner, source, hint=hint)
                 node.values[name] = value
                 if kind.named_by_value and isinstance(value, str):
                     node.name = value
@@ -274,6 +316,57 @@ class _Reader:
                     f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,
                 )  # fmt: skip
                 source.unread.nodes.append(node.key)
+
+    def _below_name(
+        self,
+        node: TreeNode,
+        inner: Node,
+        kind: Kind,
+        keys: MappingType[str, Key],
+        beside: list[tuple[Scalar, Node]],
+    ) -> str | None:
+        """What to write for a collection that stands below a kind's word, in the place of a name.
+
+        It is read on as if it stood where it belongs: keys that belong beside the word are added to
+        `beside`. None, where nobody can tell what is meant.
+        """
+        if isinstance(kind.value, Table):
+            return None
+        write = f"write '{node.key.text}: {'name' if kind.named_by_value else '...'}'"
+        held = next((name for name in _CHILDREN if name in keys), None)
+        fields = next((name for name in _FIELDS if name in keys), None)
+        if isinstance(inner, Mapping):
+            names = {key.text for key, _ in inner.pairs}
+            known = names & {*keys, "name"}
+            if known and (fields is None or known == names or known & {fields, "type"}):
+                beside += [pair for pair in inner.pairs if pair[0].text != "name"]
+                name = inner.get("name")
+                if isinstance(name, Scalar) and kind.named_by_value:
+                    write = f"write '{node.key.text}: {name.text}'"
+                return f"{write}, and the keys beside it"
+            if fields is not None:
+                return f"{write}, and the fields beside it, under '{fields}:'"
+        if held is None or not kind.named_by_value or node.node.get(held) is not None:
+            return None
+        if not self._holds_nodes(inner):
+            return None
+        node.written[held] = inner
+        items = inner.items if isinstance(inner, Listing) else [inner]
+        self._waiting += [(node, item) for item in reversed(items)]
+        what = "list" if held == "children" else "node"
+        if what == "node" and len(items) > 1:
+            what = "'sequence' of these nodes"
+        return f"{write}, and the {what} beside it, under '{held}:'"
+
+    def _holds_nodes(self, inner: Node | None) -> bool:
+        """Whether this is a list, or a node, rather than a setting."""
+        return isinstance(inner, Listing) or (
+            isinstance(inner, Mapping)
+            and any(
+                key.text in KINDS or key.text in _CHILDREN or key.text in self._actions
+                for key, _ in inner.pairs
+            )
+        )
 
     def _report_unknown(self, node: TreeNode, key: Scalar, keys: MappingType[str, Key]) -> None:
         if key.text in _CHILDREN:
