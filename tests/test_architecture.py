@@ -31,6 +31,7 @@ TOOLS = {
     "expression_text",
     "expression_values",
     "plain_text",
+    "shorten",
     "streams",
     "suggest",
     "ticking",

@@ -1,0 +1,96 @@
+"""Any value as one short text for people, in time that does not grow with the value.
+
+No ROS here: a message is recognised by what it can do. Nothing is made a text as a whole first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import islice
+
+__all__ = ["shorten"]
+
+_ALL = 20
+"""A list with more items is shown by its first ones and their number."""
+_FIRST = 3
+_NOTHING = object()
+Part = tuple[str, object]
+"""A text, and a value that stands behind it (or `_NOTHING`)."""
+
+
+def shorten(value: object, limit: int = 300) -> str:
+    """Return a value as people write it in a tree: ``{x: 1.0, on: true, name: 'a'}``.
+
+    A long list is ``[7, 7, 7, … 4000000 items]``; a text of more than `limit` characters is cut,
+    and then ends with an ellipsis. Raises nothing, whatever the value's own methods do.
+    """
+    text = ""
+    stack: list[Iterator[Part]] = [iter((("", value),))]
+    while stack and len(text) <= limit:
+        try:
+            before, item = next(stack[-1])
+        except StopIteration:
+            stack.pop()
+            continue
+        except Exception:  # noqa: BLE001 - a value's own methods may raise anything
+            stack.pop()
+            before, item = "…", _NOTHING
+        text += before
+        if item is _NOTHING:
+            continue
+        try:
+            parts = _parts(item)
+        except Exception:  # noqa: BLE001 - as above
+            parts = None
+        if parts is None:
+            text += _scalar(item, limit)
+        else:
+            stack.append(parts)
+    return text if len(text) <= limit else f"{text[: limit - 1]}…"
+
+
+def _parts(value: object) -> Iterator[Part] | None:
+    """What a value with others in it is made of; None for one that holds no others."""
+    fields = getattr(type(value), "get_fields_and_field_types", None)
+    if fields is not None:
+        return _braced((f"{name}: ", getattr(value, name)) for name in fields())
+    if isinstance(value, Mapping):
+        return _braced((f"{key if isinstance(key, str) else _scalar(key, 40)}: ", item)
+                       for key, item in value.items())  # fmt: skip
+    is_array = type(value).__module__ in ("array", "numpy") and getattr(value, "shape", True)
+    is_bytes = isinstance(value, bytes | bytearray) and len(value) != 1  # one is a byte of ROS
+    if isinstance(value, list | tuple) or is_array or is_bytes:
+        return _listed(value)  # type: ignore[arg-type]
+    return None
+
+
+def _braced(members: Iterator[Part]) -> Iterator[Part]:
+    yield "{", _NOTHING
+    for at, (name, item) in enumerate(members):
+        yield f", {name}" if at else name, item
+    yield "}", _NOTHING
+
+
+def _listed(items: list[object]) -> Iterator[Part]:
+    size = len(items)
+    shown = size if size <= _ALL else _FIRST
+    yield "[", _NOTHING
+    for at, item in enumerate(islice(items, shown)):
+        yield ", " if at else "", item
+    yield f", … {size} items]" if shown < size else "]", _NOTHING
+
+
+def _scalar(value: object, limit: int) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    try:
+        if isinstance(value, str):
+            return repr(value[: limit + 1])
+        if isinstance(value, bytes):
+            return str(value[0])
+        to_python = getattr(value, "tolist", None)  # a scalar of numpy
+        return repr(value if to_python is None else to_python())
+    except Exception:  # noqa: BLE001 - as above
+        return f"<{type(value).__name__}>"

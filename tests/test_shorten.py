@@ -1,0 +1,87 @@
+"""The rules of short texts of values, as sentences."""
+
+from __future__ import annotations
+
+import array
+import time
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bt_actions.shorten import shorten
+
+
+class Point:
+    """A message, as far as anybody here can see."""
+
+    def __init__(self) -> None:
+        self.x, self.on, self.data = 1.5, True, array.array("B", [1, 2])
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        return {"x": "double", "on": "boolean", "data": "sequence<uint8>"}
+
+
+class Rude:
+    def __repr__(self) -> str:
+        raise RuntimeError("no")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1, "1"),
+        (True, "true"),
+        (None, "nothing"),
+        ("it's", '"it\'s"'),
+        ([1, 2.5, "a"], "[1, 2.5, 'a']"),
+        ((), "[]"),
+        ({"a": {"b": [1]}, 2: None}, "{a: {b: [1]}, 2: nothing}"),
+        (Point(), "{x: 1.5, on: true, data: [1, 2]}"),
+        (b"\x07", "7"),
+        (b"\x07\x08", "[7, 8]"),
+        (array.array("i", [7]) * 4_000_000, "[7, 7, 7, … 4000000 items]"),
+        (np.zeros(3), "[0.0, 0.0, 0.0]"),
+        (np.float64(2.0), "2.0"),
+        ([[7] * 100] * 2, "[[7, 7, 7, … 100 items], [7, 7, 7, … 100 items]]"),
+        ([Rude()], "[<Rude>]"),
+        (SimpleNamespace(a=1), "namespace(a=1)"),
+    ],
+)
+def test_a_value_is_shown_as_it_is_written_and_a_long_list_by_its_length(
+    value: object, text: str
+) -> None:
+    assert shorten(value) == text
+
+
+def test_what_is_longer_than_the_limit_ends_with_an_ellipsis() -> None:
+    assert shorten("a" * 1000, 10) == "'aaaaaaaa…"
+    assert shorten({"a": "b" * 10, "c": "d" * 10}, 25) == "{a: 'bbbbbbbbbb', c: 'dd…"
+    assert shorten([1, 2, 3], 9) == "[1, 2, 3]"
+
+
+def test_no_value_takes_long_however_much_it_holds() -> None:
+    doubled: list[Any] = [1]
+    for _ in range(5000):
+        doubled = [doubled, doubled]
+    itself: list[Any] = []
+    itself.append(itself)
+    for value in (doubled, itself, "a" * 100_000_000, array.array("d", [0.5]) * 10_000_000):
+        started = time.thread_time()
+        assert len(shorten(value)) <= 300
+        assert time.thread_time() - started < 0.05
+
+
+VALUES = st.recursive(
+    st.integers() | st.text() | st.binary() | st.floats(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+)
+
+
+@given(VALUES, st.integers(1, 80))
+def test_no_text_is_longer_than_the_limit(value: object, limit: int) -> None:
+    assert len(shorten(value, limit)) <= limit
