@@ -17,9 +17,9 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Access, Status
 
 from bt_actions.attempts import AttemptRecord, Attempts
-from bt_actions.behaviours.conditions import condition_of, expression_of, unknown_field
+from bt_actions.behaviours.conditions import condition_of, function_of, unknown_field
 from bt_actions.behaviours.node import node_in
-from bt_actions.behaviours.variables import key, read, resolve, variables_in, write
+from bt_actions.behaviours.variables import key, resolve, variables_in, write
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.goal_terms import Event
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
@@ -72,9 +72,8 @@ class ActionBehaviour(Behaviour):
         retry: how often and when to try again; a bare number is the attempts in all.
         expect: what a result must be, beyond the server's word: a callable on the result message,
             or an expression over ``result`` and blackboard variables (``result.stalled``).
-        save: blackboard keys, and the place in the result that each is set from on success
-            (``{"final_pose": "result.final_pose"}``).
-        fit: called with each key of `save` and its value; returns the value to set. Raising
+        save: blackboard keys, and what each is set to on success: an expression as for `expect`
+            (``{"final_pose": "result.final_pose"}``), or a function of the result. Raising
             ValueError makes the result an unexpected one.
         busy: what to do when the resources are taken: wait, replace, fail or share.
         resources: what the goal occupies, in place of the action server; named as servers are, so
@@ -94,8 +93,7 @@ class ActionBehaviour(Behaviour):
         timeout: Timeouts | float | None = None,
         retry: Retry | int = 1,
         expect: Callable[[Any], bool] | str | None = None,
-        save: Mapping[str, str | Expression] | None = None,
-        fit: Callable[[str, Any], Any] | None = None,
+        save: Mapping[str, str | Callable[[Any], Any]] | None = None,
         busy: Busy | str = "wait",
         resources: Iterable[str] | None = None,
         on_feedback: Callable[[Any], None] | None = None,
@@ -115,11 +113,8 @@ class ActionBehaviour(Behaviour):
         self._expect = condition_of(expect, "expect")
         self._expect_text = expect if isinstance(expect, str) else getattr(expect, "text", "")
         self._when = condition_of(self.retry.when, "retry.when")
-        self._save = {
-            target: expression_of(place, "save") for target, place in (save or {}).items()
-        }
-        self.save = {target: place.text for target, place in self._save.items()}
-        self._fit = fit
+        self.save = dict(save or {})
+        self._save = {key: function_of(place, "save") for key, place in self.save.items()}
         self._to_save: dict[str, Any] = {}
         self._traffic: Traffic | None = None
         self._line: Any = None
@@ -389,10 +384,11 @@ class ActionBehaviour(Behaviour):
                 fill(action.Goal, self.goal)
             except MessageError as error:
                 raise ValueError(f"{self.name}: goal: {error}") from error
-        texts = {"expect": self.expect, "retry.when": self.retry.when}
-        conditions = {each: Expression(text) for each, text in texts.items() if type(text) is str}
-        for what, place in [*conditions.items(), *(("save", each) for each in self._save.values())]:
-            if wrong := unknown_field(place, "result", action.Result):
+        saved = (("save", place) for place in self.save.values())
+        for what, text in (("expect", self.expect), ("retry.when", self.retry.when), *saved):
+            if not isinstance(text, str):
+                continue
+            if wrong := unknown_field(Expression(text), "result", action.Result):
                 raise ValueError(f"{self.name}: {what}: {wrong}")
 
     def _judge(self, ticket: Ticket) -> AttemptRecord:
@@ -427,17 +423,12 @@ class ActionBehaviour(Behaviour):
         try:
             if self._expect is not None and not self._expect(result):
                 return self._unexpected(result)
-            roots = {"result": result}
-            self._to_save = {
-                target: place.evaluate(roots, read) for target, place in self._save.items()
-            }
         except ExpressionError as error:
             return str(error)
-        if self._fit is not None:
-            try:
-                self._to_save = {key: self._fit(key, value) for key, value in self._to_save.items()}
-            except ValueError as error:
-                return str(error)
+        try:
+            self._to_save = {key: value(result) for key, value in self._save.items()}
+        except ValueError as error:  # ExpressionError, or what is saved does not fit
+            return str(error)
         return ""
 
     def _unexpected(self, result: Any) -> str:

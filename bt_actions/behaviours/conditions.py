@@ -23,10 +23,16 @@ def condition_of(
     """
     if given is None or callable(given):
         return given
-    if not isinstance(given, str):
-        raise ValueError(f"{what} must be a callable on the result or an expression as text")
-    expression = expression_of(given, what)
+    expression = _expression(given, what)
     return lambda result: expression.holds({"result": result}, read)
+
+
+def function_of(given: Callable[[Any], Any] | str, what: str) -> Callable[[Any], Any]:
+    """As `condition_of`, for any value."""
+    if callable(given):
+        return given
+    expression = _expression(given, what)
+    return lambda result: expression.evaluate({"result": result}, read)
 
 
 def unknown_field(expression: Expression, root: str, message_type: Any) -> str:
@@ -40,10 +46,10 @@ def unknown_field(expression: Expression, root: str, message_type: Any) -> str:
     return ""
 
 
-def expression_of(text: str | Expression, what: str) -> Expression:
-    """Return the text as an expression; raises ValueError, naming `what` it was given for."""
-    if isinstance(text, Expression):
-        return text
+def _expression(text: object, what: str) -> Expression:
+    """The text as an expression; raises ValueError, naming `what` it was given for."""
+    if not isinstance(text, str):
+        raise ValueError(f"{what} must be a callable on the result or an expression as text")
     try:
         return Expression(text)
     except ExpressionError as error:

@@ -28,9 +28,7 @@ from bt_actions.document.findings import PLACE
 from bt_actions.document.inputs import check_inputs
 from bt_actions.document.scope import Scope
 from bt_actions.document.tree import Declared, Document, TreeNode
-from bt_actions.document.values import resolve
 from bt_actions.document.writes import writes_of
-from bt_actions.expression import ExpressionError
 
 __all__ = ["BUILDERS", "build"]
 
@@ -172,7 +170,7 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     scope = context.scope.inner(included.name)
     namespace = join_names(context.namespace, text_of(node.values, "namespace"))
     child = build(included, scope, namespace=namespace, types=context.types, python=context.python)
-    given = node.values.get("with", {})
+    given = context.value(node.values.get("with", {}))
     saved = table_of(node.values.get("save"))
     written = {declared.name for declared in included.outputs.values()}
     written |= _writes(included, included.nodes())
@@ -181,7 +179,7 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
             written -= _writes(included, inner.walk())  # which is not done again
 
     def begin() -> None:
-        values = _resolved(given, context)
+        values = given()
         if not isinstance(values, dict):
             raise ValueError(f"'with' needs a mapping of inputs to values, not {values!r:.60}")
         try:
@@ -207,13 +205,6 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
 def _writes(document: Document, nodes: Iterable[TreeNode]) -> set[str]:
     """The names of the variables that some nodes of a tree write."""
     return {each.name for node in nodes for each in writes_of(node, document)}
-
-
-def _resolved(written: object, context: Context) -> object:
-    try:
-        return resolve(written, context.read)
-    except ExpressionError as error:
-        raise ValueError(error.message) from None
 
 
 BUILDERS: Mapping[str, Callable[[TreeNode, Context], Behaviour]] = MappingProxyType(

@@ -33,11 +33,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
     settings = settings_of(node, context.document)
     goal = settings.get("goal", {})
     dynamic = any(True for _ in computed_in(goal))
-    save = {
-        context.scope.key(name): place.expression
-        for name, place in table_of(settings.get("save")).items()
-    }
-    names = {context.scope.key(name): name for name in table_of(settings.get("save"))}
+    saved = context.saved(settings.get("save"), "result")
     given = settings.get("resources")
     resources = given if isinstance(given, list) else []
     return ActionBehaviour(
@@ -48,8 +44,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         timeout=_timeouts(tuple(table_of(settings.get("timeout")).items())),
         retry=_retry(settings, context),
         expect=context.condition(settings.get("expect"), "result"),
-        save=save,
-        fit=lambda key, value: context.fitting(names[key], value),
+        save={context.scope.key(name): part for name, part in saved.items()},
         busy=text_of(settings, "busy") or "wait",
         resources=[context.joined(settings, str(each)) for each in resources],
     )
@@ -93,19 +88,12 @@ def _check(node: TreeNode, context: Context) -> Behaviour:
 
 def _saver(node: TreeNode, context: Context, root: str) -> Callable[[Any], None] | None:
     """What keeps parts of an answer or a message, as `save` says."""
-    saved = table_of(node.values.get("save"))
+    saved = context.saved(node.values.get("save"), root)
     if not saved:
         return None
-
-    def save(given: Any) -> None:
-        context.write(
-            {
-                name: place.expression.evaluate({root: given}, context.read)
-                for name, place in saved.items()
-            }
-        )
-
-    return save
+    return lambda given: context.scope.write_all(
+        {name: part(given) for name, part in saved.items()}
+    )
 
 
 def _service(node: TreeNode, context: Context) -> Behaviour:

@@ -74,6 +74,16 @@ class Context:
             return None
         return Condition(written.expression, root, self.read)
 
+    def saved(self, written: object, root: str) -> dict[str, Callable[[Any], object]]:
+        """What `save` keeps, by the variable's name, as functions of a bare root.
+
+        They raise ValueError for what has no value, or does not fit its variable.
+        """
+        return {
+            name: Part(place.expression, root, self, name)
+            for name, place in table_of(written).items()
+        }
+
     def holds(self, written: object) -> Callable[[], bool]:
         """A condition over variables alone as a function, which raises ExpressionError."""
         assert isinstance(written, Computed)
@@ -96,6 +106,26 @@ class Condition:
     def __call__(self, given: Any) -> bool:
         """Whether it holds; raises ExpressionError."""
         return self.expression.holds({} if self.root is None else {self.root: given}, self.read)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What is kept of a result or a message, as a function of it; `text` says what that is."""
+
+    expression: Expression
+    root: str
+    context: Context
+    name: str
+
+    @property
+    def text(self) -> str:
+        """The expression as it was written."""
+        return self.expression.text
+
+    def __call__(self, given: Any) -> object:
+        """The value as its variable wants it; raises ValueError."""
+        value = self.expression.evaluate({self.root: given}, self.context.read)
+        return self.context.fitting(self.name, value)
 
 
 def table_of(value: object) -> dict[str, Any]:

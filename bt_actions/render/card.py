@@ -113,10 +113,10 @@ def _action(node: Behaviour, *, from_python: bool) -> Iterator[Line]:
         yield Line("goal", _value(node.goal))
     expect = getattr(node, "expect", None)
     yield Line("expect", "no more than success" if expect is None else _condition(expect))
-    saved: Mapping[str, str] = getattr(node, "save", None) or {}
+    saved: Mapping[str, Any] = getattr(node, "save", None) or {}
     for target, place in saved.items():
         name = target if from_python else target.rpartition("/")[2]  # a document's own variable
-        yield Line("save", f"{name}: {place}")
+        yield Line("save", f"{name}: {_condition(place)}")
     yield Line("busy", str(getattr(node, "busy", "wait")))
     resources = sorted(getattr(node, "resources", None) or ())
     yield Line("resources", ", ".join(resources) or f"{action[0]} (its server)")
