@@ -9,13 +9,15 @@ large text, and raises nothing but `ExpressionError`.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Callable, Iterable, Mapping
 
-from bt_actions.expression_text import ExpressionError, translate
+from bt_actions.expression_text import ExpressionError, foreign_in, translate
 from bt_actions.expression_values import (
     BINARY,
     COMPARE,
     FUNCTIONS,
+    LENGTHS,
     MAX_BITS,
     ONE_VALUE,
     UNARY,
@@ -43,10 +45,10 @@ _FOREIGN = {
     "null": "there is no 'null' here",
     "TRUE": "write 'true'",
     "FALSE": "write 'false'",
-    "AND": "write 'and'",
-    "OR": "write 'or'",
-    "NOT": "write 'not'",
 }
+_INTERFACE = re.compile(r"[a-z]\w*(?:/(?:msg|srv|action))?/(?P<constant>[A-Z]\w*(?:\.\w+)+)")
+_COMPARED = re.compile(r"(?:[=!]=|[\[,]) *\Z")
+"""What stands before a word that may be meant as a text."""
 Variable = Callable[[str], object]
 _Roots = Mapping[str, object]
 _Closure = Callable[[_Roots, Variable], object]
@@ -154,6 +156,8 @@ class Expression:
         try:
             tree = ast.parse(stripped.rstrip(), mode="eval").body
         except SyntaxError as error:
+            if foreign := foreign_in(self.text):
+                raise foreign from None
             column = source.origin[
                 min(
                     offset + ((error.offset or 0) - 1 if error.offset else len(source.text)),
@@ -169,6 +173,10 @@ class Expression:
                     node.col_offset += offset
                 if getattr(node, "end_col_offset", None) is not None:
                     node.end_col_offset += offset  # type: ignore[attr-defined]
+        for node in ast.walk(tree) if "._" in source.text else ():
+            if isinstance(node, ast.Attribute):  # as it was written: `translate` may change it
+                end = self.span(node)[1]
+                node.attr = self.text[end - len(node.attr) : end]
         return tree
 
     def _compile(
@@ -215,6 +223,9 @@ class Expression:
                 if len(args) > 1 and name in ONE_VALUE:
                     raise self._refusal(node, f"{name}() takes one value, not {len(args)}")
                 return self._guard(node, call(name), *(part(arg) for arg in args))
+            case ast.Call(func=function, args=args) if measured := _measured(function, args):
+                start, end = self.span(measured)
+                raise self._refusal(node, f"write len({self.text[start:end]})")
         raise self._refusal(node, _why_not(node))
 
     def _compile_name(self, node: ast.Name, names: list[tuple[str, tuple[int, int]]]) -> _Closure:
@@ -226,7 +237,12 @@ class Expression:
         if node.id in _CONSTANTS:
             return _constant(_CONSTANTS[node.id])
         if node.id not in self.roots:
-            raise self._refusal(node, _unknown_name(node.id, self.roots))
+            start, end = self.span(node)
+            if path := _INTERFACE.match(self.text, start):
+                text = f"a constant is written with the name of its type alone: {path['constant']}"
+                raise ExpressionError(text, *path.span())
+            compared = _COMPARED.search(self.text, 0, start) is not None
+            raise ExpressionError(_unknown_name(node.id, self.roots, compared), start, end)
         return _root(node.id, *self.span(node))
 
     def _compile_bool(
@@ -324,23 +340,39 @@ def _syntax(text: str, column: int, error: SyntaxError) -> str:
     return "this is not an expression"
 
 
-def _unknown_name(name: str, roots: Iterable[str]) -> str:
+def _unknown_name(name: str, roots: Iterable[str], compared: bool) -> str:
     known = sorted(roots)
     if name in _FOREIGN:
         return _FOREIGN[name]
+    if foreign := foreign_in(name):
+        return foreign.message
     if name in _ANSWERS:
         instead = f"{', '.join(known)} can be used" if known else _SAVE
         return f"there is no {name} here: {instead}"
     given = "".join(f", a field {root}.{name}" for root in known)
+    given += f", a text {name!r}" if compared else ""
     if name.isupper():
         given = f", and a constant with its type, such as {_EXAMPLE}"
     return f"unknown name {name!r}: a variable is written ${name}{given}"
 
 
+def _measured(function: ast.expr, args: list[ast.expr]) -> ast.expr | None:
+    """What is measured where other languages measure: ``length($x)``, ``$x.size()``."""
+    match function:
+        case ast.Name(id=name) if name in LENGTHS and len(args) == 1:
+            return args[0]
+        case ast.Attribute(value=inner, attr=name) if name in LENGTHS and not args:
+            return inner
+    return None
+
+
 def _why_not(node: ast.expr) -> str:
     if isinstance(node, ast.Call):
-        if isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
-            return f"{node.func.id}() takes values only, not {node.keywords[0].arg or '**'}="
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        if foreign := foreign_in(name):
+            return foreign.message
+        if name in FUNCTIONS:
+            return f"{name}() takes values only, not {node.keywords[0].arg or '**'}="
         return "only len, abs, min and max can be called"
     if isinstance(node, ast.Constant) and node.value is None:
         return "there is no 'None' here"

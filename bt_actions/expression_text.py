@@ -1,10 +1,12 @@
 """The text of an expression, made readable to Python's parser without losing any place.
 
-No ROS here, and nothing is evaluated. Python knows neither `$name` nor the index in `$name.0`.
+No ROS here, and nothing is evaluated. Python knows neither `$name` nor the index in `$name.0`, and
+takes no word of its own for a field (`$leg.from`).
 """
 
 from __future__ import annotations
 
+import keyword
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -17,11 +19,18 @@ _RUN_ON = re.compile(
     r"(and|else|for|if|in|is|not|or)\b"
 )
 """A number and a word without a space between: Python reads it so far, and warns."""
+_FIELD = re.compile(rf"""'[^']*'|"[^"]*"|\.({"|".join(keyword.kwlist)})\b""")
+_FOREIGN = re.compile(
+    r"""'[^']*'|"[^"]*"|(?P<equal>[!=]==)|(?<![\w.$])(?P<word>(?!and|or|not)(?i:and|or|not))\b"""
+)
+"""What other languages write, and Python cannot read."""
+_NEGATED = re.compile(r"!\s*(\$?[\w.$\[\]]+)")
 _BAD_WORDS = {
     "&&": "write 'and'",
     "||": "write 'or'",
+    "&": "write 'and'",
+    "|": "write 'or'",
     "<>": "write '!='",
-    "!": "write 'not'",
     "?": "there is no conditional expression",
     ";": "one expression only",
     "#": "a comment has no place in an expression",
@@ -52,10 +61,15 @@ class Source(NamedTuple):
 
 
 def translate(text: str) -> Source:
-    """`$name` becomes `_name`, and the `.0` of `$name.0` becomes `[0]`, keeping the places."""
+    """`$name` becomes `_name`, and the `.0` of `$name.0` becomes `[0]`, keeping the places.
+
+    So does a field that is a word of Python's: its first letter becomes `_`.
+    """
     for match in _RUN_ON.finditer(text):
         if match[1]:
             raise ExpressionError(f"a space is missing before {match[1]!r}", *match.span(1))
+    if "." in text:
+        text = _FIELD.sub(lambda found: f"._{found[1][1:]}" if found[1] else found[0], text)
     if _SIMPLE.fullmatch(text) and "<>" not in text and not _INDEX.search(text):
         variables_at = [at for at, char in enumerate(text) if char == "$"] if "$" in text else []
         return Source(text.replace("$", "_"), range(len(text) + 1), frozenset(variables_at))
@@ -102,6 +116,16 @@ def translate(text: str) -> Source:
     return Source("".join(out), origin, frozenset(variables))
 
 
+def foreign_in(text: str) -> ExpressionError | None:
+    """What is wrong with a text that holds a word of another language outside of its quotes."""
+    for found in _FOREIGN.finditer(text):
+        if found["equal"]:
+            return ExpressionError(f"{found[0]!r}: write '{found[0][:2]}'", *found.span())
+        if found["word"]:
+            return ExpressionError(f"write {found[0].lower()!r}", *found.span())
+    return None
+
+
 def _end_of_string(text: str, start: int) -> int:
     index = start + 1
     while index < len(text) and text[index] != text[start]:
@@ -135,6 +159,10 @@ def _refuse_foreign(text: str, index: int) -> None:
     char = text[index]
     if char == "!" and text[index + 1 : index + 2] == "=":
         return
+    if char == "!":
+        negated = _NEGATED.match(text, index)
+        wanted = f"not {negated[1]}" if negated else "not"
+        raise ExpressionError(f"'!': write '{wanted}'", index)
     for word in (text[index : index + 2], char):
         if word in _BAD_WORDS:
             raise ExpressionError(f"{word!r}: {_BAD_WORDS[word]}", index, index + len(word))

@@ -22,6 +22,10 @@ ONE_VALUE = frozenset({"len", "abs"})
 """The functions that take no list of arguments."""
 
 
+LENGTHS = frozenset({"length", "size", "count"})
+"""What other languages call `len`."""
+
+
 def call(name: str) -> Callable[..., object]:
     function = FUNCTIONS[name]
 
@@ -87,7 +91,8 @@ def field(value: object, name: str) -> object:
         public = vars(value)
     if name in public:
         return scalar(getattr(value, name))
-    raise ValueError(f"{show(value)} has no field {name!r}{_among(public)}")
+    remedy = ": write len(...)" if name in LENGTHS and hasattr(value, "__len__") else ""
+    raise ValueError(f"{show(value)} has no field {name!r}{remedy or _among(public)}")
 
 
 def _among(known: Iterable[object]) -> str:

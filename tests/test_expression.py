@@ -13,7 +13,14 @@ from hypothesis import strategies as st
 from bt_actions.expression import MAX_LENGTH, Expression, ExpressionError
 
 RESULT = SimpleNamespace(
-    stalled=True, position=4.0, message="done", poses=[SimpleNamespace(x=1.5), {"x": 2}]
+    stalled=True,
+    position=4.0,
+    message="done",
+    poses=[
+        SimpleNamespace(x=1.5),
+        {"x": 2},
+        {"not": {"except": False}},
+    ],
 )
 VARIABLES: dict[str, Any] = {
     "a": 1,
@@ -23,6 +30,9 @@ VARIABLES: dict[str, Any] = {
     "where": {"pose": {"x": 7}},
     "big": 2**200,
     "raw": array.array("d", [1.0, 2.0]),
+    "words": {"from": 1, "class": {"in": 5}, "None": 2, "is": "x.from", "if": 5, "fromage": 9},
+    "from": 3,
+    "class": True,
 }
 
 
@@ -69,6 +79,10 @@ def value(text: str) -> object:
         ("'ä' == 'ä'", True),
         ("  $a\n  ==  1 ", True),
         ("$on", True),
+        ("$words.from + $words.class.in - $words.None", 4),
+        ("'.from' in $words.is and $words['if'] == 5", True),
+        ("result.poses.2.not.except or ( $words ).from < $words.fromage", True),
+        ("$from == 3 and $class", True),
     ],
 )
 def test_an_expression_has_the_value_python_gives_it(text: str, expected: object) -> None:
@@ -82,7 +96,29 @@ def test_an_expression_has_the_value_python_gives_it(text: str, expected: object
         ("", "an empty expression", 0),
         ("result.stalled = true", "'=' alone compares nothing: write '=='", 15),
         ("$a && $b", "'&&': write 'and'", 3),
-        ("!$a", "'!': write 'not'", 0),
+        ("!$a", "'!': write 'not $a'", 0),
+        ("!($a)", "'!': write 'not'", 0),
+        ("$a | $b", "'|': write 'or'", 3),
+        ("$on AND $a == 1", "write 'and'", 4),
+        ("'x AND' == 'y' Or $on", "write 'or'", 15),
+        ("NOT $on", "write 'not'", 0),
+        ("NOT($on)", "write 'not'", 0),
+        ("$a === 1", "'===': write '=='", 3),
+        ("$a !== 1", "'!==': write '!='", 3),
+        ("length($list) > 1", "write len($list)", 0),
+        ("1 < result.poses.size()", "write len(result.poses)", 4),
+        (
+            "$a == sensor_msgs/msg/BatteryState.FULL",
+            "a constant is written with the name of its type alone: BatteryState.FULL",
+            6,
+        ),
+        (
+            "$where == ab",
+            "unknown name 'ab': a variable is written $ab, a field result.ab, a text 'ab'",
+            10,
+        ),
+        ("$words.from.class = 2", "'=' alone compares nothing: write '=='", 18),
+        ("$words.from.class and there", None, 22),
         ("$a # why", "'#': a comment has no place in an expression", 3),
         (
             "pick_at > 1",
@@ -120,11 +156,11 @@ def test_an_expression_has_the_value_python_gives_it(text: str, expected: object
     ],
 )
 def test_what_is_no_expression_is_refused_with_its_place(
-    text: str, message: str, column: int | None
+    text: str, message: str | None, column: int | None
 ) -> None:
     with pytest.raises(ExpressionError) as caught:
         Expression(text)
-    assert caught.value.message == message
+    assert message is None or caught.value.message == message
     if column is not None:
         assert caught.value.column == column
     assert caught.value.end_column > caught.value.column
@@ -137,6 +173,8 @@ def test_what_is_no_expression_is_refused_with_its_place(
         ("$a / 0", "division by zero", (0, 6)),
         ("1 == 1 and $a.x", "1 has no field 'x'", (11, 15)),
         ("$where.poze", "no key 'poze'; there is pose", (0, 11)),
+        ("$words.class.from", "no key 'from'; there is in", (0, 17)),
+        ("$list.length", "[10, 20, 30] has no field 'length': write len(...)", (0, 12)),
         ("$list.7", "index 7 is outside of 3 items", (0, 7)),
         ("$list.0.0", "10 has no items", (0, 9)),
         ("$big * $big", "the number is too large", (0, 11)),

@@ -9,7 +9,7 @@ import ast
 from collections.abc import Callable, Mapping, Sequence
 
 from bt_actions.expression import Expression
-from bt_actions.expression_values import BINARY, bounded, number, reason
+from bt_actions.expression_values import BINARY, LENGTHS, bounded, number, reason
 from bt_actions.ros.conveniences import UnknownClass
 from bt_actions.ros.fields import (
     FLOATS,
@@ -199,7 +199,11 @@ class _Inference:
         if isinstance(owner, Record):
             return self._key(node, owner, name)
         if not isinstance(owner, Message):
-            self._wrong(node, f"{named(owner)} has no field {name!r}", "BT203")
+            remedy = ""
+            if name in LENGTHS and isinstance(node, ast.Attribute) and _has_length(owner):
+                start, end = self._expression.span(node.value)
+                remedy = f": write len({self._expression.text[start:end]})"
+            self._wrong(node, f"{named(owner)} has no field {name!r}{remedy}", "BT203")
             return None
         known = describe(owner.cls)
         if name in known:
@@ -322,7 +326,7 @@ class _Inference:
     def _call(self, name: str, args: list[ast.expr]) -> FieldType | None:
         if name == "len":
             kind = self.type_of(args[0])
-            if not (kind is None or isinstance(kind, Listing | Record) or _is_text(kind)):
+            if not (kind is None or _has_length(kind)):
                 self._wrong(args[0], f"{named(kind)} has no length")
             return INTEGER
         if name == "abs":
@@ -342,6 +346,10 @@ class _Inference:
             floats = any(isinstance(kind, Scalar) and kind.name in FLOATS for kind in kinds)
             return FLOAT if floats else INTEGER
         return kinds[0] if all(kind == kinds[0] for kind in kinds) else None
+
+
+def _has_length(kind: FieldType) -> bool:
+    return isinstance(kind, Listing | Record) or _is_text(kind)
 
 
 def _power(exponent: ast.expr, kind: FieldType) -> FieldType | None:
