@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import ast
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
+
+from bt_actions.shorten import shorten
 
 MAX_BITS = 256
 MAX_ITEMS = 10_000
@@ -20,6 +22,7 @@ FUNCTIONS: dict[str, Callable[..., object]] = {"len": len, "abs": abs, "min": mi
 
 ONE_VALUE = frozenset({"len", "abs"})
 """The functions that take no list of arguments."""
+_NUMBERS = frozenset({bool, int, float})
 
 
 LENGTHS = frozenset({"length", "size", "count"})
@@ -28,11 +31,35 @@ LENGTHS = frozenset({"length", "size", "count"})
 
 def call(name: str) -> Callable[..., object]:
     function = FUNCTIONS[name]
+    if name == "len":
+        return _length
+    if name == "abs":
+        return lambda value: abs(number(value))
 
     def call(*values: object) -> object:
-        return function(*(plain(value) for value in values))
+        items = plain(values[0]) if len(values) == 1 else [plain(value) for value in values]
+        if not isinstance(items, (list, tuple)):
+            raise ValueError(f"{name}() of one value needs a list, not {show(items)}")
+        if not items:
+            raise ValueError(f"{name}() of an empty list")
+        try:
+            return function(items)
+        except TypeError:
+            raise ValueError(f"{name}() is of numbers alone, or of texts alone") from None
 
     return call
+
+
+def _length(value: object) -> int:
+    value = scalar(value)
+    if not isinstance(value, Sized):
+        raise ValueError(f"{show(value)} has no length")
+    return len(value)
+
+
+def numbers_only(items: Iterable[object]) -> bool:
+    """Whether nothing but numbers is in a list; looks at millions without a loop of Python's."""
+    return _NUMBERS.issuperset(map(type, items))
 
 
 def number(value: object) -> int | float:
@@ -195,11 +222,7 @@ COMPARE: dict[type[ast.cmpop], Callable[..., bool]] = {
 
 
 def show(value: object) -> str:
-    try:
-        text = repr(value)
-    except Exception:  # noqa: BLE001 - a value's own repr may raise anything
-        text = f"<{type(value).__name__}>"
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return shorten(value, 60)
 
 
 def reason(error: Exception) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 
+from bt_actions.shorten import shorten
+
 __all__ = ["DURATION_UNITS", "parse_angle", "parse_duration"]
 
 DURATION_UNITS = {
@@ -63,5 +65,4 @@ def _parse(value: object, units: dict[str, float], what: str, example: str) -> f
 
 
 def _show(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return shorten(value, 60)

@@ -183,7 +183,11 @@ def test_what_is_no_expression_is_refused_with_its_place(
         ("'a' < 1", "a number is needed, not 'a'", (0, 7)),
         ("not 3", "true or false is needed, not 3", (0, 5)),
         ("$a and $on", "true or false is needed, not 1", (0, 2)),
-        ("len(3)", "object of type 'int' has no len()", (0, 6)),
+        ("len(3)", "3 has no length", (0, 6)),
+        ("min([])", "min() of an empty list", (0, 7)),
+        ("max(3)", "max() of one value needs a list, not 3", (0, 6)),
+        ("max(1, 'a')", "max() is of numbers alone, or of texts alone", (0, 11)),
+        ("abs('a')", "a number is needed, not 'a'", (0, 8)),
         ("result.nothing", None, (0, 14)),
     ],
 )

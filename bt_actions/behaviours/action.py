@@ -23,14 +23,13 @@ from bt_actions.behaviours.variables import key, resolve, variables_in, write
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.goal_terms import Event
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.shorten import shorten
 from bt_actions.ticking import root_of
 
 if TYPE_CHECKING:
     from bt_actions.ros.shared import Ticket
     from bt_actions.ros.traffic import Traffic
 
-RESULT_SHOWN = 300
-"""Characters of a result in a reason."""
 CHANCE = random.Random()
 """Varies the pauses before retries; one for all leaves, as a seed costs more than a leaf."""
 DEADLINES = {
@@ -400,8 +399,8 @@ class ActionBehaviour(Behaviour):
             why = self._read_result(goal.result)
             if why:
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why
-        elif outcome is Outcome.ABORTED and (said := self._shown(goal.result)):
-            reason += f"; its result is: {said}"
+        elif outcome is Outcome.ABORTED and goal.result is not None:
+            reason += f"; its result is: {shorten(goal.result)}"
         now = self._traffic.clocks.now().ros
         return AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
 
@@ -433,14 +432,7 @@ class ActionBehaviour(Behaviour):
 
     def _unexpected(self, result: Any) -> str:
         wanted = f"{self._expect_text} was expected" if self._expect_text else "not as expected"
-        return f"{wanted}, but the result is: {self._shown(result) or 'empty'}"
-
-    @staticmethod
-    def _shown(result: Any) -> str:
-        from bt_actions.ros.messages import to_plain
-
-        fields = to_plain(result) if result is not None else {}
-        return ", ".join(f"{name} {value}" for name, value in fields.items())[:RESULT_SHOWN]
+        return f"{wanted}, but the result is: {shorten(result)}"
 
     def _in_words(self, ticket: Ticket) -> str:
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""

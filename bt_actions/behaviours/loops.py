@@ -11,6 +11,7 @@ from py_trees.common import Status
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.gate import Gate
 from bt_actions.expression_values import plain
+from bt_actions.shorten import shorten
 
 __all__ = ["ForEach", "Repeat", "RetryChild"]
 
@@ -163,10 +164,9 @@ class ForEach(Gate):
         self.feedback_message = ""
         try:
             items = self._get_items()
-            to_list = getattr(items, "tolist", None)  # array.array and numpy alike
-            items = plain(to_list() if to_list is not None else items)
+            items = plain(items)
             if not isinstance(items, (list, tuple)):
-                raise ValueError(f"a list is needed, not {type(items).__name__}")
+                raise ValueError(f"a list is needed, not {shorten(items, 60)}")
         except ValueError as error:
             self.feedback_message = str(error)
             return
@@ -220,5 +220,6 @@ def _whole(given: Number | int, what: str, least: int) -> tuple[int | None, str]
     except ValueError as error:
         return None, f"{what}: {error}"
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        return None, f"{what}: a whole number of at least {least} is needed, not {value!r}"
+        wanted = f"a whole number of at least {least}"
+        return None, f"{what}: {wanted} is needed, not {shorten(value, 60)}"
     return value, ""

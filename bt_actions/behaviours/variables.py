@@ -12,6 +12,8 @@ from typing import Any
 
 from py_trees.blackboard import Blackboard
 
+from bt_actions.expression_values import numbers_only
+
 
 class MissingVariable(KeyError):
     """A variable was read that nobody has written, or that has no such field."""
@@ -78,6 +80,8 @@ def resolve(data: Any) -> Any:
     if isinstance(data, Mapping):
         return {name: resolve(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
+        if numbers_only(data):
+            return [*data]
         return [resolve(value) for value in data]
     return data
 
@@ -88,6 +92,6 @@ def variables_in(data: Any) -> set[str]:
         return {key(data.name)}
     if isinstance(data, Mapping):
         return set().union(*(variables_in(value) for value in data.values()))
-    if isinstance(data, list | tuple):
+    if isinstance(data, list | tuple) and not numbers_only(data):
         return set().union(*(variables_in(value) for value in data))
     return set()

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import chain
 
+from bt_actions.expression_values import numbers_only
+
 __all__ = ["MAX_CHARACTERS", "MAX_ITEMS", "MAX_LEVELS", "refuse_large"]
 
 MAX_ITEMS = 1_000_000
@@ -38,6 +40,9 @@ def refuse_large(value: object, *, items: int = MAX_ITEMS, characters: int = MAX
         if isinstance(item, str):
             characters -= len(item)
         elif isinstance(item, list | tuple):
+            if len(item) <= left and numbers_only(item):
+                left -= len(item)
+                continue
             stack.append(iter(item))
         elif isinstance(item, Mapping):
             stack.append(chain.from_iterable(item.items()))

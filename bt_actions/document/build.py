@@ -29,6 +29,7 @@ from bt_actions.document.inputs import check_inputs
 from bt_actions.document.scope import Scope
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.writes import writes_of
+from bt_actions.shorten import shorten
 
 __all__ = ["BUILDERS", "build"]
 
@@ -181,7 +182,8 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     def begin() -> None:
         values = given()
         if not isinstance(values, dict):
-            raise ValueError(f"'with' needs a mapping of inputs to values, not {values!r:.60}")
+            got = shorten(values, 60)
+            raise ValueError(f"'with' needs a mapping of inputs to values, not {got}")
         try:
             refuse_large(values)
         except ValueError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import array
 import contextlib
 import math
 from collections.abc import Mapping
@@ -121,7 +122,9 @@ def refuse_infinite(value: object) -> None:
             waiting.extend(value.values())
         elif isinstance(value, list | tuple):
             waiting.extend(value)
-        elif hasattr(value, "tolist"):  # an array of numpy
+        elif isinstance(value, array.array) and all(map(math.isfinite, value)):
+            continue  # seen without a loop of Python's
+        elif hasattr(value, "tolist"):
             waiting.append(value.tolist())
 
 

@@ -20,6 +20,7 @@ from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.tree import Document
 from bt_actions.document.unread import Doubts
 from bt_actions.document.workspace import Workspace
+from bt_actions.expression_values import plain
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
@@ -95,14 +96,14 @@ def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
 
 
 def tree_outputs(root: Behaviour) -> dict[str, object]:
-    """The outputs of a loaded tree that have a value by now, by name."""
+    """The outputs of a loaded tree that have a value by now, by name; arrays as lists."""
     loaded = getattr(root, LOADED, None)
     if not isinstance(loaded, Loaded):
         return {}
     found = {}
     for name in loaded.document.outputs:
         try:
-            found[name] = loaded.scope.read(name)
+            found[name] = plain(loaded.scope.read(name))
         except KeyError:
             continue
     return found

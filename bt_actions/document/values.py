@@ -33,6 +33,7 @@ from bt_actions.document.nodes import (
 from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.expression_values import MAX_ITEMS as MAX_TEXT
+from bt_actions.expression_values import numbers_only
 
 __all__ = [
     "BAD",
@@ -327,6 +328,8 @@ def resolve(value: object, variable: Lookup) -> object:
     if isinstance(value, MappingType):
         return {key: resolve(item, variable) for key, item in value.items()}
     if isinstance(value, list):
+        if numbers_only(value):
+            return [*value]
         return [resolve(item, variable) for item in value]
     return value
 
@@ -334,8 +337,12 @@ def resolve(value: object, variable: Lookup) -> object:
 def _as_text(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
+    from bt_actions.ros.messages import to_plain  # here, so that reading a tree needs no ROS
+
     try:
         refuse_large(value, items=MAX_TEXT, characters=MAX_TEXT)  # an item takes a character
+        value = to_plain(value)
+        refuse_large(value, items=MAX_TEXT, characters=MAX_TEXT)
     except ValueError:
         raise ExpressionError(_TOO_LONG) from None
     return str(value)

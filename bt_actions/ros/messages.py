@@ -5,14 +5,17 @@ Pure functions: no node, no clock of their own unless none is given, and no rclp
 
 from __future__ import annotations
 
+import array
+import contextlib
 import math
 import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, TypeVar
 
-from bt_actions.expression_values import plain, scalar
+from bt_actions.expression_values import numbers_only, plain, scalar
 from bt_actions.ros.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
 from bt_actions.ros.fields import (
     FLOATS,
@@ -30,6 +33,7 @@ from bt_actions.ros.interfaces import (
     interface_name,
     short_name,
 )
+from bt_actions.shorten import shorten
 from bt_actions.suggest import did_you_mean
 
 __all__ = [
@@ -48,6 +52,13 @@ __all__ = [
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")
+_CODES = MappingProxyType(
+    {
+        "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
+        "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
+    }
+)  # fmt: skip
+"""How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code."""
 _NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")
 
 
@@ -88,12 +99,15 @@ def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.t
 
 
 def fill_value(kind: FieldType, data: object, *, now: Callable[[], int] = time.time_ns) -> object:
-    """A value of type `kind` as a tree has it: a byte is a number. Raises MessageError."""
+    """A value of type `kind` as a tree has it: a byte is a number, an array stays what it is.
+
+    Raises MessageError.
+    """
     filler = _Filler(now, None)
     value = filler.convert(kind, data, ())
     if filler.problems:
         raise MessageError(filler.problems)
-    return plain(value)
+    return value if isinstance(value, array.array) else plain(value)
 
 
 def examine(kind: FieldType, data: object, hole: Hole | None = None) -> list[Problem]:
@@ -118,6 +132,8 @@ def to_plain(message: object) -> Any:
     if to_list is not None:
         return to_list()
     if isinstance(message, (list, tuple)):
+        if numbers_only(message):
+            return list(message)
         return [to_plain(item) for item in message]
     if isinstance(message, Mapping):
         return {str(key): to_plain(value) for key, value in message.items()}
@@ -205,17 +221,21 @@ class _Filler:
         }
 
     def _listing(self, kind: Listing, value: object, path: Path) -> Any:
-        to_list = getattr(value, "tolist", None)
-        items = to_list() if to_list is not None else value
-        if isinstance(items, (bytes, bytearray)):
-            items = list(items)
-        if not isinstance(items, (list, tuple)):
+        code = _CODES.get(str(kind.item))
+        items: Any = array.array("B", value) if isinstance(value, (bytes, bytearray)) else value
+        if hasattr(items, "tolist") and getattr(items, "typecode", None) != code:  # numpy's, too
+            items = items.tolist()
+        if not isinstance(items, (list, tuple, array.array)):
             self._bad(path, f"a list of {kind.item} is needed, not {show(value)}")
             return None
         if kind.size is not None and len(items) != kind.size:
             self._bad(path, f"exactly {kind.size} items are needed, not {len(items)}")
         elif kind.limit is not None and len(items) > kind.limit:
             self._bad(path, f"at most {kind.limit} items fit, not {len(items)}")
+        if self._hole is None:  # there may be millions
+            numbers = items if isinstance(items, array.array) else _numbers(str(kind.item), items)
+            if numbers is not None:
+                return numbers
         return [self.convert(kind.item, item, (*path, at)) for at, item in enumerate(items)]
 
     def _scalar(self, kind: Scalar, value: object, path: Path) -> Any:
@@ -235,6 +255,23 @@ class _Filler:
         if kind.name == "byte" and isinstance(value, int):
             return bytes([value])
         return value
+
+
+def _numbers(name: str, items: Sequence[Any]) -> list[Any] | None:
+    """A list of a numeric type, checked without a loop of Python's; None for what needs one."""
+    kinds, numbers = set(map(type, items)), [*items]
+    if name in FLOATS and kinds <= {int, float}:
+        with contextlib.suppress(OverflowError):
+            floats = [*map(float, numbers)]
+            if name == "float64" or max(map(abs, floats), default=0.0) <= FLOATS[name]:
+                return floats
+    elif kinds == {int} and name in _CODES:
+        least, greatest = INTEGERS[name]
+        if least <= min(numbers) and max(numbers) <= greatest:
+            return numbers
+    elif kinds == {bool} and name == "bool":
+        return numbers
+    return None
 
 
 def _wrong(kind: Scalar, value: object) -> str | None:
@@ -317,8 +354,4 @@ def show(value: object) -> str:
         return "a list"
     if hasattr(value, "get_fields_and_field_types"):
         return f"a {short_name(type(value))}"
-    try:
-        text = repr(value)
-    except Exception:  # noqa: BLE001 - a value's own repr may raise anything
-        return f"a {type(value).__name__}"
-    return text if len(text) <= 40 else f"{text[:37]}..."
+    return shorten(value, 40)

@@ -21,7 +21,7 @@ def test_an_unexpected_result_says_what_was_expected_and_what_came(
     leaf = run(MoveRobot("m", 0.1, action_name=name, expect="result.final_pose > 4.0"))
     assert leaf.outcome is Outcome.UNEXPECTED_RESULT
     assert leaf.reason.startswith("result.final_pose > 4.0 was expected, but the result is: ")
-    assert "final_pose 0.1" in leaf.reason
+    assert "final_pose: 0.1" in leaf.reason
     host.close_server(name)
 
 
