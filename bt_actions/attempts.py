@@ -13,6 +13,7 @@ from typing import Any
 
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import Now
+from bt_actions.plain_text import in_words
 from bt_actions.policy import RETRYABLE, End, Outcome, Retry
 
 
@@ -107,7 +108,7 @@ class Attempts:
             try:
                 return bool(self._when(record.result))
             except Exception as error:  # noqa: BLE001 - the user's: any
-                record.reason += f" (not tried again: retry.when raised {error!r})"
+                record.reason += f" (not tried again: retry.when: {in_words(error)})"
                 return False
         return True
 

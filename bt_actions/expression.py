@@ -104,9 +104,8 @@ class Expression:
         except ExpressionError:
             raise
         except Exception as error:
-            raise ExpressionError(
-                f"cannot be computed: {reason(error)}", 0, len(self.text)
-            ) from error
+            why = reason(error, self.text.strip())
+            raise ExpressionError(f"cannot be computed: {why}", 0, len(self.text)) from error
 
     def holds(self, roots: Mapping[str, object], variable: Callable[[str], object]) -> bool:
         """The value of a condition, which must be true or false."""
@@ -275,7 +274,7 @@ class Expression:
                     if not test(left, right):
                         return False
                 except Exception as error:
-                    raise ExpressionError(reason(error), *self.span(node)) from error
+                    raise self._failure(node, error) from error
                 left = right
             return True
 
@@ -289,9 +288,13 @@ class Expression:
             try:
                 return bounded(function(*values))
             except Exception as error:
-                raise ExpressionError(reason(error), *self.span(node)) from error
+                raise self._failure(node, error) from error
 
         return apply
+
+    def _failure(self, node: ast.expr, error: Exception) -> ExpressionError:
+        start, end = self.span(node)
+        return ExpressionError(reason(error, self.text[start:end]), start, end)
 
     def _refusal(self, node: ast.expr, message: str) -> ExpressionError:
         return ExpressionError(message, *self.span(node))

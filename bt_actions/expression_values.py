@@ -14,6 +14,7 @@ from dataclasses import fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
 
+from bt_actions.plain_text import in_words
 from bt_actions.shorten import shorten
 
 MAX_BITS = 256
@@ -183,7 +184,10 @@ def contains(left: object, right: object) -> bool:
         raise ValueError(f"{show(right)} holds nothing that 'in' could look for")
     if isinstance(right, str) and not isinstance(left, str):
         raise ValueError(f"{show(left)} cannot be in a text")
-    return left in right
+    try:
+        return left in right
+    except TypeError:  # a list is no key
+        return False
 
 
 def ordered(function: Callable[[Any, Any], bool]) -> Callable[[object, object], bool]:
@@ -225,12 +229,10 @@ def show(value: object) -> str:
     return shorten(value, 60)
 
 
-def reason(error: Exception) -> str:
+def reason(error: Exception, text: str) -> str:
+    """Why `text`, a part of an expression, has no value."""
     if isinstance(error, ZeroDivisionError):
-        return "division by zero"
+        return f"{text} divides by zero"
     if isinstance(error, OverflowError):
         return "the number is too large"
-    try:
-        return str(error) or type(error).__name__
-    except Exception:  # noqa: BLE001 - as above
-        return type(error).__name__
+    return in_words(error)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["clean", "clean_lines", "in_words"]
+__all__ = ["clean", "clean_lines", "in_words", "raised"]
 
 _NONE = "\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
 """Controls, those that turn the direction of what follows, and characters that are none."""
@@ -26,11 +26,16 @@ def clean_lines(text: str) -> str:
     return _STRANGE.sub(" ", text).replace("\n", "\n  ")
 
 
-def in_words(error: Exception) -> str:
-    """Return what an exception of a stranger says; what it is, where it does not say anything."""
+def in_words(error: BaseException) -> str:
+    """Return what a ValueError says, a sentence for people; any other as `raised` has it."""
+    text = raised(error)
+    return text.partition(": ")[2] or text if isinstance(error, ValueError) else text
+
+
+def raised(error: BaseException) -> str:
+    """Return an exception as the last line of a traceback has it: ``KeyError: 'pick_at'``."""
     try:
         said = str(error)
-        bare = isinstance(error, KeyError) or not said  # KeyError("x") says 'x' only
-        return repr(error) if bare else said
-    except Exception:  # noqa: BLE001 - it may be wrong in that, too
-        return type(error).__name__
+    except Exception:  # noqa: BLE001 - one of a stranger's may be wrong in that, too
+        said = ""
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__

@@ -26,6 +26,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
+from bt_actions.plain_text import raised
 from bt_actions.policy import End, Outcome
 from bt_actions.ticking import ChangeVisitor, Patience, culprit_of, path_of, root_of, tick_once
 
@@ -166,7 +167,7 @@ class TreeRunner:
             try:
                 callback()
             except Exception as error:  # noqa: BLE001 - the rest must be closed all the same
-                _error(f"closing: {error!r}")
+                _error(f"closing: {raised(error)}")
 
     # Running
 
@@ -361,11 +362,11 @@ class TreeRunner:
             thread.join()
             self._thread = None  # also where wait() has done so meanwhile
             if isinstance(self._outcome, BaseException):  # and nobody has called wait()
-                _error(f"the tree that was started raised {self._outcome!r}")
+                _error(f"the tree that was started raised {raised(self._outcome)}")
         try:
             self.tree.shutdown()
         except Exception as error:  # noqa: BLE001 - the user's: any
-            _error(f"shutdown of a behaviour raised: {error!r}")
+            _error(f"shutdown of a behaviour raised: {raised(error)}")
             for behaviour in self.tree.root.iterate():  # ours must let go all the same
                 if isinstance(behaviour, ActionBehaviour):
                     with contextlib.suppress(Exception):
@@ -432,7 +433,9 @@ class TreeRunner:
             self._awake = False
             self._spinner.check()
             if self._spin_error is not None:
-                raise TreeError(f"the spin thread died: {self._spin_error!r}") from self._spin_error
+                raise TreeError(
+                    f"the spin thread died: {raised(self._spin_error)}"
+                ) from self._spin_error
             if self._stop_wanted or _past(deadline):
                 return Status.INVALID
             self._flush()
@@ -495,7 +498,7 @@ class TreeRunner:
             try:
                 root.stop(Status.INVALID)
             except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
-                _error(f"terminate of a behaviour raised: {error!r}")
+                _error(f"terminate of a behaviour raised: {raised(error)}")
                 self._leave_with(error)
                 self._let_go()
         self._patience.end()
@@ -516,7 +519,7 @@ class TreeRunner:
                     if node.status is Status.RUNNING:
                         node.terminate(Status.INVALID)
                 except BaseException as error:  # noqa: BLE001 - the user's: any
-                    _error(f"terminate of {node.name} raised: {error!r}")
+                    _error(f"terminate of {node.name} raised: {raised(error)}")
                     self._leave_with(error)
                 ActionBehaviour.terminate(node, Status.INVALID)
 
@@ -599,7 +602,7 @@ class TreeRunner:
                 observer(event)
             except BaseException as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
-                _error(f"an observer raised and was removed: {error!r}")
+                _error(f"an observer raised and was removed: {raised(error)}")
                 self._leave_with(error)
 
     def _leave_with(self, error: BaseException) -> None:

@@ -80,7 +80,7 @@ def test_when_that_raises_counts_as_no() -> None:
 
     filed = record(Outcome.ABORTED, result=2)
     assert not attempts(Retry(2), when).again(filed, START)
-    assert "retry.when raised AttributeError" in filed.reason
+    assert "retry.when: AttributeError: " in filed.reason
 
 
 def test_the_next_attempt_waits_for_its_pause_on_the_nodes_clock() -> None:

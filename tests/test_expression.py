@@ -170,7 +170,7 @@ def test_what_is_no_expression_is_refused_with_its_place(
     ("text", "message", "span"),
     [
         ("1 + $gone", "$gone has no value", (4, 9)),
-        ("$a / 0", "division by zero", (0, 6)),
+        ("$a / 0", "$a / 0 divides by zero", (0, 6)),
         ("1 == 1 and $a.x", "1 has no field 'x'", (11, 15)),
         ("$where.poze", "no key 'poze'; there is pose", (0, 11)),
         ("$words.class.from", "no key 'from'; there is in", (0, 17)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from bt_actions.behaviours.variables import MissingVariable
 from bt_actions.plain_text import in_words
 
 
@@ -18,11 +19,13 @@ class Mute(Exception):
     ("error", "says"),
     [
         (ValueError("no variable $pick_at"), "no variable $pick_at"),
-        (KeyError("pick_at"), "KeyError('pick_at')"),
-        (ValueError(), "ValueError()"),
+        (MissingVariable("variable 'pick_at' has no value"), "variable 'pick_at' has no value"),
+        (KeyError("pick_at"), "KeyError: 'pick_at'"),
+        (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero"),
+        (ValueError(), "ValueError"),
         (Mute(), "Mute"),
     ],
-    ids=["words", "a key", "nothing", "raises"],
+    ids=["words", "a variable", "a key", "no sentence", "nothing", "raises"],
 )
 def test_what_an_exception_says(error: Exception, says: str) -> None:
     assert in_words(error) == says

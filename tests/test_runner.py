@@ -359,7 +359,7 @@ class TestStart:
         runner.start()
         until(lambda: not runner._running.locked())
         runner.shutdown()
-        assert "the tree that was started raised TreeError('culprit: tick" in capfd.readouterr().err
+        assert "the tree that was started raised TreeError: culprit: tick" in capfd.readouterr().err
 
     def test_shutdown_ends_a_run_on_another_thread(
         self, journal: Journal, name: str, node: Any

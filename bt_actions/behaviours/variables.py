@@ -15,7 +15,7 @@ from py_trees.blackboard import Blackboard
 from bt_actions.expression_values import numbers_only
 
 
-class MissingVariable(KeyError):
+class MissingVariable(ValueError, KeyError):
     """A variable was read that nobody has written, or that has no such field."""
 
     def __str__(self) -> str:

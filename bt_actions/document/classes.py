@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.plain_text import raised
 from bt_actions.suggest import did_you_mean
 
 __all__ = ["ClassError", "Misfit", "find_behaviour", "make_behaviour", "wrong_arguments"]
@@ -63,15 +64,7 @@ def _not_imported(module_name: str, error: BaseException) -> str:
             f"there is no module {error.name!r} where Python looks; install its package, or put "
             "the folder it is in on PYTHONPATH"
         )
-    return f"importing {module_name!r} raised {_shown(error)}"
-
-
-def _shown(error: BaseException) -> str:
-    try:
-        text = str(error)
-    except Exception:  # noqa: BLE001 - a foreign error's text may raise anything
-        text = ""
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+    return f"importing {module_name!r} raised {raised(error)}"
 
 
 def make_behaviour(path: str, name: str, arguments: Mapping[str, object]) -> Behaviour:
@@ -82,7 +75,7 @@ def make_behaviour(path: str, name: str, arguments: Mapping[str, object]) -> Beh
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        raise ClassError(f"making a {cls.__name__} raised {_shown(error)}") from error
+        raise ClassError(f"making a {cls.__name__} raised {raised(error)}") from error
     if not isinstance(made, Behaviour):
         raise ClassError(f"{path!r} makes no behaviour, but a {type(made).__name__}")
     if not hasattr(made, "children") or not hasattr(made, "parent"):

@@ -299,7 +299,8 @@ class _Inference:
         try:
             bounded(BINARY[type(node.op)](left, right))
         except (ValueError, ArithmeticError) as error:
-            self._wrong(node, reason(error))
+            start, end = self._expression.span(node)
+            self._wrong(node, reason(error, self._expression.text[start:end]))
 
     def _compare(self, operands: list[ast.expr], ops: list[ast.cmpop]) -> None:
         kinds = [self.type_of(operand) for operand in operands]

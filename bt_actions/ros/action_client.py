@@ -35,6 +35,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.hearing import Hearing
+from bt_actions.plain_text import raised
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 
@@ -288,7 +289,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                 try:
                     self._tell(kind, about, detail)
                 except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
-                    log.error(f"{self._action_name}: {kind} was not taken in: {error!r}")
+                    log.error(f"{self._action_name}: {kind} was not taken in: {raised(error)}")
             if any_came:
                 with contextlib.suppress(Exception):  # nothing was lost by that
                     self._listener.all_delivered()

@@ -12,6 +12,7 @@ import threading
 import time
 from typing import Protocol
 
+from bt_actions.plain_text import raised
 from bt_actions.ros.collector import Collector
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
@@ -108,7 +109,7 @@ def _attend_until_idle() -> None:
                 try:
                     wait = min(wait, line.attend(time.monotonic()))
                 except Exception as error:  # noqa: BLE001 - the last guard of every deadline
-                    log.error(f"{line!r}: {error!r}")
+                    log.error(f"{line!r}: {raised(error)}")
             now = time.monotonic()
             _wakes_at = min(now + wait, _wakes_at)
             standstill.lives(now)

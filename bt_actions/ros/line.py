@@ -23,6 +23,7 @@ from bt_actions.goal_terms import (
     Now,
     State,
 )
+from bt_actions.plain_text import raised
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
@@ -380,7 +381,7 @@ class Line:
     def _warn_once(self, what: str, error: Exception) -> None:
         if what not in self._warned_of:
             self._warned_of.add(what)
-            log.error(f"{self.name}: {what}: {error!r}")
+            log.error(f"{self.name}: {what}: {raised(error)}")
 
     def close_book(self, ticket: Ticket) -> None:
         """Know nothing of this goal any more, and mind only what is left."""

@@ -24,6 +24,7 @@ from typing import Protocol
 from rclpy.context import Context
 from rclpy.node import Node
 
+from bt_actions.plain_text import raised
 from bt_actions.ros import participant
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.graph import servers
@@ -193,7 +194,7 @@ class Lookout:
                 found = False
                 if not self._told:
                     self._told = True
-                    log.warning(f"no second look for lost servers: {error!r}")
+                    log.warning(f"no second look for lost servers: {raised(error)}")
             pause = PAUSE if found else min(2 * pause, LONGEST_PAUSE)
 
     def _wait(self, pause: float) -> None:

@@ -27,7 +27,7 @@ from rclpy.node import Node
 from bt_actions.goal import Goal
 from bt_actions.goal_ids import new_goal_id
 from bt_actions.goal_terms import Event, State
-from bt_actions.plain_text import in_words
+from bt_actions.plain_text import in_words, raised
 from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
 from bt_actions.ros import alarm, shared
@@ -322,7 +322,7 @@ class Traffic:
                 observer(change)
             except Exception as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
-                log.error(f"an observer of goals raised and was removed: {error!r}")
+                log.error(f"an observer of goals raised and was removed: {raised(error)}")
         changed.notify_all()
 
     def destroy(self) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from bt_actions.plain_text import raised
 from bt_actions.simulation.fault_plan import FaultPlan, GoalFaults
 from bt_actions.simulation.faults import FaultKind
 from bt_actions.simulation.journal import Event
@@ -95,7 +96,7 @@ class Intake:
             try:
                 reason = refusal(goal)
             except Exception as error:  # noqa: BLE001 - it would end the executor's spin
-                reason = f"it could not be checked: {error!r}"
+                reason = f"it could not be checked: {raised(error)}"
         if reason:
             self._reject(request, reason)
             return False

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 from action_msgs.msg import GoalStatus
 from rclpy.action.server import RCLError, ServerGoalHandle
 
+from bt_actions.plain_text import raised
 from bt_actions.simulation.execution import CancelAnswer, Execution, Finish, Happened
 from bt_actions.simulation.goal_meaning import GoalMeaning
 from bt_actions.simulation.journal import Event
@@ -63,7 +64,7 @@ class LiveGoal:
         try:
             happened = self.run.step(now, self._step_period)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its motion does
-            happened = self.run.give_up(f"it could not go on: {error!r}")
+            happened = self.run.give_up(f"it could not go on: {raised(error)}")
         self._owner.record(self.goal_id, Event.STEP, **self._meaning.state(self.run.motion))
         self._carry_out(happened)
         return self.run.moving
@@ -110,7 +111,7 @@ class LiveGoal:
             for _ in range(times):
                 self.handle.publish_feedback(message)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
-            self.give_up(f"it has no feedback: {error!r}")
+            self.give_up(f"it has no feedback: {raised(error)}")
 
     def _finish(self, finish: Finish, reason: str) -> None:
         motion = self.run.motion
@@ -123,7 +124,7 @@ class LiveGoal:
             if not isinstance(result, self._meaning.action_type.Result):
                 raise TypeError(f"{result!r} is no {self._meaning.action_type.Result.__name__}")
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
-            finish, reason = Finish.FAULT, f"it has no result: {error!r}"
+            finish, reason = Finish.FAULT, f"it has no result: {raised(error)}"
             result = self._meaning.action_type.Result()
         event = self._change_state(finish)
         more = {"reason": reason} if reason else {}

@@ -16,6 +16,7 @@ from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
+from bt_actions.plain_text import raised
 from bt_actions.simulation.execution import Execution, Motion
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault, FaultKind
@@ -277,7 +278,7 @@ class SimulatedServer(GoalMeaning):
         try:
             return self.begin(goal), ""
         except Exception as error:  # noqa: BLE001 - rclpy would leave the goal live for ever
-            return _Nowhere(), f"it could not begin: {error!r}"
+            return _Nowhere(), f"it could not begin: {raised(error)}"
 
     def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         with self.stepper.lock:

@@ -15,6 +15,7 @@ from typing import Self
 
 from rclpy.node import Node
 
+from bt_actions.plain_text import raised
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault
 from bt_actions.simulation.journal import Journal
@@ -142,7 +143,7 @@ class Simulation:
             self._on_event(namespace, event)
         except Exception as error:  # noqa: BLE001 - a faulty listener must not end a goal
             self._on_event = None
-            self._log.error(f"simulation: on_event raised {error!r} and is told no more")
+            self._log.error(f"simulation: on_event raised {raised(error)} and is told no more")
 
     def _publish_batteries(self, now: float) -> None:
         for cell in self._cells.values():

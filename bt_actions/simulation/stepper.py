@@ -22,6 +22,8 @@ from rclpy.clock_type import ClockType
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
+from bt_actions.plain_text import raised
+
 CATCH_UP = 0.25
 """Wall seconds a late timer makes up for. A process that was stopped for longer does not make its
 robots jump: they go on where they were."""
@@ -155,5 +157,7 @@ class Stepper:
         try:
             return function(now)
         except Exception as error:  # noqa: BLE001 - an exception in a timer callback ends spin()
-            self.node.get_logger().error(f"simulation: {function.__qualname__} raised {error!r}")
+            self.node.get_logger().error(
+                f"simulation: {function.__qualname__} raised {raised(error)}"
+            )
             return False

@@ -18,6 +18,8 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.task import Future
 from rclpy.waitable import NumberOfEntities
 
+from bt_actions.plain_text import raised
+
 Taken = tuple[Any, Any]
 """A request as rclpy takes it: its header, and the message."""
 
@@ -110,7 +112,7 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
             super()._send_result_response(request_header, future)
         except Exception as error:  # noqa: BLE001 - rclpy calls this as a task: it would end spin()
             if not self._gone:
-                self._logger.error(f"simulation: a result could not be sent: {error!r}")
+                self._logger.error(f"simulation: a result could not be sent: {raised(error)}")
 
     async def _execute_goal(self, execute_callback: Any, goal_handle: ServerGoalHandle) -> None:
         # The server may go, or the goal expire, between `finish` and this task of the executor.
@@ -147,7 +149,7 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
         try:
             return self._interceptor.on_request(kind, taken)
         except Exception as error:  # noqa: BLE001 - it would end spin()
-            self._logger.error(f"simulation: at a {kind} request: {error!r}")
+            self._logger.error(f"simulation: at a {kind} request: {raised(error)}")
             return True
 
     def _tell(self, kind: str, taken: Taken) -> None:
@@ -156,7 +158,7 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
         try:
             self._interceptor.on_answered(kind, taken)
         except Exception as error:  # noqa: BLE001 - it would end spin()
-            self._logger.error(f"simulation: after a {kind} request: {error!r}")
+            self._logger.error(f"simulation: after a {kind} request: {raised(error)}")
 
     @contextlib.contextmanager
     def _unless_gone(self) -> Iterator[None]:
@@ -171,7 +173,7 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
             await work
         except Exception as error:  # noqa: BLE001 - it would end spin()
             if not self._gone:
-                self._logger.error(f"simulation: {error!r}")
+                self._logger.error(f"simulation: {raised(error)}")
 
 
 def _nothing(goal_handle: ServerGoalHandle) -> None:

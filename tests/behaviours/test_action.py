@@ -177,7 +177,7 @@ def test_an_answer_that_cannot_be_taken_keeps_no_other_goal_from_being_canceled(
         monkeypatch.setattr(leaves[0]._line.client, "pump", broken)
     assert [journal.ends() for journal in journals] == [["canceled"], ["canceled"]]
     told: list[str] = []  # by the log's own thread
-    until(lambda: "not be taken: RuntimeError('of a type" in "".join(told),
+    until(lambda: "not be taken: RuntimeError: of a type" in "".join(told),
           meanwhile=lambda: told.append(capfd.readouterr().err))  # fmt: skip
     for which in ("broken", "sound"):
         host.close_server(f"{name}_{which}")

@@ -208,7 +208,7 @@ def test_check_fails_with_a_readable_reason_and_never_raises(load: Load) -> None
     for text, reason in (
         ("$count > 1", "$count > 1 is false"),
         ("$n > 1", "$n has no value"),
-        ("1 / ($count - 1) > 0", "division by zero"),
+        ("1 / ($count - 1) > 0", "1 / ($count - 1) divides by zero"),
     ):
         status, _, root = run(load, f"check: {text}")
         assert (status, root.feedback_message) == (Status.FAILURE, reason)

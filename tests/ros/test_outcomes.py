@@ -715,23 +715,23 @@ class TestServerLost:
 
 class TestInvalidGoal:
     @pytest.mark.parametrize(
-        "goal",
+        ("goal", "reason"),
         [
-            {"distance": Var("outcome_nobody_wrote_this")},
-            lambda: {"distance": "far"},
-            lambda: {"distanse": 1.0},
-            lambda: 1 / 0,
-            lambda: None,
+            ({"distance": Var("nobody_wrote")}, "variable 'nobody_wrote' has no value"),
+            (lambda: {"distance": "far"}, "distance: a number (float64) is needed, not 'far'"),
+            (lambda: {"distanse": 1.0}, "distanse: MoveRobot.Goal has no field 'distanse'; "),
+            (lambda: 1 / 0, "ZeroDivisionError: division by zero"),
+            (lambda: None, "the fields of a MoveRobot.Goal are needed, not nothing"),
         ],
         ids=["missing variable", "wrong type", "unknown field", "callable raises", "nothing"],
     )
     def test_a_goal_that_cannot_be_built_is_not_sent(
-        self, serve: Any, name: str, run: Run, goal: Any
+        self, serve: Any, name: str, run: Run, goal: Any, reason: str
     ) -> None:
         journal = serve()
         leaf = run(ActionBehaviour("m", MoveRobotAction, name, goal, retry=3))
         assert stood(leaf) == (Outcome.INVALID_GOAL, End.NEVER_STARTED)
-        assert leaf.reason
+        assert leaf.reason.startswith(reason)
         assert len(leaf.history) == 1
         assert journal.events() == []
 
@@ -751,7 +751,7 @@ class TestInvalidGoal:
 
         serve()
         leaf = run(ActionBehaviour("m", MoveRobotAction, name, goal))
-        assert leaf.reason == "no such place"
+        assert leaf.reason == "Mine: no such place"
         assert set(under_the_lock) == {False}
 
 
