@@ -28,6 +28,7 @@ from bt_actions.cli import (
 from bt_actions.cli import format as format_
 from bt_actions.cli.common import BadInput, Exit, OutputLost, discard_stdout, note
 from bt_actions.cli.parser import Parser
+from bt_actions.cli.results import give_stdout_back, results
 from bt_actions.ros.environment import Reach, prepare
 
 COMMANDS: dict[str, ModuleType] = {
@@ -96,7 +97,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = Exit.SIGINT
     except BrokenPipeError:
         code = Exit.SIGPIPE
-    return code if _flushed() else code or Exit.BAD_INPUT
+    code = code if _flushed() else code or Exit.BAD_INPUT
+    if argv is not None:  # it is called by a program, whose standard output that is again
+        give_stdout_back()
+    return code
 
 
 def _dispatch(argv: Sequence[str] | None) -> int:
@@ -133,7 +137,7 @@ def _flushed() -> bool:
     """
     note("", end="")  # and the same for what is left for standard error
     try:
-        sys.stdout.flush()
+        results().flush()
     except BrokenPipeError:
         discard_stdout()
     except (OSError, ValueError) as error:

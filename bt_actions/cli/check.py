@@ -6,7 +6,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import Exit, add_no_python, columns, prints_apart, write
+from bt_actions.cli.common import Exit, add_no_python, columns, write
+from bt_actions.cli.results import keep_results_apart, results
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -51,21 +52,20 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check the trees that `args` name."""
+    keep_results_apart()
     from bt_actions.document.reports import REPORTS, as_text
 
     findings: list[Finding] = []
     seen = set()
     unreadable = False
     for tree in args.trees:
-        with prints_apart():
-            found = _check(tree, types=not args.no_types, python=args.python)
-        for finding in found:
+        for finding in _check(tree, types=not args.no_types, python=args.python):
             if finding not in seen:  # trees share what they include
                 seen.add(finding)
                 findings.append(finding)
                 unreadable |= finding.code in ("BT100", "BT101")
     if args.format == "text":
-        write(as_text(findings, columns(sys.stdout)))
+        write(as_text(findings, columns(results())))
     else:
         write(REPORTS[args.format](findings))
     if unreadable:

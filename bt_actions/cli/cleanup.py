@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import os
 import signal
 import time
@@ -122,11 +123,12 @@ def sweep(
         hint = "; start it" if wanted else ""
         hint += ", or run without --cleanup-first" if wanted and first else ""
         code = _tell_what_is_open(swept, unseen, stop.signal, hint, any_will_do=wanted is not None)
+        tell = functools.partial(note, end="") if first else write  # whose results are to follow
         try:
             for goal in swept.left:
-                write(_line(goal))
+                tell(_line(goal))
             if code is Exit.SUCCESS and not swept.left:
-                write(_nothing(swept, "nothing of this machine" if foreign else "nothing"))
+                tell(_nothing(swept, "nothing of this machine" if foreign else "nothing"))
         except (OutputLost, BrokenPipeError):
             if code is not Exit.UNKNOWN:
                 raise

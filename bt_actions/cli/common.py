@@ -17,6 +17,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TextIO
 
+from bt_actions.cli.results import results
+
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
@@ -75,8 +77,8 @@ def write(text: str) -> None:
     Raises OutputLost, or BrokenPipeError when nobody reads any more.
     """
     try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
+        results().write(text)
+        results().flush()
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -85,7 +87,7 @@ def write(text: str) -> None:
 
 def discard_stdout() -> None:
     """Write to nowhere from now on, what is left in the buffer too."""
-    _discard(sys.stdout)
+    _discard(results())
 
 
 def _discard(stream: TextIO) -> None:
@@ -235,8 +237,7 @@ def load(
                 inputs[name] = parse_input(text, kind)
             except ValueError as error:
                 raise BadInput(f"--set {name}={text}: {error}") from error
-        with prints_apart():
-            return load_tree(tree, inputs, python=python)
+        return load_tree(tree, inputs, python=python)
     except DocumentError as error:
         raise BadInput(findings_text(error), prefixed=False) from error
     except (InputError, TreeNotFoundError) as error:
@@ -246,11 +247,6 @@ def load(
 def findings_text(error: DocumentError) -> str:
     """What is wrong with a document, for standard error."""
     return "\n".join(finding.text(columns(sys.stderr)) for finding in error.findings)
-
-
-def prints_apart() -> contextlib.AbstractContextManager[object]:
-    """While a tree is read: what the modules that it names print goes to standard error."""
-    return contextlib.redirect_stdout(sys.stderr)
 
 
 def columns(stream: TextIO) -> int:

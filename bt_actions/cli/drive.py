@@ -25,6 +25,7 @@ from py_trees.common import Status
 from bt_actions.cli.common import Exit, discard_stdout, note
 from bt_actions.cli.patient_output import PatientOutput
 from bt_actions.cli.report import Report
+from bt_actions.cli.results import results
 from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import QuietView, View
 from bt_actions.cli.words import Closing, waiting_text
@@ -236,7 +237,7 @@ class Drive:
         """Standard output is closed: end the run, and write to nowhere from now on."""
         self._watched = -1
         with contextlib.suppress(OSError):
-            sys.stdout.flush()
+            results().flush()
         discard_stdout()
         if self._stop is None:
             self._end(Exit.SIGPIPE, "standard output was closed", self._clock())
@@ -325,7 +326,7 @@ class Drive:
 
 def leave(code: Exit) -> NoReturn:
     """Exit at once: threads of rclpy still run, and its teardown would wait for them."""
-    for stream in (sys.stdout, sys.stderr):
+    for stream in (results(), sys.stdout, sys.stderr):
         with contextlib.suppress(OSError):
             stream.flush()
     os._exit(code)
@@ -334,7 +335,7 @@ def leave(code: Exit) -> NoReturn:
 def _pipe_of_stdout() -> int:
     """Return standard output's descriptor where a reader could go away, else -1."""
     try:
-        descriptor = sys.stdout.fileno()
+        descriptor = results().fileno()
         mode = os.fstat(descriptor).st_mode
     except (OSError, ValueError):
         return -1

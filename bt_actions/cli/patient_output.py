@@ -15,9 +15,10 @@ import stat
 import sys
 import threading
 from collections.abc import Callable
-from typing import Self
+from typing import Self, TextIO
 
 from bt_actions.cli.patient_file import PatientFile
+from bt_actions.cli.results import STDERR, STDOUT, are_apart, results, send_results
 from bt_actions.cli.stderr import roomy_pipe
 
 
@@ -25,7 +26,7 @@ class PatientOutput:
     """Stands in the place of standard output from `__enter__` to `__exit__`; main thread only."""
 
     def __init__(self) -> None:
-        self._stdout = sys.stdout
+        self._stdout = results()
         self._file: PatientFile | None = None
         self._stderr: _PatientStderr | None = None
 
@@ -36,17 +37,11 @@ class PatientOutput:
             return self
         self._stdout.flush()
         self._file = PatientFile(descriptor, "stdout")
-        sys.stdout = io.TextIOWrapper(
-            self._file,
-            encoding=self._stdout.encoding,
-            errors=self._stdout.errors,
-            newline="",
-            write_through=True,
-        )
+        send_results(_text(self._file, self._stdout, write_through=True))
         return self
 
     def __exit__(self, *_: object) -> None:
-        sys.stdout = self._stdout
+        send_results(self._stdout)
         if self._stderr is not None:
             self._stderr.close()
         if self._file is not None:
@@ -74,17 +69,36 @@ class PatientOutput:
         return done
 
 
+def _text(file: PatientFile, like: TextIO, *, write_through: bool = False) -> TextIO:
+    """Return a stream that encodes as `like` does; it writes line by line, or at once."""
+    return io.TextIOWrapper(
+        file,  # type: ignore[type-var]  # a raw stream has all that is needed
+        encoding=like.encoding,
+        errors=like.errors,
+        newline="",
+        line_buffering=not write_through,
+        write_through=write_through,
+    )
+
+
 class _PatientStderr:
-    """File descriptor 2, led into a pipe that never blocks: C libraries write there, too."""
+    """File descriptor 2, led into a pipe that never blocks: C libraries write there, too.
+
+    So is 1 where that is standard error for all but results, and a print of any length has room.
+    """
 
     def __init__(self) -> None:
         sys.stderr.flush()
-        self._real = os.dup(2)
+        self._descriptors = (STDERR, STDOUT) if are_apart() else (STDERR,)
+        self._real = os.dup(STDERR)
         self._file = PatientFile(self._real, "stderr")
+        if are_apart():
+            sys.stdout = _text(self._file, sys.stderr)  # a part of a line would mix with others
         self._read, write = roomy_pipe()
         self._moving = threading.Lock()
         """Held while text is neither in the pipe nor in the file."""
-        os.dup2(write, 2)
+        for descriptor in self._descriptors:
+            os.dup2(write, descriptor)
         os.close(write)
         self._thread = threading.Thread(target=self._pass_on, name="stderr pipe", daemon=True)
         self._thread.start()
@@ -117,6 +131,9 @@ class _PatientStderr:
         """Let 2 be what it was; what was written before is on its way."""
         with contextlib.suppress(OSError, ValueError):
             sys.stderr.flush()
-        os.dup2(self._real, 2)
+        if STDOUT in self._descriptors:
+            sys.stdout = sys.stderr
+        for descriptor in self._descriptors:
+            os.dup2(self._real, descriptor)
         self._thread.join(0.1)  # longer only where a child process has inherited the pipe
         self._file.end()

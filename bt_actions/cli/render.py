@@ -6,11 +6,11 @@ Never needs a ROS graph, and never imports rclpy.
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, add_no_python, load, write
+from bt_actions.cli.results import keep_results_apart, results
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
@@ -72,6 +72,7 @@ def _levels(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Draw the tree that `args` name."""
+    keep_results_apart()
     from bt_actions import render
 
     try:
@@ -81,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         if args.output is not None:
             render.write(root, args.output, direction=args.direction, depth=args.depth)
         else:
-            encoding = sys.stdout.encoding or "ascii"
+            encoding = results().encoding or "ascii"
             write(render.text(root, encoding=encoding, depth=args.depth))
     except render.RenderError as error:
         raise BadInput(str(error)) from error

@@ -7,8 +7,6 @@ Puts together what others do: loads the tree (document), starts the servers (sim
 from __future__ import annotations
 
 import argparse
-import contextlib
-import sys
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import (
@@ -21,6 +19,7 @@ from bt_actions.cli.common import (
     seconds,
     speed,
 )
+from bt_actions.cli.results import keep_results_apart
 from bt_actions.cli.ros_arguments import parameters
 
 if TYPE_CHECKING:
@@ -133,6 +132,8 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the tree that `args` name."""
+    if args.json:
+        keep_results_apart()
     _refuse_without_sim(args)
     faults = _faults(args.fault)
     given = parameters(args.ros_args, args.namespace)
@@ -163,8 +164,7 @@ def _clean_up(wanted: set[str], namespace: str) -> Exit:
     """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
     from bt_actions.cli.cleanup import sweep
 
-    with contextlib.redirect_stdout(sys.stderr):
-        return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=True)
+    return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=True)
 
 
 def _refuse_without_sim(args: argparse.Namespace) -> None:

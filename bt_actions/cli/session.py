@@ -22,6 +22,7 @@ from bt_actions.cli.drive import Drive, Ended, leave
 from bt_actions.cli.patient_file import gap_text
 from bt_actions.cli.patient_output import PatientOutput
 from bt_actions.cli.report import Report
+from bt_actions.cli.results import results
 from bt_actions.cli.signals import Signals
 from bt_actions.cli.simulated import Wanted, remark, wanted
 from bt_actions.cli.views import JsonView, LineView, View
@@ -93,7 +94,7 @@ class Session:
         """Return the view that suits standard output; `verbose` is about lines."""
         if as_json:
             self._output.tell_gaps(_gap_object)
-            return JsonView(self.report, sys.stdout)
+            return JsonView(self.report, results())
         if sys.stdout.isatty():
             from rich.console import Console
 

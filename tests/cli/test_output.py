@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -14,15 +15,15 @@ FULL = Path("/dev/full")
 DEMO = ("run", "pick_and_place", "--sim", "--speed", "30")
 
 
-def call(redirection: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Call `bt-actions` from a shell, its standard output redirected."""
+def call(redirection: str, *arguments: str, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Call `bt-actions` from a shell, its standard output redirected; `path` has more modules."""
     command = f'exec "$0" -m bt_actions.cli "$@" {redirection}'
     return subprocess.run(
         ["sh", "-c", command, sys.executable, *arguments],
         capture_output=True,
         text=True,
         cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": f"{ROOT}:{path}"},
         check=False,
     )
 
@@ -92,3 +93,83 @@ def test_the_text_of_format_that_is_lost_is_an_error_too(tmp_path: Path) -> None
     path = tmp_path / "t.yaml"
     path.write_text("tree: t\nroot: {success: A}\n")
     assert call(f"<{path} >{FULL}", "format", "-").returncode == 2
+
+
+TALKER = """\
+import atexit, ctypes, logging, os, subprocess, sys
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+def talk(when):
+    print("print", when)
+    print("*" * 3_000_000)
+    sys.__stdout__.write(f"old stream {when}\\n")
+    os.write(1, f"descriptor {when}\\n".encode())
+    ctypes.CDLL(None).puts(f"C {when}".encode())
+    subprocess.run(["echo", "child", when])
+    logging.basicConfig(stream=sys.stdout, force=True)
+    logging.warning("logger %s", when)
+
+talk("imported")
+atexit.register(talk, "at exit")
+
+class Talker(Behaviour):
+    def __init__(self, name):
+        super().__init__(name)
+        talk("made")
+    def setup(self, **_):
+        talk("set up")
+        self.logger.info("py_trees set up")
+    def update(self):
+        talk("ticked")
+        return Status.SUCCESS
+    def terminate(self, _):
+        talk("terminated")
+    def shutdown(self):
+        talk("shut down")
+"""
+RUN = ("imported", "made", "set up", "ticked", "terminated", "shut down", "at exit")
+
+
+@pytest.mark.parametrize(
+    ("command", "when"),
+    [
+        ("run --json", RUN),
+        ("check --format json", ("imported", "at exit")),
+        ("check --format sarif", ("imported", "at exit")),
+        ("render", ("imported", "made", "at exit")),
+    ],
+    ids=["run", "check", "sarif", "render"],
+)
+def test_standard_output_has_results_alone_and_all_else_goes_to_standard_error(
+    command: str, when: tuple[str, ...], tmp_path: Path, domain: int
+) -> None:
+    (tmp_path / "talker.py").write_text(TALKER)
+    tree = tmp_path / "t.yaml"
+    tree.write_text("tree: t\nroot: {python: talker.Talker, name: It talks}\n")
+    done = call("", *command.split(), str(tree), path=tmp_path)
+    assert done.returncode == 0, done.stderr[-2000:]
+    if command == "render":
+        assert done.stdout == "--> It talks  (Talker)\n"
+    else:
+        objects = [json.loads(text) for text in done.stdout.splitlines() if "run" in command]
+        assert (
+            objects[-1]["event"] == "finished" if objects else json.loads(done.stdout) is not None
+        )
+    said = done.stderr.splitlines()
+    for each in when:
+        for who in ("print", "old stream", "descriptor", "C", "child", "WARNING:root:logger"):
+            assert said.count(f"{who} {each}") == 1, (who, each)
+    assert said.count("*" * 3_000_000) == len(when), "a print of any length"
+
+
+def test_who_calls_a_command_from_a_program_has_its_standard_output_again() -> None:
+    code = (
+        "from bt_actions.cli import main; import os\n"
+        "for _ in range(2): main(['check', 'pick_and_place', '--format', 'json'])\n"
+        "print('print', flush=True); os.write(1, b'descriptor')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert done.stdout == "[]\n[]\nprint\ndescriptor"
