@@ -169,6 +169,7 @@ class Row:
 class Culprit:
     """One leaf that made the tree fail."""
 
+    node: Behaviour
     path: tuple[str, ...]
     message: str
     place: str
@@ -278,7 +279,7 @@ class Report:
         if self.status is not Status.FAILURE:
             return []
         return [
-            Culprit(path_of(leaf), self._why(leaf), place_of(leaf), self._rows.get(leaf.id))
+            Culprit(leaf, path_of(leaf), self._why(leaf), place_of(leaf), self._rows.get(leaf.id))
             for leaf in self._failed_leaves()
         ]
 

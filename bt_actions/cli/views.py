@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TextIO
+from uuid import UUID
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -20,7 +21,7 @@ from bt_actions.cli.report import DONE, Report, Row
 from bt_actions.cli.words import Closing, goal_text, last_words, outputs_of, troubles
 from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
-from bt_actions.render import action_of
+from bt_actions.render import action_of, kind, rows
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, GoalChanged
@@ -205,19 +206,26 @@ class JsonView:
     def __init__(self, report: Report, out: TextIO) -> None:
         self._report = report
         self._out = out
+        self._ids: dict[UUID, int] = {}
+        for row in rows(report.root):
+            self._id(row.node)
 
     def event(self, event: Event) -> None:
         """Write `event` as an object."""
+        from bt_actions.document import tree_name
         from bt_actions.events import GoalChanged, NodeChanged, TreeStarted
 
         time = round(event.time - self._report.started, 4)
         if isinstance(event, TreeStarted):
-            self._write({"event": "started", "tree": self._report.root.name})
+            root = self._report.root
+            nodes = [self._node(row.node) for row in rows(root)]
+            self._write({"event": "started", "tree": tree_name(root), "nodes": nodes})
         elif isinstance(event, NodeChanged):
             self._write(
                 {
                     "event": "node",
                     "time": time,
+                    "id": self._id(event.node),
                     "path": list(event.path),
                     "status": event.status.value,
                     "message": event.message,
@@ -230,6 +238,7 @@ class JsonView:
                 {
                     "event": "goal",
                     "time": time,
+                    "id": self._id(event.behaviour),
                     "name": row.name,
                     "path": list(row.path),
                     "server": row.server,
@@ -261,9 +270,10 @@ class JsonView:
                 "error": closing.error or None,
                 "duration": round(report.now - report.started, 3),
                 "outputs": outputs_of(report),
-                "actions": [_action(report, row) for row in report.rows],
+                "actions": [self._action(row) for row in report.rows],
                 "failures": [
                     {
+                        "id": self._id(culprit.node),
                         "path": list(culprit.path),
                         "attempts": culprit.row.attempt if culprit.row else 0,
                         "outcome": culprit.row.outcome if culprit.row else None,
@@ -282,6 +292,33 @@ class JsonView:
     def close(self) -> None:
         """Nothing to give back."""
 
+    def _id(self, node: Behaviour) -> int:
+        """Return the number of a node: from 1, parents first; what is inserted later follows."""
+        return self._ids.setdefault(node.id, len(self._ids) + 1)
+
+    def _node(self, node: Behaviour) -> dict[str, object]:
+        return {
+            "id": self._id(node),
+            "parent": None if node.parent is None else self._id(node.parent),
+            "name": node.name,
+            "kind": kind(node),
+            "place": place_of(node) or None,
+        }
+
+    def _action(self, row: Row) -> dict[str, object]:
+        return {
+            "id": self._id(row.behaviour),
+            "name": row.name,
+            "path": list(row.path),
+            "server": row.server,
+            "attempts": row.attempts,
+            "outcome": row.outcome,
+            "end": row.end,
+            "reason": row.reason,
+            "duration": round(self._report.seconds(row), 3),
+            "place": row.place or None,
+        }
+
     def _write(self, data: dict[str, object]) -> None:
         ascii_only = not _is_utf8(self._out)
         try:
@@ -298,20 +335,6 @@ def _finite(data: object) -> object:
     if isinstance(data, list | tuple):
         return [_finite(value) for value in data]
     return None if isinstance(data, float) and not math.isfinite(data) else data
-
-
-def _action(report: Report, row: Row) -> dict[str, object]:
-    return {
-        "name": row.name,
-        "path": list(row.path),
-        "server": row.server,
-        "attempts": row.attempts,
-        "outcome": row.outcome,
-        "end": row.end,
-        "reason": row.reason,
-        "duration": round(report.seconds(row), 3),
-        "place": row.place or None,
-    }
 
 
 def _is_utf8(stream: TextIO) -> bool:

@@ -19,6 +19,7 @@ from bt_actions.document.load import (
     check_source,
     load_tree,
     tree_inputs,
+    tree_name,
     tree_outputs,
 )
 from bt_actions.document.rules import RULES, Rule
@@ -47,6 +48,7 @@ __all__ = [
     "read_source",
     "source_of",
     "tree_inputs",
+    "tree_name",
     "tree_outputs",
 ]
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from bt_actions.document.scope import Scope
 
-__all__ = ["check_file", "check_source", "load_tree", "tree_inputs", "tree_outputs"]
+__all__ = ["check_file", "check_source", "load_tree", "tree_inputs", "tree_name", "tree_outputs"]
 
 PathLike = str | os.PathLike[str]
 
@@ -93,6 +93,12 @@ def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
     """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
     _, document = _open(path, types=False)
     return inputs_of(document)
+
+
+def tree_name(root: Behaviour) -> str:
+    """The name that its file gives a loaded tree; the root's own where no file made it."""
+    loaded = getattr(root, LOADED, None)
+    return loaded.document.name if isinstance(loaded, Loaded) else root.name
 
 
 def tree_outputs(root: Behaviour) -> dict[str, object]:

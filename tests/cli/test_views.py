@@ -6,6 +6,7 @@ import io
 import json
 import math
 import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from bt_actions.cli.report import Report
 from bt_actions.cli.views import JsonView, LineView, View
 from bt_actions.cli.words import Closing, fields_text, last_words, result_lines
 from bt_actions.document import load_tree
-from bt_actions.events import Event
+from bt_actions.events import Event, TreeFinished
 from bt_actions.policy import End, Outcome
 from tests.cli.fakes import FakeAction, FakeProgress, Story
 
@@ -195,15 +196,25 @@ def test_the_last_line_is_what_went_wrong(
 # JSON
 
 
+def objects_of(
+    root: Behaviour, events: Iterable[Event], status: Status = Status.SUCCESS, note: str = ""
+) -> list[dict[str, Any]]:
+    """What is written of a run that ends with `status` after `events`."""
+    report, out = Report(root), io.StringIO()
+    view = JsonView(report, out)
+    for event in events:
+        feed(report, view, event)
+    feed(report, view, TreeFinished(report.now, status))
+    if note:
+        view.say(note)
+    view.finish(Closing(Exit.SUCCESS if status is Status.SUCCESS else Exit.FAILURE))
+    return [json.loads(line) for line in out.getvalue().splitlines()]
+
+
 def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
     root: Behaviour, leaves: list[FakeAction], story: Story
 ) -> None:
-    report, out = Report(root), io.StringIO()
-    view = JsonView(report, out)
-    feed(report, view, story.start(), *story.succeed(leaves[0]), story.finish(Status.SUCCESS))
-    view.say("a note")
-    view.finish(Closing(Exit.SUCCESS))
-    objects: list[dict[str, Any]] = [json.loads(line) for line in out.getvalue().splitlines()]
+    objects = objects_of(root, [story.start(), *story.succeed(leaves[0])], note="a note")
     kinds = [each["event"] for each in objects]
     assert kinds == ["started", "node", "goal", "goal", "goal", "node", "note", "finished"]
     last = objects[-1]
@@ -222,6 +233,42 @@ def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
     assert documented == {each["event"]: list(each)[1:] for each in objects}
     (actions,) = re.findall(r"^- `actions`: [^,]*, with (.*?)\.$", text, re.MULTILINE | re.DOTALL)
     assert re.findall(r"`(\w+)`", actions) == list(action)
+
+
+def test_each_node_has_an_id_of_its_own_in_the_order_of_the_file(story: Story) -> None:
+    twins = [FakeAction("Step"), FakeAction("Step"), FakeAction("Step")]
+    root = Sequence("Step", memory=True, children=[*twins[:2]])
+
+    def insert_one_and_fail() -> Iterator[Event]:
+        yield story.start()
+        root.add_child(twins[2])
+        for twin in reversed(twins):
+            yield story.goal(twin, "DONE", outcome=Outcome.ABORTED, end=End.ABORTED)
+            yield story.node(twin, Status.FAILURE)
+        yield story.node(root, Status.FAILURE)
+
+    started, *told, finished = objects_of(root, insert_one_and_fail(), Status.FAILURE)
+    assert [(node["id"], node["parent"]) for node in started["nodes"]] == [
+        (1, None),
+        (2, 1),
+        (3, 1),
+    ]
+    assert [each["id"] for each in told] == [4, 4, 3, 3, 2, 2, 1]
+    assert [each["id"] for each in finished["actions"]] == [4, 3, 2]
+    assert [each["id"] for each in finished["failures"]] == [2, 3, 4]
+
+
+def test_json_names_the_tree_as_its_file_does_and_its_nodes(tmp_path: Path, story: Story) -> None:
+    path = tmp_path / "tree.yaml"
+    path.write_text("tree: errand\nroot: {invert: Not, child: {wait: 1 s, name: A moment}}\n")
+    assert objects_of(load_tree(path), [story.start()])[0] == {
+        "event": "started",
+        "tree": "errand",
+        "nodes": [
+            {"id": 1, "parent": None, "name": "Not", "kind": "invert", "place": f"{path}:2:8"},
+            {"id": 2, "parent": 1, "name": "A moment", "kind": "wait", "place": f"{path}:2:29"},
+        ],
+    }
 
 
 # The live drawing
