@@ -1,9 +1,9 @@
 """A file that takes text at once and writes it with a thread of its own; a reader takes its time.
 
 Whoever reads may pause (`less`, Ctrl-S, a stuck collector of logs), and what is written waits here,
-in order and bounded. Must not decide what a failed write means: the main thread's next write or
-flush raises it. Must not hold a lock of Python's own streams while it writes: the interpreter could
-not exit then.
+in order and bounded; a file on a disk has no reader, and gets everything. Must not decide what a
+failed write means: the main thread's next write or flush raises it. Must not hold a lock of
+Python's own streams while it writes: the interpreter could not exit then.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import os
 import select
+import stat
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -23,6 +24,18 @@ MOST = 4_000_000
 """Bytes that may wait for a reader; beyond that the oldest are dropped."""
 _OF_A_PIECE = 64
 """Bytes that a piece of text costs besides its own."""
+_OF_A_LARGE_ONE = 4
+"""Large pieces that may wait, however large: none alone drops what is around it, or is dropped."""
+
+
+def has_reader(descriptor: int) -> bool:
+    """Whether somebody reads what is written there, who may pause."""
+    mode = os.fstat(descriptor).st_mode
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or os.isatty(descriptor)
+
+
+def _cost(piece: bytes) -> int:
+    return min(len(piece), MOST // _OF_A_LARGE_ONE) + _OF_A_PIECE
 
 
 def gap_text(lines: int) -> str:
@@ -35,6 +48,7 @@ class PatientFile(io.RawIOBase):
 
     def __init__(self, descriptor: int, name: str) -> None:
         self._descriptor = descriptor
+        self._bounded = has_reader(descriptor)
         self._pid = os.getpid()
         self._changed = threading.Condition()
         self._waiting: deque[bytes] = deque()
@@ -68,10 +82,10 @@ class PatientFile(io.RawIOBase):
             return os.write(self._descriptor, piece)
         with self._changed:
             self._waiting.append(piece)
-            self._size += len(piece) + _OF_A_PIECE
-            while self._size > MOST and len(self._waiting) > 1:
+            self._size += _cost(piece)
+            while self._bounded and self._size > MOST:
                 oldest = self._waiting.popleft()
-                self._size -= len(oldest) + _OF_A_PIECE
+                self._size -= _cost(oldest)
                 self._missing += oldest.count(b"\n")
             self._changed.notify_all()
         return len(piece)
@@ -133,13 +147,14 @@ class PatientFile(io.RawIOBase):
                 missing, self._missing = self._missing, 0
                 return self.gap(missing).encode("ascii", "backslashreplace")
             piece = self._waiting.popleft()
-            self._size -= len(piece) + _OF_A_PIECE
+            self._size -= _cost(piece)
             return piece
 
     def _put(self, piece: bytes) -> None:
-        while piece:
+        left = memoryview(piece)
+        while left:
             try:
-                piece = piece[os.write(self._descriptor, piece) :]
+                left = left[os.write(self._descriptor, left) :]
             except BlockingIOError:  # whoever shares it has made it so
                 poll = select.poll()
                 poll.register(self._descriptor, select.POLLOUT)

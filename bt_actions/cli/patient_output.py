@@ -11,13 +11,12 @@ import contextlib
 import io
 import os
 import select
-import stat
 import sys
 import threading
 from collections.abc import Callable
 from typing import Self, TextIO
 
-from bt_actions.cli.patient_file import PatientFile
+from bt_actions.cli.patient_file import PatientFile, has_reader
 from bt_actions.cli.results import STDERR, STDOUT, are_apart, results, send_results
 from bt_actions.cli.stderr import roomy_pipe
 
@@ -49,8 +48,7 @@ class PatientOutput:
 
     def catch_stderr(self) -> None:
         """Let standard error be patient, too, where it has a reader who could pause."""
-        mode = os.fstat(2).st_mode
-        if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or os.isatty(2):
+        if has_reader(STDERR):
             self._stderr = _PatientStderr()
 
     def tell_gaps(self, gap: Callable[[int], str]) -> None:

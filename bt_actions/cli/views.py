@@ -260,6 +260,8 @@ class JsonView:
 
     def finish(self, closing: Closing) -> None:
         """Write the last object."""
+        from bt_actions.ros.messages import to_plain
+
         report = self._report
         self._write(
             {
@@ -269,7 +271,7 @@ class JsonView:
                 "cause": closing.cause or None,
                 "error": closing.error or None,
                 "duration": round(report.now - report.started, 3),
-                "outputs": outputs_of(report),
+                "outputs": {name: to_plain(value) for name, value in outputs_of(report).items()},
                 "actions": [self._action(row) for row in report.rows],
                 "failures": [
                     {

@@ -14,6 +14,7 @@ from bt_actions.cli.common import Exit
 from bt_actions.cli.report import Report, Row, summary, table
 from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
+from bt_actions.shorten import shorten
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -30,7 +31,11 @@ _USUAL_ENDS = {
 }
 """Ends that go without saying."""
 MOST = 3
-"""Actions that are named where many are waited for."""
+"""Of many actions that are waited for, or many items of a list, how many are shown."""
+MANY = 20
+"""Items of a list that is shown whole."""
+LONG = 300
+"""Characters of a value; longer ones are cut."""
 CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
 
 
@@ -52,7 +57,7 @@ class Closing:
 def last_words(report: Report, closing: Closing, width: int | None = None) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     lines = ["", *table(report, width)] if report.rows else []
-    outputs = [clean(f"{name}: {value}") for name, value in outputs_of(report).items()]
+    outputs = [clean(f"{name}: {brief(value)}") for name, value in outputs_of(report).items()]
     lines += ["", *outputs] if outputs else []
     lines += ["", closing.verdict] if closing.verdict else []
     word = report.status.value if report.status is not Status.INVALID else "STOPPED"
@@ -64,13 +69,19 @@ def last_words(report: Report, closing: Closing, width: int | None = None) -> li
 
 
 def outputs_of(report: Report) -> dict[str, object]:
-    """Return what the tree gave its outputs, as plain data; only once it has succeeded."""
+    """Return what the tree gave its outputs; only once it has succeeded."""
     if report.status is not Status.SUCCESS:
         return {}
     from bt_actions.document import tree_outputs
-    from bt_actions.ros.messages import to_plain
 
-    return {name: to_plain(value) for name, value in tree_outputs(report.root).items()}
+    return tree_outputs(report.root)
+
+
+def brief(value: object) -> str:
+    """Return a value as people read it, short however large it is; a text without quotes."""
+    if not isinstance(value, str):
+        return shorten(value, LONG)
+    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
 
 
 def troubles(report: Report, closing: Closing) -> list[str]:
@@ -152,27 +163,37 @@ def fields_text(message: object, most: int = 4) -> str:
         if isinstance(value, float):
             parts.append(f"{field} {value:.2f}" if math.isfinite(value) else f"{field} {value}")
         elif isinstance(value, bool | str):
-            parts.append(f"{field} {str(value).lower() if isinstance(value, bool) else value}")
+            parts.append(f"{field} {brief(value)}")
         elif isinstance(value, int):
             parts.append(f"{field} {_constant(message, field, value)}")
     return ", ".join(parts[:most])
 
 
 def result_lines(result: object) -> list[str]:
-    """Return a result message as lines of YAML."""
+    """Return a result message as lines of YAML; of long values the beginning."""
     if result is None:
         return []
     import yaml
 
     from bt_actions.ros.messages import to_plain
 
-    text = yaml.safe_dump(to_plain(result), sort_keys=False, allow_unicode=True)
+    text = yaml.safe_dump(_short(to_plain(result)), sort_keys=False, allow_unicode=True)
     lines = []
     for line in text.splitlines():
         field, _, written = line.partition(": ")
         name = _constant(result, field, int(written)) if written.isdecimal() else written
         lines.append(f"  {line}" + (f"  # {name}" if name != written else ""))
     return lines
+
+
+def _short(data: object) -> object:
+    """Return plain data with the first items of long lists, and the beginning of long texts."""
+    if isinstance(data, dict):
+        return {key: _short(value) for key, value in data.items()}
+    if isinstance(data, list):
+        more = [f"… {len(data)} items"] if len(data) > MANY else []
+        return [_short(item) for item in (data[:MOST] if more else data)] + more
+    return brief(data) if isinstance(data, str) else data
 
 
 def _constant(message: object, field: str, value: int) -> str:

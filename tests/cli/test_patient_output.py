@@ -365,6 +365,34 @@ def test_what_waits_is_bounded_and_a_line_says_what_is_missing(
     assert len(kept) < 500
 
 
+def test_a_line_above_the_bound_drops_nothing_and_is_not_dropped(
+    file: PatientFile, pipe: FullPipe
+) -> None:
+    lines = ["before", "*" * 2 * patient_file.MOST, "after", "and last"]
+    for line in lines:
+        file.write(f"{line}\n".encode())
+    assert not file.written(0.0)
+    got: list[str] = []
+    reader = threading.Thread(target=lambda: got.extend(pipe.lines()))
+    reader.start()
+    assert file.written(PATIENCE)
+    os.close(pipe.writer)
+    reader.join()
+    assert got == lines
+
+
+def test_a_file_on_a_disk_gets_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(patient_file, "MOST", 1000)
+    with (tmp_path / "out").open("wb") as out:
+        file = PatientFile(out.fileno(), "test")
+        with file._changed:  # so the thread that writes is behind
+            for number in range(1000):
+                file.write(f"line {number}\n".encode())
+        assert file.written(PATIENCE)
+        file.end()
+    assert (tmp_path / "out").read_text().split("\n")[:-1] == [f"line {n}" for n in range(1000)]
+
+
 def test_an_error_is_raised_once_by_the_main_thread_and_by_no_other(
     file: PatientFile, pipe: FullPipe
 ) -> None:

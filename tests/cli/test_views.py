@@ -25,6 +25,7 @@ from bt_actions.cli.report import Report
 from bt_actions.cli.views import JsonView, LineView, View
 from bt_actions.cli.words import Closing, fields_text, last_words, result_lines
 from bt_actions.document import load_tree
+from bt_actions.document.findings import LOADED
 from bt_actions.events import Event, TreeFinished
 from bt_actions.policy import End, Outcome
 from tests.cli.fakes import FakeAction, FakeProgress, Story
@@ -518,6 +519,33 @@ def test_a_message_in_words_shows_constants_by_name() -> None:
     assert fields_text(result) == "final_pose 2.00, status FAULT, message hot"
     assert fields_text(Gripper.Feedback(stalled=True)).startswith("position 0.00, stalled true")
     assert "  status: 3  # FAULT" in result_lines(result)
+
+
+LARGE = [7] * 1_000_000
+
+
+def test_reports_and_the_live_view_shorten_long_values_and_json_has_them_whole(
+    tmp_path: Path, story: Story
+) -> None:
+    from robot_control_interfaces.action import MoveRobot
+    from test_msgs.action import Fibonacci
+
+    path = tmp_path / "tree.yaml"
+    path.write_text("tree: t\noutputs: {many: 'int32[]', text: string}\nroot: {success: Done}\n")
+    root = load_tree(path)
+    getattr(root, LOADED).scope.write_all({"many": LARGE, "text": "x" * 1_000_000})
+    report = Report(root)
+    report.observe(story.finish(Status.SUCCESS))
+    assert last_words(report, Closing(Exit.SUCCESS))[1:3] == [
+        "many: [7, 7, 7, … 1000000 items]",
+        f"text: {'x' * 299}…",
+    ]
+    *_, finished = objects_of(root, [story.start()])
+    assert finished["outputs"] == {"many": LARGE, "text": "x" * 1_000_000}
+    result = result_lines(Fibonacci.Result(sequence=LARGE))
+    assert result == ["  sequence:", "  - 7", "  - 7", "  - 7", "  - … 1000000 items"]
+    result = MoveRobot.Result(message="x" * 1_000_000)
+    assert fields_text(result).endswith(f", message {'x' * 299}…")
 
 
 def test_without_a_result_there_are_no_lines() -> None:
