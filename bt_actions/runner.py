@@ -16,6 +16,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent import futures
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -43,6 +44,7 @@ PATIENCE_AT_EXIT = 30.0
 
 _runs: set[TreeRunner] = set()
 """All that go on in this process; a list of them can be made in a signal handler."""
+_beginning = threading.Lock()
 
 
 class TreeError(Exception):
@@ -104,7 +106,8 @@ class TreeRunner:
         self._leaving: BaseException | None = None
         """What an observer, or a terminate(), raised to end the program: after the drain."""
         self._thread: threading.Thread | None = None
-        self._outcome: Status | BaseException | None = None
+        self._future: futures.Future[Status] | None = None
+        self._is_heard = True  # somebody has asked what became of it
         self._running = threading.Lock()
         self._runs_on: int | None = None
         self._closed = False  # no run begins any more
@@ -146,6 +149,24 @@ class TreeRunner:
             and (ticket.goal.outcome is not None or not self._running.locked())
         ]
 
+    @property
+    def running(self) -> bool:
+        """Whether a run goes on, the drain of its goals included."""
+        return self._running.locked()
+
+    @property
+    def future(self) -> futures.Future[Status]:
+        """The status of the run that `start` began last, or what it raised.
+
+        For add_done_callback, which is called on the tree's thread, where `shutdown` and the next
+        `start` are allowed, and for `asyncio.wrap_future`. To cancel it does nothing: `interrupt`
+        does. Raises RuntimeError before the first `start`.
+        """
+        if self._future is None:
+            raise RuntimeError("there is no future: the tree has not been started")
+        self._is_heard = True
+        return self._future
+
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event of a run, on the ticking thread.
 
@@ -174,22 +195,42 @@ class TreeRunner:
     def run(self, timeout: float | None = None) -> Status:
         """Run the tree until it succeeds or fails, and return which; INVALID when interrupted.
 
-        Raises TimeoutError after `timeout` seconds, TreeError when a behaviour raised or the
-        spin thread died (goals are drained first in each case), and RuntimeError on an executor's
-        thread, in a second run at a time, or where nobody spins the node. On the main thread and
-        with a node of its own, SIGINT, SIGTERM and SIGHUP take effect after the goals were drained.
+        Raises TimeoutError after `timeout` seconds, TreeError when a behaviour raised or returned
+        no status, or the spin thread died (goals are drained first in each case), and RuntimeError
+        where the tree runs already, here or in another runner, where nobody spins the node, and on
+        the thread that has to: in a callback of the node's own executor use `start` and `future`.
+        On the main thread and with a node of its own, SIGINT, SIGTERM and SIGHUP take effect after
+        the goals were drained.
         """
-        from bt_actions.ros.spinning import on_executor_thread
-
-        if on_executor_thread():
-            raise RuntimeError("run() on an executor's thread would wait for itself; use start()")
-        if not self._running.acquire(blocking=False):
-            raise RuntimeError("this tree is running already")
+        if self._spinner.is_here():
+            raise RuntimeError(
+                "run() would wait for the thread that it is called on, which spins the node: "
+                "start() the tree, and take its status in a done callback of `future`"
+            )
+        self._begin()
         try:
             with self._mind_signals():
                 return self._run(timeout)
         finally:
             self._release()
+
+    def _begin(self) -> None:
+        """Take the tree for a run; raises RuntimeError where it is in one."""
+        if not self._running.acquire(blocking=False):
+            raise RuntimeError("this tree is running already")
+        root = root_of(self.tree.root)
+        with _beginning:
+            others = [each for each in list(_runs) if root_of(each.tree.root) is root]
+            if not others:
+                _runs.add(self)
+                return
+        self._running.release()
+        here, there = (each.node.get_fully_qualified_name() for each in (self, others[0]))
+        raise RuntimeError(
+            f"{'/'.join(path_of(self.tree.root))} cannot run in the runner on node {here}: "
+            f"{'/'.join(path_of(others[0].tree.root))} is running in the one on node {there}, and "
+            "they are parts of one tree"
+        )
 
     def _mind_signals(self) -> contextlib.AbstractContextManager[None]:
         """With a node of the user's, its context's signal handling is the user's as well."""
@@ -213,33 +254,47 @@ class TreeRunner:
         return self._patience.is_over
 
     def start(self) -> None:
-        """Run the tree on a thread of its own; see `wait`. For use inside a running node.
+        """Run the tree on a thread of its own; see `wait` and `future`. For use in callbacks.
+
+        Raises RuntimeError where the tree runs already, here or in another runner.
 
         A signal that ends the process while neither `wait` nor `shutdown` is on the main thread
         ends it at once, as it does any program, and its goals run on: only SIGINT, which Python
         turns into an exception, and what ends the main thread in good order, drains them.
         """
-        if self._thread is not None:
-            raise RuntimeError("this tree has been started already; wait() for it first")
-        if not self._running.acquire(blocking=False):
-            raise RuntimeError("this tree is running already")
-        self._outcome = None
-        self._thread = threading.Thread(target=self._run_started, name="bt_actions-tree")
+        self._begin()
+        self._tell_unheard()
+        before = self._thread, self._future
+        future = self._future = futures.Future[Status]()
+        future.set_running_or_notify_cancel()
+        self._thread = threading.Thread(
+            target=self._run_started, args=(future,), name="bt_actions-tree"
+        )
         self._thread.daemon = True  # the exit hook of ros/traffic.py drains what it leaves
+        self._is_heard = False
         try:
             self._thread.start()
         except RuntimeError:  # there can be no more threads
-            self._thread = None
-            self._running.release()
+            self._is_heard, (self._thread, self._future) = True, before
+            self._release()
             raise
 
-    def _run_started(self) -> None:
+    def _run_started(self, future: futures.Future[Status]) -> None:
         try:
-            self._outcome = self._run(None)
+            status = self._run(None)
         except BaseException as error:  # noqa: BLE001 - raised again by wait()
-            self._outcome = error
-        finally:
             self._release()
+            future.set_exception(error)
+        else:
+            self._release()
+            future.set_result(status)
+
+    def _tell_unheard(self) -> None:
+        """Tell in the log what a run raised that nobody has asked about."""
+        if not self._is_heard and self._future is not None:
+            if error := self._future.exception():
+                _error(f"the tree that was started raised {raised(error)}")
+            self._is_heard = True
 
     def _release(self) -> None:
         from bt_actions.ros.shared import lock
@@ -259,15 +314,23 @@ class TreeRunner:
 
         Signals take effect as in `run` while this, or `shutdown`, is on the main thread.
         Raises TimeoutError, which says what its goals do, when it is still running after `timeout`
-        seconds; it goes on.
+        seconds; it goes on. Raises RuntimeError before the first `start`, within the run, and,
+        without a `timeout`, where `run` does because of the thread.
         """
-        thread = self._thread
-        if thread is None:
+        future = self._future
+        if future is None:
             raise RuntimeError("nothing to wait for: the tree has not been started")
         _check_seconds(timeout)
+        if self._runs_on == threading.get_ident():
+            raise RuntimeError("wait() within the run would wait for itself")
+        if timeout is None and not future.done() and self._spinner.is_here():
+            raise RuntimeError(
+                "wait() would wait for the thread that it is called on, which spins the node: "
+                "take the status in a done callback of `future`"
+            )
         with self._mind_signals():
-            thread.join(None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
-        if thread.is_alive():
+            futures.wait([future], None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
+        if not future.done():
             goals = [
                 f"{ticket.name} on {ticket.goal.server} is {ticket.goal.state.value}"
                 for ticket in list(self._tickets)
@@ -275,12 +338,8 @@ class TreeRunner:
             ]
             what = f"; {', '.join(goals)}" if goals else ""
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s{what}")
-        self._thread = None
-        outcome = self._outcome
-        if isinstance(outcome, Status):
-            return outcome
-        assert outcome is not None
-        raise outcome
+        self._is_heard = True
+        return future.result()
 
     def pause(self) -> None:
         """Stop ticking: no new goal starts, running ones finish, and their deadlines hold."""
@@ -318,12 +377,13 @@ class TreeRunner:
         Returns at once where another thread is at it. What an exception cuts short waits no longer.
         Raises RuntimeError on a thread of an executor that is spun here, and within the run.
         """
-        from bt_actions.ros.spinning import on_executor_thread
-
         if self._is_down:
             return
-        if self._spinner.spins and on_executor_thread():
-            raise RuntimeError("shutdown() on the executor's own thread would wait for itself")
+        if self._spins_here():
+            raise RuntimeError(
+                "shutdown() would wait for the thread that it is called on, which spins the node: "
+                "call it on another one, or in a done callback of `future`"
+            )
         if self._runs_on == threading.get_ident():
             raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
         with self._mind_signals():
@@ -331,6 +391,9 @@ class TreeRunner:
         if self._is_down and self._leaving is not None:
             leaving, self._leaving = self._leaving, None
             raise leaving
+
+    def _spins_here(self) -> bool:
+        return self._spinner.spins and self._spinner.is_here()
 
     def _at_exit(self) -> None:
         with contextlib.suppress(KeyboardInterrupt), self._ended_by_signals():
@@ -357,12 +420,10 @@ class TreeRunner:
             self._shutting_down.release()
 
     def _take_down(self) -> None:
-        thread = self._thread
-        if thread is not None:
+        thread, self._thread = self._thread, None
+        if thread is not None and thread is not threading.current_thread():  # a done callback
             thread.join()
-            self._thread = None  # also where wait() has done so meanwhile
-            if isinstance(self._outcome, BaseException):  # and nobody has called wait()
-                _error(f"the tree that was started raised {raised(self._outcome)}")
+        self._tell_unheard()
         try:
             self.tree.shutdown()
         except Exception as error:  # noqa: BLE001 - the user's: any
@@ -387,7 +448,8 @@ class TreeRunner:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self.shutdown()
+        if error is None or not self._spins_here():  # else what run() has said would be lost
+            self.shutdown()
 
     # The loop
 
@@ -400,7 +462,6 @@ class TreeRunner:
         self._visitor.forget()
         self.tree.visitors.append(self._visitor)
         self._runs_on = threading.get_ident()
-        _runs.add(self)
         self._patience.begin(deadline)
         try:
             self._guarded("setup", self._set_up)  # clients are made before anything spins

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import gc
 import os
@@ -16,13 +17,16 @@ from typing import Any
 
 import py_trees
 import pytest
+import rclpy
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from rclpy.executors import SingleThreadedExecutor
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
+from bt_actions.ros import spinning
 from bt_actions.ros.log import log
+from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
 from tests.support.trees import Gate, Raises, in_sequence, state, together
 from tests.support.waiting import holds_for, until
@@ -96,8 +100,8 @@ class TestRun:
     ) -> None:
         leaf = MoveRobot("m", 9.0, action_name=name)
         with TreeRunner(leaf, node=node, executor=executor) as runner:
-            with pytest.raises(TimeoutError, match=r"m did not finish within 0\.5 s"):
-                runner.run(timeout=0.5)
+            with pytest.raises(TimeoutError, match="m did not finish within 3 s"):
+                runner.run(timeout=3.0)
             assert journal.ends() == ["canceled"]
             assert leaf.outcome is Outcome.CANCELED
             assert leaf.status is Status.INVALID
@@ -120,22 +124,6 @@ class TestRun:
                 runner.start()
             gate.passed = True
             assert runner.wait(5.0) is Status.SUCCESS
-
-    def test_on_an_executors_thread_it_raises(self, node: Any) -> None:
-        told: list[str] = []
-
-        def callback() -> None:
-            try:
-                runner.run()
-            except RuntimeError as error:
-                told.append(str(error))
-
-        with spun(node) as executor:
-            runner = TreeRunner(Gate(), node=node)
-            executor.create_task(callback)
-            until(lambda: told)
-            runner.shutdown()
-        assert "start()" in told[0]
 
     def test_a_timeout_that_is_no_number_is_refused(self, node: Any) -> None:
         with TreeRunner(Gate(), node=node) as runner, pytest.raises(ValueError, match="seconds"):
@@ -169,6 +157,149 @@ class TestRun:
         with pytest.raises(ValueError, match="'multi', 'single'"):
             TreeRunner(Gate(), executor="fast")
         assert threading.active_count() == before
+
+
+def called(executor: Any, call: Callable[[], Any]) -> Any:
+    """Return what `call` returns in a callback of the executor, or the error that it raises."""
+    told: list[Any] = []
+
+    def callback() -> None:
+        try:
+            told.append(call())
+        except Exception as error:  # noqa: BLE001 - whatever it is
+            told.append(error)
+
+    executor.create_task(callback)
+    until(lambda: told, 20.0)
+    return told[0]
+
+
+class TestInACallback:
+    @pytest.mark.parametrize("kind", ["single", "multi"])
+    @pytest.mark.parametrize("how", ["run", "start"])
+    def test_of_another_executor_a_runner_on_its_own_node_works_and_leaves_nothing(
+        self, journal: Journal, name: str, node: Any, kind: str, how: str
+    ) -> None:
+        def offer() -> Status:
+            with TreeRunner(MoveRobot("m", 0.1, action_name=name)) as runner:
+                if how == "run":
+                    return runner.run(timeout=9.0)
+                runner.start()
+                return runner.wait()
+
+        with spun(node, kind) as executor:
+            called(executor, lambda: None)  # each pool has its threads by now
+            called(executor, lambda: None)
+            before = set(threading.enumerate())
+            assert called(executor, offer) is Status.SUCCESS
+            left = {each for each in set(threading.enumerate()) - before if each.is_alive()}
+        assert [each.name for each in left if each.name not in OUR_OWN] == []
+
+    def test_of_a_multi_threaded_executor_a_runner_on_its_node_works(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        with (
+            spun(node, "multi") as executor,
+            TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner,
+        ):
+            assert called(executor, lambda: runner.run(timeout=9.0)) is Status.SUCCESS
+
+    @pytest.mark.parametrize("whose", ["the user's", "its own"])
+    def test_of_the_executor_that_this_thread_has_to_spin_it_says_what_to_do(
+        self, node: Any, whose: str
+    ) -> None:
+        def within(runner: TreeRunner) -> Status:
+            with runner:
+                return runner.run()
+
+        def waits(runner: TreeRunner) -> Status:
+            runner.start()
+            return runner.wait()
+
+        with contextlib.ExitStack() as stack:
+            if whose == "the user's":
+                stack.enter_context(spun(node))
+            runner = stack.enter_context(TreeRunner(Gate(), node=node))
+            runner.start()
+            runner.interrupt()  # it spins from now on
+            runner.wait()
+            for call in within, waits:
+                error = called(runner.executor, lambda call=call: call(runner))
+                assert isinstance(error, RuntimeError)
+                assert "in a done callback of `future`" in str(error)
+                if whose == "the user's":
+                    break  # it is shut down: nothing of that has to wait for the thread
+
+
+class TestFuture:
+    def test_has_the_status_of_the_run_that_was_started(self, node: Any) -> None:
+        gate, told = Gate(), list[Any]()
+        with TreeRunner(gate, node=node) as runner:
+            with pytest.raises(RuntimeError, match="not been started"):
+                _ = runner.future
+            assert not runner.running
+            runner.start()
+            assert runner.running
+            runner.future.add_done_callback(lambda f: told.append((f.result(), runner.running)))
+            assert not runner.future.cancel()
+            gate.passed = True
+            assert runner.future.result(9.0) is Status.SUCCESS
+            until(lambda: told)
+            assert told == [(Status.SUCCESS, False)]
+
+    def test_has_what_the_run_raised(self, node: Any, capfd: pytest.CaptureFixture[str]) -> None:
+        with TreeRunner(Raises("culprit", "update"), node=node) as runner:
+            runner.start()
+            assert isinstance(runner.future.exception(9.0), TreeError)
+        assert "the tree that was started raised" not in capfd.readouterr().err
+
+    def test_may_be_awaited(self, node: Any) -> None:
+        async def awaits() -> Status:
+            with TreeRunner(py_trees.behaviours.Success("s"), node=node) as runner:
+                runner.start()
+                return await asyncio.wrap_future(runner.future)
+
+        assert asyncio.run(awaits()) is Status.SUCCESS
+
+    def test_a_done_callback_may_start_the_next_run_and_shut_down(self, node: Any) -> None:
+        gate, statuses, is_down = Gate(), list[Status](), threading.Event()
+
+        def next_one(future: Any) -> None:
+            statuses.append(future.result())
+            if len(statuses) < 3:
+                runner.start()
+                runner.future.add_done_callback(next_one)
+            else:
+                runner.shutdown()
+                is_down.set()
+
+        runner = TreeRunner(gate, node=node)
+        runner.start()
+        runner.future.add_done_callback(next_one)
+        gate.passed = True
+        assert is_down.wait(9.0)
+        assert statuses == [Status.SUCCESS] * 3
+        assert node.executor is None
+
+
+class TestOneRunAtATime:
+    @pytest.mark.parametrize("part", ["the same root", "a subtree"])
+    def test_a_tree_that_runs_in_another_runner_is_refused_and_both_are_named(
+        self, node: Any, part: str
+    ) -> None:
+        inner = in_sequence(Gate(), name="inner")
+        root = in_sequence(inner, name="root")
+        with TreeRunner(root, node=node) as runner:
+            runner.start()
+            with TreeRunner(root if part == "the same root" else inner) as other:
+                here, there = (r.node.get_fully_qualified_name() for r in (other, runner))
+                for call in other.run, other.start:
+                    with pytest.raises(RuntimeError, match=f"{here}: root is running .* {there},"):
+                        call()
+                runner.interrupt()
+                runner.wait()
+                other.interrupt()
+                assert other.run() is Status.INVALID
 
 
 class Stuck(Behaviour):
@@ -508,7 +639,10 @@ class TestPause:
 
 
 class TestWhoSpins:
-    def test_a_node_in_an_executor_that_nobody_spins_is_an_error(self, node: Any) -> None:
+    def test_a_node_in_an_executor_that_nobody_spins_is_an_error(
+        self, node: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(spinning, "PATIENCE_SPUN", 0.5)
         executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)
         started = time.monotonic()
@@ -517,7 +651,7 @@ class TestWhoSpins:
             pytest.raises(RuntimeError, match="nobody spins"),
         ):
             runner.run(timeout=9.0)
-        assert 0.9 <= time.monotonic() - started < 9.0
+        assert 0.5 <= time.monotonic() - started < 9.0
         executor.shutdown()
         node.executor = None
 
@@ -526,19 +660,20 @@ class TestWhoSpins:
     ) -> None:
         leaf = MoveRobot("m", 0.5, action_name=name)
         with contextlib.ExitStack() as stack:
-            spinning = contextlib.ExitStack()
-            spinning.enter_context(spun(node))
+            theirs = contextlib.ExitStack()
+            theirs.enter_context(spun(node))
             runner = stack.enter_context(TreeRunner(leaf, node=node))
             runner.start()
             until(lambda: state(leaf) == "EXECUTING")
-            spinning.close()
+            theirs.close()
             with pytest.raises(RuntimeError, match="nobody spins"):
-                runner.wait(8.0)
+                runner.wait(9.0)
         assert journal.ends() in (["succeeded"], ["canceled"])
 
     def test_an_executor_that_stands_still_is_an_error_as_well(
-        self, journal: Journal, name: str, node: Any
+        self, journal: Journal, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        monkeypatch.setattr(spinning, "PATIENCE_SPUN", 1.0)
         leaf = MoveRobot("m", 9.0, action_name=name)
         free, held = threading.Event(), threading.Event()
         with spun(node) as executor, TreeRunner(leaf, node=node) as runner:
@@ -546,10 +681,46 @@ class TestWhoSpins:
             until(lambda: state(leaf) == "EXECUTING")
             executor.create_task(lambda: (held.set(), free.wait(20.0)))
             held.wait(5.0)
-            with pytest.raises(RuntimeError, match="nobody spins"):
-                runner.wait(9.0)
+            where = rf"has been in <lambda> \({__file__}:\d+\) for 1 s"
+            with pytest.raises(RuntimeError, match=where):
+                runner.wait(15.0)
             assert journal.ends() == ["canceled"]
             free.set()
+
+    def test_an_executor_that_is_spun_may_be_too_busy_to_answer(
+        self, node: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(spinning, "PATIENCE", 0.05)
+        monkeypatch.setattr(spinning, "PATIENCE_SPUN", 0.1)
+        with spun(node) as executor, TreeRunner(Gate(), node=node) as runner:
+            monkeypatch.setattr(executor, "create_task", lambda callback: None)
+            with pytest.raises(TimeoutError):
+                runner.run(timeout=0.8)
+
+    @pytest.mark.parametrize("whose", ["the executor's", "rclpy's"])
+    def test_a_loop_that_spins_once_now_and_then_spins(
+        self, journal: Journal, name: str, node: Any, whose: str
+    ) -> None:
+        executor, over = SingleThreadedExecutor(context=node.context), threading.Event()
+        executor.add_node(node)
+
+        def loop() -> None:
+            while not over.wait(0.05):
+                if whose == "rclpy's":  # puts the node in and out each time
+                    rclpy.spin_once(node, executor=executor, timeout_sec=0.0)
+                else:
+                    executor.spin_once(timeout_sec=0.0)
+
+        thread = threading.Thread(target=loop)
+        with TreeRunner(MoveRobot("m", 1.5, action_name=name), node=node) as runner:
+            if whose == "rclpy's":
+                executor.remove_node(node)
+            thread.start()
+            assert runner.run(timeout=20.0) is Status.SUCCESS
+        over.set()
+        thread.join()
+        executor.shutdown()
+        node.executor = None
 
     @pytest.mark.parametrize("how", ["shut down", "node removed"])
     def test_an_executor_that_is_taken_away_fails_the_tree(

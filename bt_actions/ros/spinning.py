@@ -8,12 +8,13 @@ beyond closing the node's traffic.
 from __future__ import annotations
 
 import contextlib
-import inspect
 import itertools
 import os
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from types import FrameType
 from typing import Any
 
 from rclpy.context import Context
@@ -23,6 +24,7 @@ from rclpy.executors import (
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
+from rclpy.task import Task
 
 from bt_actions.ros import participant
 from bt_actions.ros.executor import OnceExecutor
@@ -32,9 +34,11 @@ from bt_actions.ros.traffic import Traffic
 THREADS = 2
 """Of the multi-threaded executor; the interpreter lock does the work, more are no faster."""
 PATIENCE = 1.0
-"""Seconds after which a node that somebody else should be spinning counts as not spun."""
-PATIENCE_RUNNING = 5.0
-"""The same while a tree runs, where a slow callback of the user's must be no false alarm."""
+"""Seconds between two questions to an executor of somebody else's; at shutdown, those after which
+it is told that a callback does not return."""
+PATIENCE_SPUN = 5.0
+"""Seconds without any sign that somebody else spins our node, where a loop of theirs may call
+spin_once now and then, and a slow callback must be no false alarm."""
 
 _number = itertools.count(1)
 
@@ -64,7 +68,8 @@ class Spinner:
         self._context: Context | None = None
         self._stopping = False
         self._alive = threading.Event()
-        self._asked_at = 0.0
+        self._asked_at = self._seen_at = 0.0
+        self._seen_in: set[Task] = set()
         self._own_node = node is None
         if executor not in (None, "multi", "single") and not isinstance(executor, Executor):
             raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {executor!r}")
@@ -105,7 +110,7 @@ class Spinner:
     def start(self) -> None:
         """Begin to spin; where somebody else should be spinning, make sure that they do.
 
-        Raises RuntimeError when nobody does, for 1 s.
+        Raises RuntimeError when nobody does, for 5 s.
         """
         if self.spins:
             if self._thread is None:
@@ -114,36 +119,79 @@ class Spinner:
                 self._thread.start()
             return
         self._ask_for_life()
-        self._alive.wait(PATIENCE)
-        self._check(PATIENCE)
+        while not self._alive.wait(0.05) and _callbacks_in(self.executor) is None:
+            self._check()
 
     def check(self) -> None:
-        """Make sure now and then that whoever spins our node still does; never waits.
+        """Make sure now and then that whoever spins our node still does.
 
-        Raises RuntimeError when nobody has for 5 s, or the node was taken out of its executor. Out
-        of one that is spun here: calls `died`.
+        Raises RuntimeError when nobody has for 5 s, the executor stands in callbacks that do not
+        return, or the node was taken out of it. Out of one that is spun here: calls `died`.
         """
         if not self.spins:
-            self._check(PATIENCE_RUNNING)
+            self._check()
         elif self._left():
             self._died(self._gone())
 
-    def _check(self, patience: float) -> None:
-        since = time.monotonic() - self._asked_at
-        if self._left() or (not self._alive.is_set() and since >= patience):
-            raise RuntimeError(
-                f"node {self.node.get_fully_qualified_name()} is in an executor that nobody spins; "
-                "spin it on another thread while the tree runs, or leave the executor out"
+    def taken_away(self) -> str:
+        """Say that our node has been put into another executor; empty where it has not, in 0.1 us.
+
+        For the thread that ticks, as soon as a behaviour has been in charge.
+        """
+        if not self._moved():
+            return ""
+        return (
+            f"node {self.node.get_fully_qualified_name()} was taken out of its executor in this "
+            "tick, as rclpy.spin_until_future_complete(node, ...) and the like do it; return "
+            "RUNNING until the future is done instead"
+        )
+
+    def is_here(self) -> bool:
+        """Whether our node is not spun while this thread waits.
+
+        This thread spins it, or, where it is spun by us, was called by the executor.
+        """
+        frames = list(_frames(sys._getframe()))  # noqa: SLF001 - documented
+        return any(_spins(self.executor, each) for each in frames) or (
+            self.spins and any(_task(self.executor, each) for each in frames)
+        )
+
+    def _check(self) -> None:
+        if self._moved():
+            raise self._gone()
+        now, left = time.monotonic(), self._left()  # rclpy.spin_once(node) puts it in and out
+        if self._alive.is_set() and not left:
+            if now - self._asked_at >= PATIENCE:
+                self._ask_for_life()
+            return
+        callbacks = None if left else _callbacks_in(self.executor)
+        if callbacks is not None and (not callbacks or callbacks.keys() != self._seen_in):
+            self._seen_at, self._seen_in = now, set(callbacks)
+        elif now - self._seen_at >= PATIENCE_SPUN and (left or not self._alive.wait(PATIENCE)):
+            # that wait: where this whole process stood still, they need a moment, too
+            raise self._unspun(callbacks or {})
+
+    def _unspun(self, callbacks: dict[Task, str]) -> RuntimeError:
+        why = "nobody spins; spin it on another thread while the tree runs"
+        if callbacks:
+            why = (
+                f"has been in {' and '.join(callbacks.values())} for {PATIENCE_SPUN:g} s, and "
+                "hears nothing of goals meanwhile; let callbacks return"
             )
-        if self._alive.is_set() and since >= PATIENCE:
-            self._ask_for_life()
+        name = self.node.get_fully_qualified_name()
+        return RuntimeError(f"node {name} is in an executor that {why}, or leave the executor out")
 
     def _ask_for_life(self) -> None:
         self._alive = threading.Event()
-        self._asked_at = time.monotonic()
+        self._asked_at = self._seen_at = time.monotonic()
+        self._seen_in = set()
         with contextlib.suppress(AttributeError):  # of the guard of an executor that is shut down
             self.executor.create_task(self._alive.set)
             self.executor.wake()
+
+    def _moved(self) -> bool:
+        executor = self.node.executor
+        return executor is not self.executor and executor is not None
 
     def _left(self) -> bool:
         """Whether the node was taken out of its executor; shut down, that holds none."""
@@ -236,11 +284,38 @@ def node_beside(node: Node, name: str) -> Node:
     return Node(name, context=node.context, use_global_arguments=False)
 
 
-def on_executor_thread() -> bool:
-    """Whether the caller was itself called by an executor, so that waiting for one would hang."""
-    frame = inspect.currentframe()
-    while frame is not None:
-        if frame.f_globals.get("__name__") in ("rclpy.executors", "rclpy.task"):
-            return True
-        frame = frame.f_back
-    return False
+def _frames(top: FrameType | None) -> Iterator[FrameType]:
+    while top is not None:
+        yield top
+        top = top.f_back
+
+
+def _spins(executor: Executor, frame: FrameType) -> bool:
+    """Whether a frame is one of `spin`, `spin_once` and the like of the executor."""
+    return "spin" in frame.f_code.co_name and frame.f_locals.get("self") is executor
+
+
+def _task(executor: Executor, frame: FrameType) -> Task | None:
+    """Return what the executor does in a frame, where that is where it calls a callback."""
+    if frame.f_code is not Task.__call__.__code__:
+        return None
+    task: Task = frame.f_locals["self"]
+    return task if task._executor() is executor else None  # noqa: SLF001
+
+
+def _callbacks_in(executor: Executor) -> dict[Task, str] | None:
+    """Return which callbacks the executor is in, with their places; None where nobody spins it.
+
+    However busy it or the machine is: nothing has to be answered for that.
+    """
+    is_spun, callbacks = False, dict[Task, str]()
+    for top in sys._current_frames().values():  # noqa: SLF001 - documented
+        outermost = top
+        for frame in _frames(top):
+            is_spun = is_spun or _spins(executor, frame)
+            if task := _task(executor, frame):
+                code = outermost.f_code
+                callbacks[task] = f"{code.co_name} ({code.co_filename}:{outermost.f_lineno})"
+            if not frame.f_globals.get("__name__", "").startswith("rclpy."):
+                outermost = frame
+    return callbacks if is_spun else None
