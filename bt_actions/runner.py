@@ -29,7 +29,16 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.plain_text import raised
 from bt_actions.policy import End, Outcome
-from bt_actions.ticking import ChangeVisitor, Patience, culprit_of, path_of, root_of, tick_once
+from bt_actions.ticking import (
+    ChangeVisitor,
+    Misbehaviour,
+    Patience,
+    SetUp,
+    culprit_of,
+    path_of,
+    root_of,
+    tick_once,
+)
 
 if TYPE_CHECKING:
     from bt_actions.ros.shared import Change, Ticket
@@ -48,7 +57,7 @@ _beginning = threading.Lock()
 
 
 class TreeError(Exception):
-    """A behaviour raised, or the spin thread died; the tree's goals have been drained."""
+    """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +82,8 @@ class TreeRunner:
         heartbeat: seconds after which the tree is ticked though nothing has happened.
         namespace: of the node that is made here.
 
-    Use it as a context manager, or call `shutdown` in the end. Not reentrant, but may run again.
+    Use it as a context manager, or call `shutdown` in the end. Not reentrant, but may run again:
+    the tree is set up once. It works in a callback of anybody else's executor.
     """
 
     def __init__(
@@ -97,7 +107,8 @@ class TreeRunner:
         self._changes: deque[Change] = deque()
         self._observers: list[Observer] = []
         self._on_close: list[Callable[[], None]] = []
-        self._visitor = ChangeVisitor()
+        self._set_up = SetUp()
+        self._doing = "setup"
         self._stop_wanted = False
         self._abandoned = False
         self._pause_wanted = False
@@ -117,6 +128,7 @@ class TreeRunner:
         self._tickets: set[Ticket] = set()
         self._patience = Patience(_warn)  # on its behalf the ticks of ours begin goals
         self._spinner = Spinner(node, executor, namespace=namespace, died=self._spin_died)
+        self._visitor = ChangeVisitor(self._set_up_rest, self._spinner.taken_away)
         self._traffic = _traffic_of(self._spinner.node)
         self._traffic.observe(self._note)
         # Before the exit hook of ros/traffic.py: a tree that ticks on would send another goal, and
@@ -464,7 +476,7 @@ class TreeRunner:
         self._runs_on = threading.get_ident()
         self._patience.begin(deadline)
         try:
-            self._guarded("setup", self._set_up)  # clients are made before anything spins
+            self._guarded(self._set_up_all)  # clients are made before anything spins
             self._spinner.start()
             self._emit(TreeStarted(time.monotonic()))
             status = self._tick_until(deadline)
@@ -482,8 +494,21 @@ class TreeRunner:
             raise TimeoutError(f"{self.tree.root.name} did not finish within {timeout:g} s")
         return status
 
-    def _set_up(self) -> None:
-        self.tree.setup(timeout=Duration.INFINITE, node=self.node)
+    def _set_up_all(self) -> None:
+        """Set up the tree, in the first run, or what is new in it."""
+        self._doing = "setup"
+        tree = self.tree
+        if type(tree).setup is not BehaviourTree.setup and not self._set_up.has_begun:
+            tree.setup(timeout=Duration.INFINITE, node=self.node)  # and it does more than that
+            for _ in self._set_up.missing(tree.root):
+                pass
+        for behaviour in self._set_up.missing(tree.root):
+            behaviour.setup(node=self.node)
+        self._doing = "tick"
+
+    def _set_up_rest(self) -> None:
+        if not self._set_up.is_complete(self.tree.root):
+            self._set_up_all()
 
     def _tick_until(self, deadline: float | None) -> Status:
         """Tick until the tree has a status; INVALID when interrupted or out of time."""
@@ -516,19 +541,24 @@ class TreeRunner:
         """Tick; again at once while each tick changes a status, and nobody wants it to stop."""
         for _ in range(BURST):
             self._visitor.begin()
-            with self._traffic.begun_by(self._patience):
-                self._guarded("tick", lambda: tick_once(self.tree))
-            changed = self._visitor.finish()
-            self._flush()
-            for node, status in changed:
-                message = node.feedback_message
-                self._emit(NodeChanged(time.monotonic(), path_of(node), node, status, message))
+            try:
+                with self._traffic.begun_by(self._patience):
+                    self._guarded(lambda: tick_once(self.tree))
+            finally:
+                changed = self._visitor.finish()
+                self._flush()
+                self._tell(changed)
             status = self.tree.root.status
             if not changed or status is not Status.RUNNING:
                 return status
             if self._stop_wanted or self._pause_wanted or _past(deadline):
                 return status
         return self.tree.root.status
+
+    def _tell(self, changes: list[tuple[Behaviour, Status]]) -> None:
+        for node, status in changes:
+            message = node.feedback_message
+            self._emit(NodeChanged(time.monotonic(), path_of(node), node, status, message))
 
     def _dues(self) -> list[float]:
         """The deadlines that running behaviours have of their own, as seconds from now."""
@@ -561,40 +591,43 @@ class TreeRunner:
             except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
                 _error(f"terminate of a behaviour raised: {raised(error)}")
                 self._leave_with(error)
-                self._let_go()
+                self._let_go(culprit_of(error))
         self._patience.end()
         _drain(self._tickets, self._hurry)
         self._flush()
-        for node, changed in self._visitor.finish(interrupted=True):
-            message = node.feedback_message
-            self._emit(NodeChanged(time.monotonic(), path_of(node), node, changed, message))
+        self._tell(self._visitor.stopped())
         self._tickets = {ticket for ticket in self._tickets if not ticket.is_over}
         _flush_log()  # who tells of the end tells it last
         self._emit(TreeFinished(time.monotonic(), status))
 
-    def _let_go(self) -> None:
-        """Interrupt every action, though one's own class of it may raise in that."""
+    def _let_go(self, culprit: Behaviour | None) -> None:
+        """Stop what a terminate() that raised has kept from it, and interrupt every action."""
         for node in self.tree.root.iterate():
-            if isinstance(node, ActionBehaviour):
+            if node.status is Status.RUNNING:
                 try:
-                    if node.status is Status.RUNNING:
+                    if node is not culprit:
                         node.terminate(Status.INVALID)
                 except BaseException as error:  # noqa: BLE001 - the user's: any
                     _error(f"terminate of {node.name} raised: {raised(error)}")
                     self._leave_with(error)
+                node.status = Status.INVALID
+            if isinstance(node, ActionBehaviour):
                 ActionBehaviour.terminate(node, Status.INVALID)
 
     def _hurry(self) -> bool:
         self._flush()
         return self._abandoned
 
-    def _guarded(self, doing: str, step: Any) -> None:
+    def _guarded(self, step: Callable[[], None]) -> None:
         try:
             step()
         except Exception as error:
             culprit = culprit_of(error)
             where = f"{'/'.join(path_of(culprit))}" if culprit is not None else self.tree.root.name
-            raise TreeError(f"{where}: {doing} raised {type(error).__name__}: {error}") from error
+            if isinstance(error, Misbehaviour):
+                raise TreeError(f"{where}: {error}") from None
+            what = f"{self._doing} raised {type(error).__name__}: {error}"
+            raise TreeError(f"{where}: {what}") from error
 
     # Who wakes and who is told
 

@@ -6,10 +6,11 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from py_trees.composites import Composite
 from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
@@ -92,12 +93,60 @@ class Patience:
         return "the tree"
 
 
+class Misbehaviour(Exception):
+    """What a behaviour did wrong without raising anything; raised in its `visit`."""
+
+
+class SetUp:
+    """Which behaviours of a tree have been set up, and whether others have been inserted since.
+
+    That is asked at each tick, so it compares the lists of children with what they were (about
+    10 ns a behaviour), and walks the tree only where one differs.
+    """
+
+    def __init__(self) -> None:
+        self._done = weakref.WeakSet[Behaviour]()
+        self._root: Behaviour | None = None
+        self._parents: list[Behaviour] = []
+        self._children: list[list[Behaviour]] = []
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether any behaviour has been."""
+        return len(self._done) > 0
+
+    def is_complete(self, root: Behaviour) -> bool:
+        """Whether the tree holds what it held when nothing was missing any more."""
+        return self._root is root and self._children == [each.children for each in self._parents]
+
+    def missing(self, root: Behaviour) -> Iterator[Behaviour]:
+        """Yield what has not been set up, children first; who asks for the next one has done it."""
+        while new := [each for each in root.iterate() if each not in self._done]:
+            for behaviour in new:
+                yield behaviour
+                self._done.add(behaviour)
+        self._root = root
+        self._parents = [
+            each for each in root.iterate() if each.children or isinstance(each, Composite)
+        ]
+        self._children = [list(each.children) for each in self._parents]
+
+
 class ChangeVisitor(VisitorBase):
     """Collects which behaviours have another status than before, and which run."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        before: Callable[[], None] = lambda: None,
+        after_each: Callable[[], str] = lambda: "",
+    ) -> None:
+        """`before` is called between the handlers of a tick and its first behaviour.
+
+        `after_each` is called when a behaviour has ticked, and what it returns is its misbehaviour.
+        """
         super().__init__(full=False)
         self.running: list[Behaviour] = []
+        self._before, self._after_each = before, after_each
         self._visited: list[Behaviour] = []
         self._known = weakref.WeakKeyDictionary[Behaviour, Status]()
 
@@ -110,21 +159,43 @@ class ChangeVisitor(VisitorBase):
         """Begin a tick."""
         self._visited = []
 
-    def run(self, behaviour: Behaviour) -> None:
-        """Take note of a behaviour that was ticked (py_trees calls this)."""
-        self._visited.append(behaviour)
+    def initialise(self) -> None:
+        """Do what has to be done before (py_trees calls this)."""
+        self._before()
 
-    def finish(self, *, interrupted: bool = False) -> list[tuple[Behaviour, Status]]:
-        """Return the changes of this tick: of what it visited, and of what it stopped."""
-        visited = [] if interrupted else self._visited
+    def run(self, behaviour: Behaviour) -> None:
+        """Take note of a behaviour that was ticked (py_trees calls this).
+
+        Raises Misbehaviour, also where it has no status: py_trees makes INVALID of what is none,
+        and goes on with its parent. Nothing else leaves that after a tick.
+        """
+        status = behaviour.status
+        if status is Status.INVALID or status.__class__ is not Status:
+            raise Misbehaviour(
+                "no status after its tick; update() has to return RUNNING, SUCCESS or FAILURE"
+            )
+        self._visited.append(behaviour)
+        if wrong := self._after_each():
+            raise Misbehaviour(wrong)
+
+    def finish(self) -> list[tuple[Behaviour, Status]]:
+        """Return the changes of a tick, also of one that raised: what it visited and stopped."""
+        visited = self._visited
         seen = set(visited)
         stopped = [node for node in self.running if node not in seen]
+        self.running = [node for node in visited if node.status is Status.RUNNING]
+        return self._changes([*stopped, *visited])
+
+    def stopped(self) -> list[tuple[Behaviour, Status]]:
+        """Return the changes of what was last known to run."""
+        return self._changes([n for n, s in list(self._known.items()) if s is Status.RUNNING])
+
+    def _changes(self, nodes: list[Behaviour]) -> list[tuple[Behaviour, Status]]:
         changes = []
-        for node in [*stopped, *visited]:
+        for node in nodes:
             if self._known.get(node) is not node.status:
                 self._known[node] = node.status
                 changes.append((node, node.status))
-        self.running = [node for node in visited if node.status is Status.RUNNING]
         return changes
 
 

@@ -28,7 +28,7 @@ from bt_actions.ros import spinning
 from bt_actions.ros.log import log
 from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
-from tests.support.trees import Gate, Raises, in_sequence, state, together
+from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, state, together
 from tests.support.waiting import holds_for, until
 
 
@@ -300,6 +300,133 @@ class TestOneRunAtATime:
                 runner.wait()
                 other.interrupt()
                 assert other.run() is Status.INVALID
+
+
+class WithoutStatus(Behaviour):
+    def __init__(self, status: Any = None) -> None:
+        super().__init__("forgets")
+        self.returns = status
+
+    def update(self) -> Any:
+        return self.returns
+
+
+class ForgetfulDecorator(py_trees.decorators.Decorator):
+    def update(self) -> Any:
+        return None
+
+
+class ForgetfulComposite(py_trees.composites.Composite):
+    def tick(self) -> Iterator[Behaviour]:
+        yield from self.children[0].tick()
+        self.status = None  # type: ignore[assignment]
+        yield self
+
+
+class TestWithoutAStatus:
+    @pytest.mark.parametrize(
+        "bad",
+        [
+            WithoutStatus(),
+            WithoutStatus("SUCCESS"),
+            ForgetfulDecorator("forgets", py_trees.behaviours.Success("s")),
+            ForgetfulComposite("forgets", [py_trees.behaviours.Success("s")]),
+        ],
+        ids=["leaf", "leaf that returns something else", "decorator", "composite"],
+    )
+    def test_a_behaviour_ends_the_run_and_nothing_passes_over_it(
+        self, node: Any, bad: Behaviour
+    ) -> None:
+        then = py_trees.behaviours.Success("then")
+        root = in_turn(in_sequence(bad, name="branch"), then, name="root")
+        with (
+            TreeRunner(root, node=node) as runner,
+            pytest.raises(TreeError, match=r"^root/branch/forgets: no status after its tick"),
+        ):
+            runner.run(timeout=9.0)
+
+
+class Counted(Behaviour):
+    """Notes what is called; SUCCESS."""
+
+    def __init__(self, name: str, calls: list[str], *, fails: int = 0) -> None:
+        super().__init__(name)
+        self.calls, self.fails = calls, fails
+
+    def setup(self, **kwargs: Any) -> None:
+        self.calls.append(f"setup {self.name}")
+        self.fails -= 1
+        if self.fails >= 0:
+            raise OSError("no device")
+
+    def update(self) -> Status:
+        self.calls.append(self.name)
+        return Status.SUCCESS
+
+    def shutdown(self) -> None:
+        self.calls.append(f"shutdown {self.name}")
+
+
+class TestSetup:
+    def test_is_called_once_however_often_the_tree_runs(self, node: Any) -> None:
+        calls: list[str] = []
+        with TreeRunner(in_sequence(Counted("a", calls)), node=node) as runner:
+            for _ in range(3):
+                runner.run(timeout=9.0)
+        assert calls == ["setup a", "a", "a", "a", "shutdown a"]
+
+    def test_of_a_tree_with_a_setup_of_its_own_is_called_once(self, node: Any) -> None:
+        class Tree(py_trees.trees.BehaviourTree):
+            def setup(self, *args: Any, **kwargs: Any) -> None:
+                calls.append("setup of the tree")
+                super().setup(*args, **kwargs)
+
+        calls: list[str] = []
+        with TreeRunner(Tree(Counted("a", calls)), node=node) as runner:
+            for _ in range(2):
+                runner.run(timeout=9.0)
+        assert calls == ["setup of the tree", "setup a", "a", "a", "shutdown a"]
+
+    def test_that_raised_is_called_again_for_those_that_were_not_set_up(self, node: Any) -> None:
+        calls: list[str] = []
+        root = in_sequence(Counted("a", calls), Counted("b", calls, fails=1), name="root")
+        with TreeRunner(root, node=node) as runner:
+            with pytest.raises(TreeError, match="root/b: setup raised OSError: no device"):
+                runner.run(timeout=9.0)
+            runner.run(timeout=9.0)
+        assert calls[:5] == ["setup a", "setup b", "setup b", "a", "b"]
+
+    @pytest.mark.parametrize("who", ["handler", "observer"])
+    def test_of_what_is_inserted_in_a_run_comes_before_its_first_tick(
+        self, node: Any, who: str
+    ) -> None:
+        calls: list[str] = []
+        inner = in_sequence(Gate(), name="inner")
+        tree = py_trees.trees.BehaviourTree(in_sequence(inner, name="root"))
+
+        def replace(_: object) -> None:
+            if tree.root.status is Status.RUNNING and len(inner.children) == 1:
+                inner.remove_all_children()
+                inner.add_child(Counted("new", calls))
+                inner.add_child(Counted("last", calls))
+
+        with TreeRunner(tree, node=node) as runner:
+            if who == "handler":
+                tree.add_pre_tick_handler(replace)
+            else:
+                runner.observe(replace)
+            assert runner.run(timeout=9.0) is Status.SUCCESS
+        assert calls[:4] == ["setup new", "setup last", "new", "last"]
+
+    def test_of_what_is_inserted_in_a_run_is_named_where_it_raises(self, node: Any) -> None:
+        root, new = in_sequence(Gate(), name="root"), Raises("new", "setup")
+        tree = py_trees.trees.BehaviourTree(root)
+        tree.add_pre_tick_handler(lambda _: root.add_child(new))
+        with (
+            TreeRunner(tree, node=node) as runner,
+            pytest.raises(TreeError, match=r"^root/new: setup raised"),
+        ):
+            runner.run(timeout=9.0)
 
 
 class Stuck(Behaviour):
@@ -722,6 +849,28 @@ class TestWhoSpins:
         executor.shutdown()
         node.executor = None
 
+    @pytest.mark.parametrize("whose", ["the user's", "its own"])
+    def test_a_behaviour_that_spins_the_node_is_named(self, node: Any, whose: str) -> None:
+        class Asks(Behaviour):
+            def update(self) -> Status:
+                theirs = SingleThreadedExecutor(context=node.context)
+                theirs.add_node(node)
+                theirs.spin_until_future_complete(theirs.create_task(lambda: None), 5.0)
+                theirs.remove_node(node)
+                theirs_all.append(theirs)
+                return Status.RUNNING
+
+        theirs_all: list[SingleThreadedExecutor] = []
+        with contextlib.ExitStack() as stack:
+            if whose == "the user's":
+                stack.enter_context(spun(node))
+            runner = stack.enter_context(TreeRunner(in_sequence(Asks("asks")), node=node))
+            with pytest.raises(TreeError, match="sequence/asks: node /tests was taken out of its"):
+                runner.run(timeout=9.0)
+        for each in theirs_all:
+            each.shutdown()
+        node.executor = None
+
     @pytest.mark.parametrize("how", ["shut down", "node removed"])
     def test_an_executor_that_is_taken_away_fails_the_tree(
         self, journal: Journal, name: str, executor: str, how: str
@@ -912,6 +1061,37 @@ class TestEvents:
         assert (goal.state, goal.outcome, goal.end) == ("DONE", "CANCELED", "CANCELED")
         changes = {event.path: event.status for event in events if isinstance(event, NodeChanged)}
         assert changes == {("root",): Status.INVALID, ("root", "m"): Status.INVALID}
+
+    @pytest.mark.parametrize("when", ["at the end", "in a tick"])
+    def test_of_a_tree_whose_terminate_raises_end_with_each_status(
+        self, node: Any, when: str
+    ) -> None:
+        ends = Guard("ends")
+        bad = Raises("bad", "terminate")
+        branch = in_sequence(together(Gate("before"), bad, Gate("behind")), name="branch")
+        told: dict[str, Status] = {}
+
+        def observer(event: Event) -> None:
+            if isinstance(event, NodeChanged):
+                told[event.path[-1]] = event.status
+                if event.path == ("root",) and event.status is Status.RUNNING:
+                    ends.holds = when == "in a tick"
+                    if when == "at the end":
+                        runner.interrupt()
+
+        root = in_turn(ends, branch, name="root", memory=False)
+        with TreeRunner(root, node=node) as runner:
+            runner.observe(observer)
+            if when == "at the end":
+                assert runner.run(timeout=9.0) is Status.INVALID
+            else:
+                with pytest.raises(TreeError, match="bad: tick raised RuntimeError: on purpose"):
+                    runner.run(timeout=9.0)
+            bad.method = ""
+        stopped = ["root", "branch", "together", "before", "bad", "behind"]
+        assert {each: told[each] for each in stopped} == dict.fromkeys(stopped, Status.INVALID)
+        assert told["ends"] is (Status.FAILURE if when == "at the end" else Status.SUCCESS)
+        assert all(each.status is Status.INVALID for each in branch.iterate())
 
     def test_an_observer_that_raises_is_dropped_and_the_run_goes_on(
         self, journal: Journal, name: str, node: Any

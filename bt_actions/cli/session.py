@@ -225,7 +225,9 @@ def _bug(error: BaseException | None) -> str:
     """One line about an exception in a behaviour, with the place in the user's code."""
     if error is None:
         return ""
+    from bt_actions.runner import TreeError
+
     cause = error.__cause__ or error
-    frames = traceback.extract_tb(cause.__traceback__)
+    frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
     where = f" ({frames[-1].filename}:{frames[-1].lineno})" if frames else ""
     return f"{error}{where}"
