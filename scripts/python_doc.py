@@ -29,7 +29,8 @@ HEAD = """\
 
 `import bt_actions` gives the names on this page, but for the two parts at its end. How a tree of
 your own is made of them and run stands in the [README](../README.md#in-your-own-py_trees-tree), a
-whole program in [examples/embed.py](../examples/embed.py). Times are seconds.
+whole program in [examples/embed.py](../examples/embed.py), one that offers a tree as an action in
+[examples/offer.py](../examples/offer.py). Times are seconds.
 
 What holds everywhere:
 
@@ -37,10 +38,16 @@ What holds everywhere:
 - **The goals need no tick.** From its request to its end a goal is driven by what arrives and by a
   thread of its own: it is canceled and drained also where nobody ticks, or spins, any more.
 - **Somebody must spin the node** while the tree runs. `TreeRunner` does, unless it was given a node
-  that is in an executor.
+  that is in an executor. No behaviour may: `rclpy.spin_until_future_complete(node, ...)` takes the
+  node out of its executor, and the run ends with a TreeError that names the behaviour.
+- **In a callback** of anybody's executor a `TreeRunner` with a node of its own can `run()`. On the
+  node that the callback belongs to it can where another thread of the executor is free for the
+  answers; else `start()` it, and take the status in a done callback of its `future`.
 - **`shutdown()` cancels and waits** until each goal is accounted for, at most as long as its
   `timeout.cancel` (and `timeout.accept`, where it was not answered yet). A loop that never
   calls it is covered by an exit hook.
+- **`setup` is called once** a runner, however often the tree runs. What is inserted later is set up
+  before its first tick, unless it is inserted and ticked in one and the same tick.
 - **After a tick that raised**, call `shutdown()` where the loop is your own: `stop(INVALID)` at the
   root does not reach what runs below a composite of py_trees whose first tick this was.
   `TreeRunner` drains by itself.

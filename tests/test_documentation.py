@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes import Host, HostFactory, Process
+from tests.support.waiting import until
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -69,6 +70,22 @@ def test_ctrl_c_in_the_example_cancels_its_goal_on_the_server(
     assert program.wait() == 1, program
     robot.wait_for("canceled")
     assert "succeeded" not in robot.events()
+
+
+def test_the_example_of_a_tree_as_an_action_delivers_and_ends_at_a_cancel_request(
+    start_program: Start, server: Host
+) -> None:
+    robot = server.robot("", "3:slow=200", speed=10.0)
+    start_program("examples/offer.py")
+    goal = ("-m", "bt_actions.cli", "send", "deliver", "MoveRobot")
+    sent = start_program(*goal, "distance=5.0")
+    assert sent.wait(60.0) == 0, sent
+    assert any("the tree ended with SUCCESS" in line for line in sent.lines), sent
+    sent = start_program(*goal, "distance=5.0")
+    until(lambda: robot.count("accepted") == 3, 40.0)
+    sent.send(signal.SIGINT)
+    assert sent.wait(20.0) == 130, sent
+    assert robot.ends() == ["succeeded", "succeeded", "canceled"]
 
 
 def test_every_file_that_the_readme_and_the_docs_name_is_there() -> None:
