@@ -157,7 +157,7 @@ class Spinner:
         )
 
     def _check(self) -> None:
-        if self._moved():
+        if self._moved() or getattr(self.executor, "_is_shutdown", False):  # rclpy's name of it
             raise self._gone()
         now, left = time.monotonic(), self._left()  # rclpy.spin_once(node) puts it in and out
         if self._alive.is_set() and not left:
