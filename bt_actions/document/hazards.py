@@ -15,13 +15,11 @@ from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.order import find_early_reads
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
-from bt_actions.document.verdicts import Verdicts
+from bt_actions.document.verdicts import BEGUN, Verdicts
 
 __all__ = ["find_hazards"]
 
-_BUSY = frozenset(
-    {"action", "service", "wait", "wait_until", "wait_for_message", "running", "python"}
-)
+_BUSY = BEGUN | {"wait_until", "running", "python", "retry", "repeat", "for_each"}
 
 
 def find_hazards(checker: Checker, doubts: Doubts) -> None:
@@ -39,6 +37,7 @@ class _Hazards:
         self._document: Document = checker.document
         self._source = checker.source
         self._verdicts = Verdicts()
+        self._at_once = Verdicts(at_once=True)
         self._held: dict[tuple[int, str], dict[str, TreeNode]] = {}
         self._slow: dict[int, bool] = {}
         self._anew: dict[int, TreeNode | None] = {}
@@ -151,22 +150,23 @@ class _Hazards:
     def _reactive(self, node: TreeNode, kind: str) -> None:
         slow = (self._takes_time(child) for child in node.children)
         last = max((at for at, takes in enumerate(slow) if takes), default=0)
-        begun_anew = []
-        for child in node.children[:last]:
-            action, can = self._restarted(child), self._verdicts.of(child)
-            if action is not None and (can.succeed if kind == "sequence" else can.fail):
-                begun_anew.append(action)
+        onward = 0 if kind == "sequence" else 1  # the end after which the next child is ticked
+        begun_anew = [
+            self._restarted(child) or child
+            for child in node.children[:last]
+            if self._verdicts.of(child)[onward] and not self._at_once.of(child)[onward]
+        ]
         if not begun_anew or self._doubts.below(node):
             return
-        for action in begun_anew:
+        for begun in begun_anew:
             self._report(
-                "BT306", span_of(action.key),
-                f"this starts again at each tick while a later child of {node.name!r} runs",
+                "BT306", span_of(begun.key),
+                f"this starts again while a later child of {node.name!r} runs, and interrupts it",
                 related=Related(node.place, "because of 'memory: false' here"),
             )  # fmt: skip
 
     def _restarted(self, root: TreeNode) -> TreeNode | None:
-        """The first action or service below that `root` begins anew with, or the tree it is in."""
+        """The first leaf below that takes time whenever it is begun, or the tree it is in."""
         if id(root) in self._anew:
             return self._anew[id(root)]
         found: TreeNode | None = None
@@ -174,8 +174,8 @@ class _Hazards:
         while stack and found is None:
             node = stack.pop()
             inner = node.included.root if node.included is not None else None
-            service = node.kind is not None and node.kind.name == "service"
-            if service or node.is_action or (inner is not None and self._restarted(inner)):
+            anew = node.is_action or (node.kind is not None and node.kind.name in BEGUN)
+            if anew or (inner is not None and self._restarted(inner)):
                 found = node
             elif node.kind is None or node.kind.name != "run_once":
                 stack.extend(reversed(node.children))

@@ -331,9 +331,11 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("root:\n  sequence: Work\n  children: [{success: Done}, {failure: Give up}]\n"),
         ),
         "BT306": Page(
-            "A composite with 'memory: false' begins with its first child at each tick. An action "
-            "that has finished is thereby sent again while a later child runs, a service is "
-            "called again.",
+            "A composite with 'memory: false' begins with its first child at each tick. What takes "
+            "time and has finished is thereby started again while a later child runs: an action "
+            "is sent, a service is called, a wait begins. The later child is interrupted, for "
+            "ever. A child that may pass without it, such as a fallback of a check and an action, "
+            "is fine.",
             _move("root:\n  sequence: Work\n  memory: false\n  children: [{move: Go}, {wait: 5 s}]"
                   "\n"),
             _move("inputs: {ready: bool}\nroot:\n  sequence: Work\n  memory: false\n"

@@ -74,7 +74,7 @@ RULES = MappingProxyType(
             _warning("BT303", "two parallel branches need one resource"),
             _warning("BT304", "a loop without a limit"),
             _warning("BT305", "a child that is never reached"),
-            _warning("BT306", "a reactive composite starts an action or a service again"),
+            _warning("BT306", "a reactive composite starts what takes time again"),
             _warning("BT307", "a timeout shorter than what it holds"),
             _warning("BT308", "an input that nothing uses"),
             _warning("BT309", "an action or a topic that nothing uses"),

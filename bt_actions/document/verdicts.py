@@ -9,7 +9,7 @@ from bt_actions.document.build_names import settings_of
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.values import computed_in
 
-__all__ = ["Can", "Verdicts"]
+__all__ = ["BEGUN", "Can", "Verdicts"]
 
 
 class Can(NamedTuple):
@@ -20,13 +20,20 @@ class Can(NamedTuple):
 
 
 _EITHER = Can(True, True)
+BEGUN = frozenset({"service", "wait", "wait_for_message"})
+"""Kinds that take time whenever they are begun, as actions do."""
 _FIXED = {"success": Can(True, False), "failure": Can(False, True), "running": Can(False, False)}
 
 
 class Verdicts:
-    """Answers for the nodes of a document; each is worked out once."""
+    """Answers for the nodes of a document; each is worked out once.
 
-    def __init__(self) -> None:
+    With `at_once` they are about a tick in which a node begins and ends, and nothing in it fails
+    because it cannot be computed.
+    """
+
+    def __init__(self, *, at_once: bool = False) -> None:
+        self._at_once = at_once
         self._known: dict[int, Can] = {}
         self._budgets: dict[int, float] = {}
 
@@ -41,6 +48,10 @@ class Verdicts:
         kind = node.kind.name if node.kind is not None else ""
         if kind in _FIXED:
             return _FIXED[kind]
+        if self._at_once and (node.is_action or kind in BEGUN):
+            return Can(False, False)
+        if self._at_once and kind in ("log", "set", "publish", "wait_until"):
+            return Can(True, False)
         if kind in ("log", "wait"):
             return Can(True, any(True for _ in computed_in(node.values.get(kind))))
         if kind in ("set", "publish"):
@@ -51,10 +62,17 @@ class Verdicts:
         if not node.children:
             return _EITHER
         ends = [self.of(child) for child in node.children]
-        if kind == "sequence":
-            return Can(all(end.succeed for end in ends), any(end.fail for end in ends))
-        if kind == "fallback":
-            return Can(any(end.succeed for end in ends), all(end.fail for end in ends))
+        if kind in ("sequence", "fallback"):
+            return _in_turn(ends, kind)
+        if kind == "parallel":
+            enough = all if node.values.get("policy", "all") == "all" else any
+            return Can(enough(end.succeed for end in ends), any(end.fail for end in ends))
+        if self._at_once and kind in ("retry", "repeat", "for_each"):
+            once = _in_one_tick(kind, node)  # each round or try after the first is a tick later
+            return Can(
+                ends[0].succeed and (once or kind == "retry"),
+                ends[0].fail and (once or kind != "retry"),
+            )
         return self._decorated(kind, ends[0], node)
 
     def _subtree(self, node: TreeNode) -> Can:
@@ -62,10 +80,9 @@ class Verdicts:
             return _EITHER
         inner = self.of(node.included.root)
         refused = any(True for _ in computed_in(node.values.get("with")))
-        return Can(inner.succeed, inner.fail or refused)
+        return Can(inner.succeed, inner.fail or (refused and not self._at_once))
 
-    @staticmethod
-    def _decorated(kind: str, inner: Can, node: TreeNode) -> Can:
+    def _decorated(self, kind: str, inner: Can, node: TreeNode) -> Can:
         ends = inner.succeed or inner.fail
         limit = node.values.get("times" if kind == "repeat" else "attempts")
         known = isinstance(limit, int)  # a limit that is computed may be none, and may be zero
@@ -78,9 +95,9 @@ class Verdicts:
                 limit is not None and (inner.succeed or limit == 0 or not known),
                 (inner.fail and limit != 0) or not (known or limit is None),
             ),
-            "timeout": Can(inner.succeed, True),
+            "timeout": Can(inner.succeed, inner.fail or not self._at_once),
             "while": Can(inner.succeed, True),
-            "run_once": inner,
+            "run_once": _EITHER if self._at_once else inner,
         }.get(kind, _EITHER)
 
     def budget(self, node: TreeNode, document: Document) -> float:
@@ -118,10 +135,30 @@ class Verdicts:
         return inner[0] * _rounds(kind, node) if len(inner) == 1 else max(inner)
 
 
+def _in_turn(ends: list[Can], kind: str) -> Can:
+    """How children end that are ticked one after the other, until one ends them all."""
+    onward = 0 if kind == "sequence" else 1
+    passes, stops = True, False
+    for end in ends:
+        stops = stops or end[1 - onward]
+        passes = end[onward]
+        if not passes:
+            break
+    return Can(passes, stops) if kind == "sequence" else Can(stops, passes)
+
+
 def _deadline(settings: Mapping[str, object], name: str) -> float:
     timeout = settings.get("timeout")
     limit = timeout.get(name) if isinstance(timeout, dict) else None
     return limit if isinstance(limit, float) else 0.0
+
+
+def _in_one_tick(kind: str, node: TreeNode) -> bool:
+    """Whether there is no second try, round or item."""
+    items = node.values.get("in")
+    if kind == "for_each":
+        return isinstance(items, list) and len(items) < 2
+    return node.values.get("attempts" if kind == "retry" else "times") in (0, 1)
 
 
 def _rounds(kind: str, node: TreeNode) -> float:
