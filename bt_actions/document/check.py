@@ -6,7 +6,7 @@ imported, and what would need it is taken for granted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from bt_actions.document.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.types import TypeNameError, fits, interface_of, misfits, parse_type
+from bt_actions.document.unmarked import marked_here, warn_unmarked
 from bt_actions.document.unread import Doubts
 from bt_actions.document.values import (
     BAD,
@@ -130,7 +131,7 @@ class Checker:
             return
         kind = self.variables.get(declared.name)
         if kind is not None:
-            self.value(kind, default, node)
+            self._value(kind, default, node, known=())
         self.finite(default, node)
 
     def interface(
@@ -252,8 +253,21 @@ class Checker:
 
     # Values
 
-    def value(self, kind: FieldType | None, value: object, node: Node) -> None:
-        """Check a value against the type it must have; without one, only what it reads."""
+    def value(
+        self, kind: FieldType | None, value: object, node: Node, *, prose: bool = False
+    ) -> None:
+        """Check a value against the type it must have; without one, only what it reads.
+
+        In `prose` a variable's bare name is a word like any other.
+        """
+        errors = self.source.errors
+        self._value(kind, value, node, self.variables)
+        if value is not BAD and self.source.errors == errors:
+            warn_unmarked(node, self.source, self.variables, prose=prose)
+
+    def _value(
+        self, kind: FieldType | None, value: object, node: Node, known: Container[str]
+    ) -> None:
         if value is BAD:
             return
         if kind is None:
@@ -295,7 +309,8 @@ class Checker:
             text = problem.text
             if isinstance(at, Scalar) and names_file(at.text):
                 text = f"{at.text}: {problem}"
-            self.source.report(code, span_of(at), text, hint=_trap(at))
+            meant = None if problem.at_key else marked_here(at, self.source, known)
+            self.source.report(code, span_of(at), text, hint=_trap(at) or meant)
 
     def finite(self, value: object, node: Node) -> None:
         """Check that no number of an input's value is infinite."""

@@ -157,14 +157,14 @@ def _for_each(checker: Checker, node: TreeNode) -> None:
     items = node.values.get("in")
     wanted = checker.variables.get(str(item)) if item in checker.declared_at else None
     if wanted is not None and item not in checker.document.topics and "in" in node.written:
-        checker.value(Listing(wanted), items, node.written["in"])
+        checker.value(Listing(wanted), items, node.written["in"], prose=True)
     elif isinstance(items, Computed):
         kind = checker.expression(items, {})
         if kind is not None and not isinstance(kind, Listing):
             text = f"a list is needed, and this is {named(kind)}"
             checker.source.report("BT204", span_of(items.node), text)
     elif "in" in node.written:
-        checker.value(None, items, node.written["in"])
+        checker.value(None, items, node.written["in"], prose=True)
 
 
 def _action(checker: Checker, node: TreeNode) -> None:
@@ -231,7 +231,7 @@ def _parallel(checker: Checker, node: TreeNode) -> None:
 
 
 def _log(checker: Checker, node: TreeNode) -> None:
-    checker.value(None, node.values.get("log"), node.written["log"])
+    checker.value(None, node.values.get("log"), node.written["log"], prose=True)
 
 
 def _python(checker: Checker, node: TreeNode) -> None:

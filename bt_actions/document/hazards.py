@@ -15,6 +15,7 @@ from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.order import find_early_reads
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
+from bt_actions.document.values import names_value
 from bt_actions.document.verdicts import BEGUN, Verdicts
 
 __all__ = ["find_hazards"]
@@ -72,6 +73,8 @@ class _Hazards:
                 self._unreachable(node, kind)
                 if node.values.get("memory") is False:
                     self._reactive(node, kind)
+            elif kind == "invert":
+                self._inverted(node)
             elif kind == "timeout":
                 self._short(node)
                 inside = True
@@ -204,6 +207,27 @@ class _Hazards:
                 f"{after:g} s are less than the {needed:g} s that what it holds may take",
                 hint="the deadlines and retries inside would never be reached",
             )  # fmt: skip
+
+    # BT314
+
+    def _inverted(self, node: TreeNode) -> None:
+        """A check fails where nothing has come on its topic; that is a success here."""
+        asked = [inner for child in node.children for inner in child.walk()]
+        kinds = {inner.kind.name if inner.kind is not None else "" for inner in asked}
+        if not kinds <= {"sequence", "fallback", "check"}:
+            return
+        reads = (read for inner in asked for read in self._checker.reads.get(id(inner), ()))
+        first = next((read for read in reads if read.name in self._document.topics), None)
+        if first is None or self._doubts.below(node):
+            return
+        hint = "write 'not' in the check itself, which fails while it has no value"
+        if asked[0].values.get("check") is first.computed:
+            text = first.computed.expression.text.strip()
+            hint = f"check: not {text if names_value(text) else f'({text})'}"
+        self._report(
+            "BT314", span_of(node.key), f"this succeeds, too, while nobody knows ${first.name}",
+            hint=hint,
+        )  # fmt: skip
 
     # BT312
 

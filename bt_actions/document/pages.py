@@ -384,6 +384,23 @@ PAGES: Mapping[str, Page] = MappingProxyType(
             _tree("root:\n  for_each: Stop\n  in: [{at: 1.0}, {at: 2.0}]\n"
                   "  child: {check: $item.at > 0.0}\n"),
         ),
+        "BT314": Page(
+            "A check fails while nothing has come on the topic that it reads. Inverted, that is a "
+            "success, although nobody knows: a door that was never heard of is not open. A 'not' "
+            "in the check itself fails as long as there is no value.",
+            _tree("topics: {door: {topic: door_closed, type: std_msgs/msg/Bool}}\n"
+                  "root:\n  invert: Open\n  child: {check: $door.data}\n"),
+            _tree("topics: {door: {topic: door_closed, type: std_msgs/msg/Bool}}\n"
+                  "root: {check: not $door.data}\n"),
+        ),
+        "BT315": Page(
+            "A text holds the name of a variable as other languages mark it, or a value is nothing "
+            "but such names: both stay text. The value of a variable is $name, or $(name) inside a "
+            "text, and what is to be computed begins with '= '. Quotes say that a bare name is "
+            "meant as text.",
+            _tree('inputs: {part: string}\nroot: {log: "Part {part}"}\n'),
+            _tree("inputs: {part: string}\nroot: {log: Part $(part)}\n"),
+        ),
     }
 )  # fmt: skip
 """The page of each rule by its code."""

@@ -82,6 +82,8 @@ RULES = MappingProxyType(
             _warning("BT311", "an output that nothing writes"),
             _warning("BT312", "a loop's item under a name that is taken"),
             _warning("BT313", "a key that not every item has"),
+            _warning("BT314", "an inverted check of what nobody may know"),
+            _warning("BT315", "a text that holds a variable's name"),
         )
     }
 )

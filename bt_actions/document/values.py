@@ -41,9 +41,11 @@ __all__ = [
     "Interpolated",
     "Lookup",
     "computed_in",
+    "computes",
     "constant_of",
     "locate",
     "names_file",
+    "names_value",
     "read_data",
     "read_expression",
     "read_value",
@@ -136,7 +138,7 @@ def _read_scalar(node: Scalar, source: Source) -> object:
         return _read_file(node, source)
     if text.startswith("= "):
         return _computed(node, source, text[2:], 2)
-    if _VARIABLE.fullmatch(text):
+    if names_value(text):
         return _computed(node, source, text, 0)
     if node.plain and _lacks_space(text):
         span = inner_span(node, source, 0, 1)
@@ -149,10 +151,15 @@ def _read_scalar(node: Scalar, source: Source) -> object:
 
 def _lacks_space(text: str) -> bool:
     """Whether a text is an expression but for the space behind its '='."""
-    return text.startswith("=") and _computes(text[1:])
+    return text.startswith("=") and computes(text[1:])
 
 
-def _computes(text: str) -> bool:
+def names_value(text: str) -> bool:
+    """Whether a text stands for one value: ``$name``, ``$name.field.0``."""
+    return _VARIABLE.fullmatch(text) is not None
+
+
+def computes(text: str) -> bool:
     """Whether a text is an expression."""
     try:
         _expression(text, frozenset())
@@ -227,12 +234,12 @@ def _interpolated(node: Scalar, source: Source) -> object:
                 hint = "write $(name) inside a text, and $$ for a dollar sign"
             if _lacks_space(text):
                 hint = f"write '= {text[1:]}' with a space to compute it"
-            elif _computes(text):
+            elif computes(text):
                 hint = f"write '= {text}' to compute it, and $(name) inside a text"
             source.report("BT115", span, "this dollar sign refers to nothing", hint=hint)
             return BAD
         written = "$" + match[1].strip()
-        if not _VARIABLE.fullmatch(written):
+        if not names_value(written):
             span = inner_span(node, source, match.start(), match.end())
             hint = notation_here(text, match.start()) or "$(name) or $(name.field)"
             source.report("BT115", span, f"{match[0]} holds no variable's name", hint=hint)
