@@ -92,12 +92,15 @@ class Checker:
                 kind = self._declared_type(declared, topic=table is document.topics)
                 earlier = self.declared_at.get(name)
                 if earlier is not None:
+                    hint = None
+                    if table is document.outputs:
+                        hint = f"give the output a name of its own: set: {{NAME: ${name}}}"
                     own, other = declared, earlier
                     if declared.source is not self.source:
                         own, other = earlier, declared
                     self.source.report(
                         "BT216", span_of(own.key), f"{name!r} is declared twice",
-                        related=Related(other.place, "first here"),
+                        hint=hint, related=Related(other.place, "first here"),
                     )  # fmt: skip
                     self.variables[name] = None
                     continue
@@ -277,7 +280,7 @@ class Checker:
 
         from bt_actions.ros.messages import examine
 
-        def hole(item: object, wanted: FieldType, _path: tuple[str | int, ...]) -> bool:
+        def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):
                 given = self.expression(item, {})
                 said = item.expression.text.strip()
@@ -301,6 +304,14 @@ class Checker:
                     text = f"{named(wanted)} is needed, and this is a text"
                     self.source.report("BT204", span_of(item.node), text)
                 return True
+            if isinstance(item, (int, float)) and wanted == TEXT:
+                at = locate(node, path)
+                if isinstance(at, Scalar) and at.value == item:  # else it comes from a file
+                    self.source.report(
+                        "BT204", span_of(at), f"a text is needed, not {at.text}",
+                        hint=f'put it in quotes: "{at.text}"',
+                    )  # fmt: skip
+                    return True
             return item is BAD
 
         for problem in examine(kind, value, hole):

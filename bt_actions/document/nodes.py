@@ -377,10 +377,11 @@ class _Composer:
             frame.refused = True
             return _REFUSED
         first = frame.keys.setdefault(node.text, node)
-        if first is not node and node.text != "<<":
+        if first is not node:
             place = Place(self._source.name, first.line, first.column)
             self._source.report(
                 "BT104", span_of(node), f"the key {node.text!r} is here twice",
+                hint="<<: [*a, *b]" if node.text == "<<" else None,
                 related=Related(place, "first here"),
             )  # fmt: skip
             return _REFUSED

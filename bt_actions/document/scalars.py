@@ -20,7 +20,7 @@ from bt_actions.document.shape import (
     words_for,
     wrong_form,
 )
-from bt_actions.document.source import Source
+from bt_actions.document.source import Source, spoken
 from bt_actions.document.values import BAD, Computed, read_expression, read_value
 from bt_actions.suggest import did_you_mean
 from bt_actions.units import DURATION_UNITS, parse_duration
@@ -76,7 +76,10 @@ class NodeName:
                 hint="tools that draw trees take 'a:b' for a port of the node 'a'",
             )  # fmt: skip
             return BAD
-        if len(text) > _NAME_LIMIT or not text.isprintable():
+        if (odd := _odd(text)) is not None:
+            source.report("BT113", span_of(node), f"{odd} cannot stand in a node's name")
+            return BAD
+        if len(text) > _NAME_LIMIT:
             source.report("BT113", span_of(node), "a name is one line of up to 200 characters")
             return BAD
         warn_cut(node, source, "name")
@@ -97,9 +100,11 @@ class Name:
         if not isinstance(node, Scalar):
             return wrong_form(self, node, source)
         if not _IDENTIFIER.fullmatch(node.text) or len(node.text) > _NAME_LIMIT:
+            odd = _odd(node.text)
             source.report(
                 "BT113", span_of(node), f"{node.text!r} is no name",
-                hint="letters, digits and underscores, beginning with a letter",
+                hint=f"{odd} stands in it" if odd is not None
+                else "letters, digits and underscores, beginning with a letter",
             )  # fmt: skip
             return BAD
         if not isinstance(node.value, str):
@@ -108,6 +113,11 @@ class Name:
 
     def schema(self) -> Schema:
         return {"type": "string", "pattern": f"^{_IDENTIFIER.pattern}$"}
+
+
+def _odd(text: str) -> str | None:
+    """What to call the first character of a text that nobody sees."""
+    return next((spoken(char) for char in text if not char.isprintable()), None)
 
 
 @dataclass(frozen=True, slots=True)

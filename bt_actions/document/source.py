@@ -9,6 +9,7 @@ import os
 import re
 import stat
 import time
+import unicodedata
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
-    "read_source", "read_stream", "source_of",
+    "read_source", "read_stream", "source_of", "spoken",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
@@ -39,6 +40,8 @@ _PAIR = re.compile(
 )
 """A character as JSON may write it, and YAML may not: as two halves of UTF-16."""
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_UNSEEN = re.compile("[\xa0\u1680\u2000-\u200d\u202f\u205f\u2060\u3000\ufeff]")
+"""Looks like a space, or like nothing."""
 
 
 class TooManyErrors(Exception):
@@ -123,6 +126,7 @@ class Source:
             return
         is_error = RULES[code].severity is Severity.ERROR
         if is_error:
+            hint = self._unseen(code, span, message) or hint
             if self.errors >= MAX_ERRORS:
                 raise TooManyErrors
             self.errors += 1
@@ -140,6 +144,22 @@ class Source:
         )  # fmt: skip
         if is_error and self.errors == MAX_ERRORS:
             raise TooManyErrors
+
+    def _unseen(self, code: str, span: Span, message: str) -> str | None:
+        """Name what only looks like a space, and may be why an error is found here.
+
+        Looked for in the indentation and the place itself; what is no YAML may go wrong anywhere
+        on the line, or the one above.
+        """
+        line = self.line(span.line) or ""
+        end = span.end_column - 1 if span.end_line == span.line else len(line)
+        parts = [line[: len(line) - len(line.lstrip())], line[span.column - 1 : end]]
+        if code == "BT102":
+            parts = [line, self.line(span.line - 1) or ""]
+        odd = _UNSEEN.search("\n".join(parts))
+        if odd is None or spoken(odd[0]) in message:
+            return None
+        return f"{spoken(odd[0])} stands here: type this without it"
 
     @property
     def has_errors(self) -> bool:
@@ -240,6 +260,12 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
             line, column,
         )  # fmt: skip
     return source
+
+
+def spoken(char: str) -> str:
+    """What to call a character that nobody sees."""
+    known = {"\t": "a tab", "\n": "a line break"}.get(char)
+    return known or f"U+{ord(char):04X} ({unicodedata.name(char, 'no name').lower()})"
 
 
 def _joined(pair: re.Match[str]) -> str:

@@ -23,7 +23,7 @@ _BRACKETED = re.compile(r"""([^\s,:{}\[\]'"][^,:{}\[\]'"]*)(\[[^\[\]{}]*\]?)""")
 _ELEMENT = re.compile(r"(\$\w[\w.]*|\w+\.[\w.]+)\[(\d+)\]")
 _SHELL = re.compile(r"\$\{[^{}]*\}")
 _BRACED = re.compile(r"\{ *([A-Za-z_]\w*) *\} *$")
-_UNSPACED = re.compile(r" *(?:- +)*([A-Za-z_]\w*):([^\s:#/][^:#]*)$")
+_UNSPACED = re.compile(r" *(?:- +)*([A-Za-z_]\w*):([^ \t:#/][^:#]*)$")
 _QUOTES = {
     "'": "inside ' ' a quote is written twice; or put the text in \" \"",
     '"': 'inside " " a quote is written \\"; or put the text in \' \'',
