@@ -172,6 +172,11 @@ class Goal:
         return self.state is State.CANCELING and open_question and not self._never_came
 
     @property
+    def unanswered(self) -> bool:
+        """Whether its request has no answer yet, and `timeout.accept` has not passed."""
+        return self.state is State.SENDING or (self.suspect and not self._suspect)
+
+    @property
     def in_flight(self) -> bool:
         """Whether its request may lie in its server's queue."""
         unanswered = self.suspect and self._denied_since is None

@@ -75,7 +75,7 @@ class Busy(StrEnum):
     WAIT = "wait"
     """Queue for it, first come first served."""
     REPLACE = "replace"
-    """Send at once, as servers that preempt like it; the older goal must end."""
+    """Send at once, or when an older goal's request is answered; that goal must end."""
     FAIL = "fail"
     """Give up at once with SERVER_BUSY."""
     SHARE = "share"

@@ -413,6 +413,8 @@ class Line:
         """Say what is in sight where the action is not: another type, or a name like it."""
         if any(line.in_the_way_of(ticket) for line in self.neighbors()):
             return ": what it would use still has a goal that was given up, and would run both"
+        if self.may_overtake(ticket):
+            return ": it has not answered another goal's request, and might run that one last"
         node, actions = self.traffic.node, dict[str, str]()
         try:
             for topic, _ in node.get_topic_names_and_types():
@@ -460,6 +462,19 @@ class Line:
         """Whether a goal that was given up here may still run where `ticket` wants to."""
         same = self.shares_server_with(ticket.line)
         return any(other.goal.bars(ticket.goal, same_server=same) for other in self._near(ticket))
+
+    def may_overtake(self, ticket: Ticket) -> bool:
+        """Whether the request of a goal that `ticket` replaces, or that replaces it, is under way.
+
+        From two nodes they arrive in any order, and the server runs the last one.
+        """
+        holders = self.traffic.domain.resources.holders(ticket.goal.resources)
+        at = holders.index(ticket)
+        rivals = holders[:at] if ticket.goal.busy is Busy.REPLACE else []
+        rivals += [other for other in holders[at + 1 :] if other.goal.busy is Busy.REPLACE]
+        return any(
+            other.goal.unanswered and other.line.shares_server_with(self) for other in rivals
+        )
 
     def may_come_back_for(self, ticket: Ticket, now: float) -> bool:
         """Whether a goal was lost here whose server may only be shown later than that of `ticket`.
@@ -715,4 +730,4 @@ def _is_answered(ticket: Ticket) -> bool:
 
 def _in_the_way(goal: Goal) -> tuple[bool, ...]:
     """What of a goal others may wait for: room at its server, or its end."""
-    return goal.in_flight, goal.owed, goal.lost, goal.holding
+    return goal.in_flight, goal.unanswered, goal.owed, goal.lost, goal.holding

@@ -239,6 +239,7 @@ class Traffic:
             and not line.orphaned
             and is_valid(self.node)
             and line.watch.state(time.monotonic()) is Server.READY
+            and not line.may_overtake(ticket)
             and not self._in_the_way_of(ticket)
             and line.in_flight() < IN_FLIGHT
         )

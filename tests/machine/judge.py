@@ -308,6 +308,11 @@ class Judge:
                 excused = excused or (other.goal.waited_for and not other.goal.accepted)
                 rule = f"{other} was given up, and is canceled before {ticket} is sent there"
                 self._hold(not runs or excused, rule)
+            elif other is not ticket and other.line.name == ticket.line.name:
+                _, newer = sorted((other.goal, ticket.goal), key=lambda goal: int(goal.id))
+                crosses = other.goal.unanswered and newer.busy is Busy.REPLACE
+                crosses = crosses and bool(other.goal.resources & ticket.goal.resources)
+                self._hold(not crosses, f"{other} is answered before {ticket} is sent")
         if reached > 1:
             ticket.ledger.crowded = True
 

@@ -273,6 +273,11 @@ def takes_preemption_for_a_failure(patch: Patch) -> None:
 
 
 @mutation
+def sends_what_replaces_a_goal_beside_the_request_of_that(patch: Patch) -> None:
+    patch.setattr(Line, "may_overtake", lambda self, ticket: False)
+
+
+@mutation
 def gives_a_replaced_goal_its_feedback_deadline_back(patch: Patch) -> None:
     def feedback(goal: Goal, now: Any, detail: Any) -> State:
         goal._deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)

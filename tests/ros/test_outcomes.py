@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from py_trees.common import Status
+from rclpy.node import Node
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import (
@@ -409,6 +410,44 @@ class TestBusy:
             runner.wait(20.0)
         assert stood(older) == (Outcome.CANCELED, End.CANCELED)
         assert older.reason == f"replaced by a newer goal on {newer.server}"
+
+    @pytest.mark.parametrize(
+        ("faults", "accept", "outcome"),
+        [
+            (["1:delay_accept=2"], 9.0, Outcome.CANCELED),
+            (["1:delay_accept=2", "1:reject"], 9.0, Outcome.REJECTED),
+            (["1:drop_goal"], 1.0, Outcome.CANCELED),
+        ],
+        ids=["accepted", "refused", "past accept"],
+    )
+    def test_what_replaces_a_goal_of_another_node_is_sent_when_that_is_answered(
+        self,
+        serve: Any,
+        name: str,
+        context: Any,
+        faults: list[str],
+        accept: float,
+        outcome: Outcome,
+    ) -> None:
+        """Requests of two nodes arrive in any order, and the last one wins. No tick is needed."""
+        journal = serve(*faults, preempts=True)
+        limits = Timeouts(accept=accept, cancel=0.5)
+        older = MoveRobot("older", 9.0, action_name=name, timeout=limits)
+        newer = MoveRobot("newer", 0.1, action_name=name, busy="replace", timeout=9.0)
+        nodes = [Node(f"of_{leaf.name}", context=context) for leaf in (older, newer)]
+        runners = [TreeRunner(older, node=nodes[0]), TreeRunner(newer, node=nodes[1], heartbeat=60)]
+        try:
+            runners[0].start()
+            journal.wait_for("received")
+            runners[1].start()
+            statuses = [runner.wait(15.0) for runner in runners]
+        finally:
+            for runner, node in zip(runners, nodes, strict=True):
+                runner.shutdown()
+                node.destroy_node()
+        assert statuses == [Status.FAILURE, Status.SUCCESS]
+        assert older.outcome is outcome
+        assert journal.events()[:2] != ["received", "received"], "the newer might have been first"
 
     @pytest.mark.parametrize("written", ["relative", "absolute"])
     def test_a_resource_is_named_as_a_server_is(
