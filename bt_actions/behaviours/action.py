@@ -77,7 +77,8 @@ class ActionBehaviour(Behaviour):
         busy: what to do when the resources are taken: wait, replace, fail or share.
         resources: what the goal occupies, in place of the action server; named as servers are, so
             a relative name is expanded with the node's namespace.
-        on_feedback: called with each feedback message, on the ticking thread.
+        on_feedback: called with each feedback message, on the ticking thread, before the outcome
+            is seen; of those that come between two ticks, or while it runs, the newest 100.
 
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
@@ -255,6 +256,7 @@ class ActionBehaviour(Behaviour):
                     return Status.RUNNING
                 ticket, begun = self._begin(), True
             traffic.advance(ticket, self._make_message)
+            settled = traffic.is_settled(ticket)  # then all of its feedback is here
             for _ in range(len(ticket.feedback)):  # not what comes meanwhile: a tick must end
                 message = ticket.feedback.popleft()
                 if self.on_feedback is not None:
@@ -263,7 +265,7 @@ class ActionBehaviour(Behaviour):
                     return Status.FAILURE
             if self._is_over():
                 return Status.FAILURE
-            if not traffic.is_settled(ticket):
+            if not settled:
                 self.feedback_message = self._in_words(ticket)
                 return Status.RUNNING
             record = self._judge(ticket)

@@ -118,7 +118,7 @@ class Line:
             self.watch.heard(now)
             self._pass_on(ticket, ticket.testimony.lives(self.watch, now))
             self.tell(ticket, Event.FEEDBACK, feedback)
-            if ticket.keeps_feedback:
+            if ticket.keeps_feedback and ticket.goal.outcome is None:
                 ticket.feedback.append(feedback)
                 self.traffic.notify(None)
 

@@ -466,6 +466,23 @@ class TestBusy:
 
 
 class TestFeedback:
+    def test_all_feedback_is_told_before_the_outcome_however_slow_the_callback_is(
+        self, serve: Any, name: str, run: Run
+    ) -> None:
+        serve()
+        told, latest = list[Any](), list[Any]()
+
+        def outlasts_the_goal(message: Any) -> None:
+            told.append(message)
+            until(lambda: leaf.end is End.SUCCEEDED)
+            assert leaf.outcome is None
+            latest.append(leaf.progress().feedback)
+
+        leaf = MoveRobot("m", 0.5, action_name=name, on_feedback=outlasts_the_goal)
+        assert run(leaf).outcome is Outcome.SUCCEEDED
+        assert len(told) > 1
+        assert told[-1] is latest[0], "the last one that came"
+
     @pytest.mark.parametrize("how", ["stop", "shutdown"])
     def test_a_leaf_that_its_own_callback_ends_is_over(
         self, serve: Any, name: str, node: Any, how: str
