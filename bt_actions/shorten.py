@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
-__all__ = ["shorten"]
+__all__ = ["shorten", "shorten_fields"]
 
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
@@ -47,6 +47,22 @@ def shorten(value: object, limit: int = 300) -> str:
         else:
             stack.append(parts)
     return text if len(text) <= limit else f"{text[: limit - 1]}…"
+
+
+def shorten_fields(message: object, limit: int = 80) -> str:
+    """Return the fields of a ROS message as ``remaining 1.2, phase moving``, cut as `shorten` does.
+
+    A field's own value is cut at half of the limit; a number has six digits.
+    """
+    text = ""
+    for name in getattr(message, "get_fields_and_field_types", dict[str, str])():
+        value = getattr(message, name)
+        plain = value[:limit] if isinstance(value, str) else ""
+        number = f"{value:g}" if isinstance(value, float) else ""
+        text += f"{', ' if text else ''}{name} {plain or number or shorten(value, limit // 2)}"
+        if len(text) > limit:
+            return f"{text[: limit - 1]}…"
+    return text
 
 
 def _parts(value: object) -> Iterator[Part] | None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_actions.shorten import shorten
+from bt_actions.shorten import shorten, shorten_fields
 
 
 class Point:
@@ -56,6 +56,16 @@ def test_a_value_is_shown_as_it_is_written_and_a_long_list_by_its_length(
     value: object, text: str
 ) -> None:
     assert shorten(value) == text
+
+
+def test_the_fields_of_a_message_are_shown_without_quotes_and_cut() -> None:
+    message = Point()
+    assert shorten_fields(message) == "x 1.5, on true, data [1, 2]"
+    message.x, message.data = 0.1 + 0.2, array.array("B", [7]) * 4_000_000
+    assert shorten_fields(message) == "x 0.3, on true, data [7, 7, 7, … 4000000 items]"
+    message.x = "moving" * 1_000_000  # type: ignore[assignment]
+    assert shorten_fields(message, 12) == "x movingmov…"
+    assert shorten_fields(SimpleNamespace(no="message")) == ""
 
 
 def test_what_is_longer_than_the_limit_ends_with_an_ellipsis() -> None:

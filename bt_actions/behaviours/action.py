@@ -23,7 +23,7 @@ from bt_actions.behaviours.variables import key, resolve, variables_in, write
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.goal_terms import Event
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.shorten import shorten
+from bt_actions.shorten import shorten, shorten_fields
 from bt_actions.ticking import root_of
 
 if TYPE_CHECKING:
@@ -59,6 +59,8 @@ class Progress:
 
 class ActionBehaviour(Behaviour):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
+
+    While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
 
     Args:
         name: as in py_trees; the tree language wants it without a colon.
@@ -116,6 +118,7 @@ class ActionBehaviour(Behaviour):
         self.save = dict(save or {})
         self._save = {key: function_of(place, "save") for key, place in self.save.items()}
         self._to_save: dict[str, Any] = {}
+        self._shown_feedback: tuple[Any, str] = (None, "")
         self._traffic: Traffic | None = None
         self._line: Any = None
         self._ticket: Ticket | None = None
@@ -438,7 +441,12 @@ class ActionBehaviour(Behaviour):
 
     def _in_words(self, ticket: Ticket) -> str:
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
-        return f"{ticket.goal.state.value.lower().replace('_', ' ')}{tries}"
+        feedback = ticket.goal.feedback
+        if feedback is not self._shown_feedback[0]:
+            told = f": {shorten_fields(feedback)}" if feedback is not None else ""
+            self._shown_feedback = feedback, told
+        state = ticket.goal.state.value.lower().replace("_", " ")
+        return f"{state}{tries}{self._shown_feedback[1]}"
 
     def _leave_line(self) -> None:
         if self._traffic is not None:

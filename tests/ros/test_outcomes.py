@@ -483,6 +483,17 @@ class TestFeedback:
         assert len(told) > 1
         assert told[-1] is latest[0], "the last one that came"
 
+    def test_the_latest_feedback_is_in_the_feedback_message_of_the_leaf(
+        self, serve: Any, name: str, node: Any
+    ) -> None:
+        """So that any viewer of py_trees shows the progress, though nobody reads it here."""
+        serve("1:stall=0.5")
+        leaf = MoveRobot("m", 5.0, action_name=name)
+        with TreeRunner(leaf, node=node) as runner:
+            runner.start()
+            until(lambda: leaf.feedback_message.startswith("executing: current_pose 0."))
+            until(lambda: f"{leaf.progress().feedback.current_pose:g}" in leaf.feedback_message)
+
     @pytest.mark.parametrize("how", ["stop", "shutdown"])
     def test_a_leaf_that_its_own_callback_ends_is_over(
         self, serve: Any, name: str, node: Any, how: str
