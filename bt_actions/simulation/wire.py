@@ -9,7 +9,8 @@ is not (a request taken at that moment raises InvalidHandle in the executor, whi
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from functools import partial
 from typing import Any, Protocol
 
 from action_msgs.msg import GoalInfo
@@ -85,16 +86,22 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
 
     def finish(self, goal_handle: ServerGoalHandle, result: Any) -> None:
         """Send `result` for a goal that has reached its terminal state."""
-        if not self._gone and self._node.executor is not None:
-            super().notify_execute(goal_handle, lambda handle: result)
+        self._soon(self._execute_goal, lambda handle: result, goal_handle)
 
     def later(self, kind: str, taken: Taken, *, silent: bool = False) -> None:
         """Have a request that was kept answered by the executor, as soon as it can.
 
         `silent` accepts a goal as rclpy does, but sends no answer.
         """
+        self._soon(self._accept_silently if silent else self.answer, kind, taken)
+
+    def _soon(self, work: Callable[..., Coroutine[Any, Any, None]], *arguments: Any) -> None:
+        """Have the executor do work that waits for nothing, unless it is shut down before.
+
+        Of a coroutine that it has and never begins Python would warn.
+        """
         if not self._gone and (executor := self._node.executor) is not None:
-            executor.create_task(self._accept_silently if silent else self.answer, kind, taken)
+            executor.create_task(partial(_to_its_end, work, *arguments))
 
     def handle_of(self, goal_id: str) -> ServerGoalHandle | None:
         """Return the handle of an accepted goal by its id in hex."""
@@ -174,6 +181,11 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
         except Exception as error:  # noqa: BLE001 - it would end spin()
             if not self._gone:
                 self._logger.error(f"simulation: {raised(error)}")
+
+
+def _to_its_end(work: Callable[..., Coroutine[Any, Any, None]], *arguments: Any) -> None:
+    with contextlib.suppress(StopIteration):
+        work(*arguments).send(None)
 
 
 def _nothing(goal_handle: ServerGoalHandle) -> None:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import gc
+import warnings
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.node import Node
 from test_msgs.action import Fibonacci
 
 from bt_actions.simulation import ScriptedServer
@@ -51,3 +56,23 @@ def test_its_results_are_not_sent(gone: InterceptedActionServer) -> None:
 
 def test_it_may_be_destroyed_twice(gone: InterceptedActionServer) -> None:
     gone.destroy()
+
+
+def test_python_does_not_warn_of_what_an_executor_did_not_come_to(bench: Bench, space: str) -> None:
+    """As where a signal ends the process in mid-goal."""
+    node = Node("ends", context=bench.node.context)
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    server = ScriptedServer(node, Fibonacci, f"{space}/fibonacci")
+    wire: Any = server._wire
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        wire.finish(SimpleNamespace(), Fibonacci.Result())
+        for silent in (True, False):
+            wire.later("goal", (object(), object()), silent=silent)
+        server.close()
+        executor.shutdown()
+        node.destroy_node()
+        del executor, node, server, wire
+        gc.collect()
+    assert [str(each.message) for each in told] == []
