@@ -22,6 +22,7 @@ from bt_actions.cli.common import (
     seconds,
     write,
 )
+from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.signals import SAME_WISH, settle
 from bt_actions.suggest import listing
 
@@ -45,6 +46,8 @@ examples:
   bt-actions cleanup /r1/move_robot
   bt-actions cleanup --look 10 --accept 120
   bt-actions run pick_and_place --cleanup-first
+in a launch file:
+  Node(package="bt_actions", executable="bt-actions", arguments=["cleanup", "/r1/move_robot"])
 
 exit codes:
   0 no server in sight has a goal that was left (should none take longer to accept one: --accept)
@@ -85,6 +88,7 @@ def add_parser(subparsers: Subparsers) -> None:
         default=0.0,
         help="a server may take so long to accept a goal [30 s, or the timeout.accept of the goal]",
     )
+    add_ros_args(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -94,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
     for name in args.actions:
         if why := why_not(name):
             raise BadInput(f"{name!r} cannot be the name of an action server: {why}")
+    parameters(args.ros_args)
     return sweep(args.look, args.patience, args.actions or None, accept=args.accept)
 
 

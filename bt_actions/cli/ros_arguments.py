@@ -1,10 +1,11 @@
-"""`--ros-args` of a run: the ROS parameters among them, as inputs of its tree.
+"""`--ros-args` of a command, as launch appends them; of a run, the parameters that are its inputs.
 
-The node of the run is told of all of them by rclpy, which reads `sys.argv` itself.
+The node of the command is told of all of them by rclpy, which reads `sys.argv` itself.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -15,8 +16,19 @@ if TYPE_CHECKING:
     from bt_actions.document import TreeInput
 
 
+def add_ros_args(parser: argparse.ArgumentParser, help_more: str = "") -> None:
+    """Add `--ros-args`, which takes all that follows."""
+    parser.add_argument(
+        "--ros-args",
+        metavar="ARG",
+        nargs=argparse.REMAINDER,
+        default=[],
+        help=f"last of all, words for ROS, as launch gives them{help_more}",
+    )
+
+
 def parameters(words: Sequence[str], namespace: str = "") -> dict[str, object]:
-    """Return the parameters that `words` give to the node of a run, without rclpy's own.
+    """Return the parameters that `words` give to the command's node, without rclpy's own.
 
     Raises BadInput for what rcl does not understand.
     """

@@ -20,7 +20,7 @@ from bt_actions.cli.common import (
     speed,
 )
 from bt_actions.cli.results import keep_results_apart
-from bt_actions.cli.ros_arguments import parameters
+from bt_actions.cli.ros_arguments import add_ros_args, parameters
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
@@ -94,13 +94,10 @@ def add_parser(subparsers: Subparsers) -> None:
         action="store_true",
         help="where the run is shown as lines: one for every state of every goal",
     )
-    parser.add_argument(
-        "--ros-args",
-        metavar="ARG",
-        nargs=argparse.REMAINDER,
-        default=[],
-        help="last of all, words for ROS; parameters (-p NAME:=VALUE, --params-file FILE) give "
-        "inputs of the tree their values where --set does not",
+    add_ros_args(
+        parser,
+        "; parameters (-p NAME:=VALUE, --params-file FILE) give inputs of the tree their values "
+        "where --set does not",
     )
     simulated = parser.add_argument_group("simulation")
     simulated.add_argument(

@@ -10,6 +10,7 @@ import sys
 from typing import TYPE_CHECKING, TextIO
 
 from bt_actions.cli.common import BadInput, namespace, seconds
+from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.values import goal_fields
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ examples:
   bt-actions send /r1/gripper_control Gripper position=0 max_effort=5
   bt-actions send navigate_to_pose nav2_msgs/NavigateToPose pose.header.frame_id=map \\
       pose.pose.position.x=1.0 --timeout 60
+in a launch file:
+  Node(package="bt_actions", executable="bt-actions",
+       arguments=["send", "move_robot", "MoveRobot", "distance=2.0"])
 
 Values are YAML: numbers, texts, true and false, [1, 2], {x: 1.0}. Ctrl-C cancels the goal and waits
 for its end. Exit codes: see `bt-actions --help`.
@@ -65,11 +69,13 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "-q", "--quiet", action="store_true", help="show only what went wrong; the exit code tells"
     )
+    add_ros_args(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Send the goal that `args` describe, and see it to its end."""
     leaf = _leaf(args.server, args.type, goal_fields(args.fields))
+    parameters(args.ros_args, args.namespace)
 
     from bt_actions.cli.session import Session
     from bt_actions.cli.views import QuietView, View

@@ -11,6 +11,7 @@ import contextlib
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, namespace, note, seconds, speed, starting_ros
+from bt_actions.cli.ros_arguments import add_ros_args, parameters
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -25,6 +26,8 @@ examples:
   bt-actions sim --robots 50 --speed 10
   bt-actions sim --fault move_robot:2:abort --fault gripper_control:5%:stall --seed 7
   bt-actions sim --journal goals.jsonl
+in a launch file:
+  Node(package="bt_actions", executable="bt-actions", namespace="r1", arguments=["sim"])
 
 A part lies at 2 m (pick); the shelf is at 5 m, home at 0 m. Ctrl-C and SIGTERM end it: exit code 0.
 The process uses ROS_DOMAIN_ID, as all ROS programs do.
@@ -92,6 +95,7 @@ def add_parser(subparsers: Subparsers) -> None:
         default="multi",
         help="rclpy's multi-threaded (default) or single-threaded executor",
     )
+    add_ros_args(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -99,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
     from bt_actions.cli.signals import Signals
     from bt_actions.ros.spinning import Spinner
 
+    parameters(args.ros_args)
     with Signals() as signals:
         errors: list[BaseException] = []
 

@@ -1,4 +1,4 @@
-"""`bt-actions run ... --ros-args`: ROS parameters are inputs, and rcl gets its words."""
+"""`bt-actions ... --ros-args`: rcl gets its words, and ROS parameters are inputs of a run."""
 
 from __future__ import annotations
 
@@ -113,14 +113,51 @@ def test_what_is_set_wins_over_parameters_and_they_over_defaults() -> None:
 def test_what_is_wrong_after_ros_args_is_told_with_exit_code_2(
     words: list[str], message: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    is_refused(["run", "pick_and_place", "--ros-args", *words], message, capfd)
+
+
+@pytest.mark.usefixtures("domain")
+@pytest.mark.parametrize(
+    "command", ["sim", "send move_robot MoveRobot distance=1", "cleanup move_robot"]
+)
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-r", "a:b"], "Couldn't parse remap rule: '-r a:b'"),
+        (["-q"], "ROS does not know -q; options of bt-actions stand before --ros-args"),
+        (["-p", "use_sim_time:=3"], "use_sim_time is true or false, not 3"),
+    ],
+)
+def test_so_it_is_of_the_other_commands_that_use_ros(
+    command: str, words: list[str], message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    is_refused([*command.split(), "--ros-args", *words], message, capfd)
+
+
+def is_refused(arguments: list[str], message: str, capfd: pytest.CaptureFixture[str]) -> None:
     try:
-        code = main(["run", "pick_and_place", "--ros-args", *words])
+        code = main(arguments)
     except SystemExit as error:
         code = int(error.code or 0)
     said = capfd.readouterr()
     assert (code, said.out) == (2, "")
     assert message in said.err.splitlines()[-1]
     assert "Traceback" not in said.err
+
+
+def test_launch_starts_a_server_a_goal_and_a_cleanup_with_names_and_parameters(
+    start: Start, tmp_path: Path
+) -> None:
+    path = tmp_path / "parameters.yaml"
+    path.write_text(FILE)
+    launch = ("--ros-args", "-r", "__node:=launched", "-r", "__ns:=/by_launch")
+    launch += ("--params-file", str(path), "-p", "use_sim_time:=false")
+    sim = start("sim", *launch)
+    assert sim.line("ready: ").startswith("ready: /by_launch/move_robot, ")
+    goal = start("send", "move_robot", "MoveRobot", "distance=0.1", *launch)
+    assert goal.wait() == 0, goal
+    cleanup = start("cleanup", "move_robot", "--look", "1", *launch)
+    assert cleanup.wait() == 0, cleanup
 
 
 def test_a_run_takes_its_inputs_from_a_file_of_parameters(start: Start, tmp_path: Path) -> None:
