@@ -10,7 +10,11 @@ import time
 from typing import Any
 
 from bt_actions.goal_terms import Now
+from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
+
+MOMENT = 2.0
+"""Seconds for which simulated time may not have begun until that is said."""
 
 
 class Clocks:
@@ -21,6 +25,8 @@ class Clocks:
         self._simulated = False
         self._offset = 0.0
         self._last = time.monotonic()
+        self._waits_since: float | None = None  # for the first message on /clock
+        self._warned = False
 
     def now(self) -> Now:
         """Return this moment."""
@@ -34,6 +40,7 @@ class Clocks:
             if self._clock.ros_time_is_active:
                 simulated, reading = True, self._clock.now().nanoseconds * 1e-9
                 if reading == 0.0:  # no /clock message yet: time stands still, and will not jump
+                    self._waits(steady)
                     return Now(steady, self._last)
         except Exception:  # noqa: BLE001 - the node was destroyed: InvalidHandle, or worse, by version
             simulated = False
@@ -42,3 +49,13 @@ class Clocks:
             self._offset = self._last - reading
         self._last = reading + self._offset
         return Now(steady, self._last)
+
+    def _waits(self, steady: float) -> None:
+        if self._waits_since is None:
+            self._waits_since = steady
+        if steady - self._waits_since > MOMENT and not self._warned:
+            self._warned = True
+            log.warning(
+                f"use_sim_time is set, and nothing has come on /clock for {MOMENT:g} s: until then "
+                "no time passes for what waits by it; is the simulator there, and not paused?"
+            )
