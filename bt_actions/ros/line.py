@@ -36,7 +36,7 @@ from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, ledg
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.standstill import ANSWERS_TAKE_IN_ALL
-from bt_actions.suggest import did_you_mean
+from bt_actions.suggest import did_you_mean, listing
 from bt_actions.testimony import Told
 
 if TYPE_CHECKING:
@@ -424,13 +424,18 @@ class Line:
                         actions[topic.removesuffix(FEEDBACK)] = kind
         except Exception:  # noqa: BLE001 - our node was destroyed
             return ""
-        kind = actions.get(self.name)
-        if kind == interface_name(self.action_type):
+        ours, kind = interface_name(self.action_type), actions.get(self.name)
+        if kind == ours:
             return ": it is in sight, but was not ready, or has requests enough to answer"
         if kind is not None:
             return f"; there is one of another type or version, {kind}"
         if not actions:
             return "; no action server at all is in sight in this ROS domain"
+        of_its_type = sorted(name for name in actions if actions[name] == ours)
+        if near := did_you_mean(self.name, of_its_type):
+            return near
+        if of_its_type:
+            return f"; of its type there is {listing(of_its_type)}"
         return did_you_mean(self.name, actions)
 
     # The watch over the server

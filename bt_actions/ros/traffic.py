@@ -91,6 +91,7 @@ class Traffic:
         self._namespace = node.get_namespace().rstrip("/")
         self._name = node.get_name()
         self._lines: dict[str, Line] = {}
+        self._warned_of: set[str] = set()
         self._observers: list[Observer] = []
 
     @classmethod
@@ -106,13 +107,14 @@ class Traffic:
     def line(self, action_type: Any, action_name: str) -> Line:
         """Return the shared line to an action, and count its user.
 
-        Remapping rules do not reach action names. Raises ValueError for a name that ROS refuses,
-        and TypeError when it is in use with another type.
+        A remapping rule for the action's name has no effect, and is warned of. Raises ValueError
+        for a name that ROS refuses, and TypeError when it is in use with another type.
         """
         name = expand_topic_name(action_name, self.node.get_name(), self.node.get_namespace())
         with lock:
             line = self._lines.get(name)
             if line is None:
+                self._warn_of_remapping(name)
                 line = self._lines[name] = Line(self, action_type, name)
             elif line.action_type is not action_type:
                 raise TypeError(
@@ -122,6 +124,18 @@ class Traffic:
                 )
             line.users += 1
             return line
+
+    def _warn_of_remapping(self, name: str) -> None:
+        """Say it, once for a name, where a rule would have it another: ROS remaps no action."""
+        other, part = self.node.resolve_service_name(name), f"{name}/_action/send_goal"
+        remapped = self.node.resolve_service_name(part) != part
+        if other != name and not remapped and name not in self._warned_of:
+            self._warned_of.add(name)
+            log.warning(
+                f"a rule remaps {name} to {other}, and has no effect: ROS does not remap actions. "
+                f"Name {other} where the action is used, set the namespace of the node, or remap "
+                f"its parts: {part}, cancel_goal, get_result, feedback and status"
+            )
 
     def leave(self, line: Line) -> None:
         """Count a user of `line` off; with the last one, and no goal open, its client goes too."""

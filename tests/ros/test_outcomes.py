@@ -33,6 +33,7 @@ from bt_actions.behaviours.variables import read, write
 from bt_actions.events import GoalChanged
 from bt_actions.goal_terms import Event
 from bt_actions.policy import Busy
+from bt_actions.ros import traffic
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
 from tests.support.processes import Host, HostFactory
@@ -206,6 +207,31 @@ class TestNoServer:
         assert other.reason.endswith(f"; there is one of another type or version, {kind}")
         near = run(MoveRobot("m", 1.0, action_name=f"{name}e", timeout=limits))
         assert near.reason.endswith(f"; did you mean {name!r}?")
+        far = run(MoveRobot("m", 1.0, action_name="/elsewhere/of/robot_7", timeout=limits))
+        assert "; of its type there is " in far.reason
+        assert name in far.reason, "the full name"
+
+    @pytest.mark.parametrize(
+        ("rules", "told"),
+        [
+            (["move:=/r1/move"], ["a rule remaps /move to /r1/move, and has no effect"]),
+            (["move:=/r1/move", "move/_action/send_goal:=/r1/move/_action/send_goal"], []),
+            (["moves:=/r1/move"], []),
+        ],
+    )
+    def test_a_rule_that_remaps_an_action_is_told_to_have_no_effect_once(
+        self, context: Any, monkeypatch: pytest.MonkeyPatch, rules: list[str], told: list[str]
+    ) -> None:
+        said = list[str]()
+        monkeypatch.setattr(traffic.log, "warning", said.append)
+        words = ["--ros-args", *(word for rule in rules for word in ("-r", rule))]
+        node = Node("remapped", context=context, cli_args=words)
+        for _ in range(2):
+            leaf = MoveRobot("m", 1.0, action_name="move")
+            leaf.setup(node=node)
+            leaf.shutdown()
+        node.destroy_node()
+        assert [text.partition(":")[0] for text in said] == told
 
     def test_a_server_that_comes_late_is_waited_for(self, serve: Any, name: str, node: Any) -> None:
         leaf = MoveRobot("m", 0.1, action_name=name)
