@@ -96,7 +96,7 @@ class CallService(Behaviour):
         if not self._client.calling:
             return self._try_to_call(self._client)
         if not self._client.answered:
-            self.feedback_message = f"waiting for an answer of {self.service_name}"
+            self.feedback_message = f"waiting for an answer of {self._client.name}"
             if self._limits[1] is not None and self._countdown.left() <= 0.0:
                 self._client.drop()
                 return self._failed(f"no answer within {self._limits[1]:g} s")
@@ -131,9 +131,10 @@ class CallService(Behaviour):
 
     def _try_to_call(self, client: ServiceClient) -> Status:
         if not client.ready:
-            self.feedback_message = f"waiting for the service {self.service_name}"
+            self.feedback_message = f"waiting for the service {client.name}"
             if self._limits[0] is not None and self._countdown.left() <= 0.0:
-                return self._failed(f"no service {self.service_name} within {self._limits[0]:g} s")
+                why = client.why_absent()
+                return self._failed(f"no service {client.name} within {self._limits[0]:g} s{why}")
             return Status.RUNNING
         try:
             client.call(self._request())
@@ -141,7 +142,7 @@ class CallService(Behaviour):
             self.feedback_message = str(error)
             return Status.FAILURE
         self._countdown.start(self._limits[1] or 0.0)
-        self.feedback_message = f"called {self.service_name}"
+        self.feedback_message = f"called {client.name}"
         return Status.RUNNING
 
     def _failed(self, reason: str) -> Status:

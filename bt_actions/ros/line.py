@@ -28,6 +28,7 @@ from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
+from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.past import Past
@@ -431,10 +432,9 @@ class Line:
             return f"; there is one of another type or version, {kind}"
         if not actions:
             return "; no action server at all is in sight in this ROS domain"
-        of_its_type = sorted(name for name in actions if actions[name] == ours)
-        if near := did_you_mean(self.name, of_its_type):
-            return near
-        if of_its_type:
+        if found := elsewhere(self.name, ours, {name: (its,) for name, its in actions.items()}):
+            return found
+        if of_its_type := sorted(name for name in actions if actions[name] == ours):
             return f"; of its type there is {listing(of_its_type)}"
         return did_you_mean(self.name, actions)
 

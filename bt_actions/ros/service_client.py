@@ -10,7 +10,8 @@ from typing import Any
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
-from bt_actions.ros.interfaces import interface
+from bt_actions.ros.in_sight import without_service
+from bt_actions.ros.interfaces import interface, interface_name
 from bt_actions.ros.messages import fill
 from bt_actions.ros.topics import wake
 
@@ -33,6 +34,15 @@ class ServiceClient:
         self._client = node.create_client(
             self.service_type, service_name, callback_group=MutuallyExclusiveCallbackGroup()
         )
+
+    @property
+    def name(self) -> str:
+        """The service's full name."""
+        return str(self._client.service_name)
+
+    def why_absent(self) -> str:
+        """What the graph shows in place of the service, behind a colon."""
+        return without_service(self._node, self.name, interface_name(self.service_type))
 
     @property
     def ready(self) -> bool:

@@ -108,7 +108,7 @@ def test_a_service_that_is_not_there_fails_in_time(load: Load, run: Run, name: s
     more = "timeout: {server: 200 ms}"
     root = run(load(CALL.format(server=f"{name}/nobody", more=more)))
     assert root.status is Status.FAILURE
-    assert root.feedback_message == f"no service {name}/nobody within 0.2 s"
+    assert root.feedback_message == f"no service {name}/nobody within 0.2 s: nobody offers it"
 
 
 def test_a_service_that_does_not_answer_fails_in_time(

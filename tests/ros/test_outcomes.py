@@ -197,7 +197,7 @@ class TestNoServer:
         assert stood(leaf) == (Outcome.SERVER_UNAVAILABLE, End.NEVER_STARTED)
         assert time.monotonic() - started >= 0.4
 
-    def test_another_type_under_the_name_and_a_name_like_it_are_told(
+    def test_another_type_under_the_name_and_names_like_it_are_told(
         self, serve: Any, name: str, run: Run
     ) -> None:
         serve()
@@ -207,6 +207,8 @@ class TestNoServer:
         assert other.reason.endswith(f"; there is one of another type or version, {kind}")
         near = run(MoveRobot("m", 1.0, action_name=f"{name}e", timeout=limits))
         assert near.reason.endswith(f"; did you mean {name!r}?")
+        elsewhere = run(MoveRobot("m", 1.0, action_name=f"/elsewhere{name}", timeout=limits))
+        assert elsewhere.reason.endswith(f"; there is {name} of that type")
         far = run(MoveRobot("m", 1.0, action_name="/elsewhere/of/robot_7", timeout=limits))
         assert "; of its type there is " in far.reason
         assert name in far.reason, "the full name"
