@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,12 @@ from bt_actions.behaviours.node import node_in
 from bt_actions.expression import ExpressionError
 
 if TYPE_CHECKING:
-    from bt_actions.ros.topics import Latest
+    from bt_actions.ros.topics import Latest, Speaker
 
 __all__ = ["Publish", "TopicValue", "WaitForMessage"]
+
+LOOKS = 0.05
+"""Seconds between two looks for somebody who listens: nothing announces that."""
 
 
 def _class(message_type: type | str) -> type:
@@ -39,6 +43,8 @@ class TopicValue:
         self._max_age = max_age
         self._node: Any = None
         self._latest: Latest | None = None
+        self._said = ""
+        self._look_again_at = 0.0
 
     def connect(self, node: Any) -> None:
         """Subscribe on a node; again for the same node: nothing."""
@@ -61,10 +67,17 @@ class TopicValue:
         message, age = (None, 0.0) if self._latest is None else self._latest.get()
         topic = self._topic if self._latest is None else self._latest.topic
         if message is None:
-            raise ExpressionError(f"nothing has come on {topic} yet (${self.name})")
+            raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._why()}")
         if self._max_age is not None and age > self._max_age:
             raise ExpressionError(f"the last message on {topic} is {age:.1f} s old (${self.name})")
         return message
+
+    def _why(self) -> str:
+        """Why nothing has come; looked up once a second at most, as a tree may ask at each tick."""
+        now = time.monotonic()
+        if self._latest is not None and now >= self._look_again_at:
+            self._said, self._look_again_at = self._latest.why_silent(), now + 1.0
+        return self._said
 
 
 class WaitForMessage(Behaviour):
@@ -101,6 +114,7 @@ class WaitForMessage(Behaviour):
         self._save = save
         self._clock = NodeTime()
         self._countdown = Countdown(self._clock)
+        self._came_before = 0
         self._node: Any = None
         self._latest: Latest | None = None
 
@@ -120,12 +134,13 @@ class WaitForMessage(Behaviour):
     def initialise(self) -> None:
         if self._latest is not None:  # what a latched topic delivered before is as good as new
             self._latest.keep(with_latest=self._qos == "latched")
+            self._came_before = self._latest.came
         if self._timeout is not None:
             self._countdown.start(self._timeout)
 
     def update(self) -> Status:
         assert self._latest is not None, "not set up"
-        self.feedback_message = f"waiting for a message on {self._topic}"
+        self.feedback_message = f"waiting for a message on {self._latest.topic}"
         for message in self._latest.take():
             try:
                 if self._until is None or self._until(message):
@@ -137,7 +152,10 @@ class WaitForMessage(Behaviour):
             except ValueError as error:  # ExpressionError, or what is saved does not fit
                 self.feedback_message = str(error)
         if self._timeout is not None and self._countdown.left() <= 0.0:
-            self.feedback_message = f"no such message on {self._topic} within {self._timeout:g} s"
+            topic, before = self._latest.topic, self._came_before
+            why = f"; {before} came before it began" if before else ""
+            why = why if self._latest.came else self._latest.why_silent()
+            self.feedback_message = f"no such message on {topic} within {self._timeout:g} s{why}"
             return Status.FAILURE
         return Status.RUNNING
 
@@ -158,12 +176,20 @@ class WaitForMessage(Behaviour):
 class Publish(Behaviour):
     """Publishes one message and succeeds; fails when the message cannot be built.
 
+    Before it publishes it waits for who listens: for `subscribers` where given; without that only
+    while the node is so new (3.5 seconds) that it may not have discovered them, and only for one.
+    Where nobody listens all the same it publishes and succeeds, and `warning` says so. `shutdown`
+    returns when all listeners have the last message, or a second after it was published.
+
     Args:
         name: as in py_trees.
         message_type: the message's class or type name.
         topic: a relative name is expanded with the node's namespace.
         data: gives the fields of the message; may raise ValueError.
         qos: as the tree language calls it.
+        subscribers: so many must listen before it publishes.
+        timeout: seconds on the node's clock after which it fails where fewer do; never where not
+            given.
     """
 
     def __init__(
@@ -174,31 +200,53 @@ class Publish(Behaviour):
         data: Callable[[], object],
         *,
         qos: str = "default",
+        subscribers: int = 0,
+        timeout: float | None = None,
     ) -> None:
         super().__init__(name)
+        self.warning = ""
+        """What a SUCCESS does not say: that nobody listened."""
         self._type = message_type
         self._topic = topic
         self._data = data
         self._qos = qos
+        self._subscribers = subscribers
+        self._timeout = timeout
+        self._clock = NodeTime()
+        self._countdown = Countdown(self._clock)
         self._node: Any = None
-        self._publisher: Any = None
+        self._speaker: Speaker | None = None
 
     def setup(self, **kwargs: Any) -> None:
         node = node_in(kwargs, self)
         if node is self._node:
             return
-        from bt_actions.ros.closable import closable
-        from bt_actions.ros.topics import qos_profile
+        from bt_actions.ros.topics import Speaker
 
         self.shutdown()
-        profile = qos_profile(self._qos)
-        self._publisher = closable(node.create_publisher(_class(self._type), self._topic, profile))
+        self._clock.setup(node)
+        self._speaker = Speaker(node, _class(self._type), self._topic, self._qos)
         self._node = node
+
+    def initialise(self) -> None:
+        self.warning = ""
+        if self._timeout is not None:
+            self._countdown.start(self._timeout)
 
     def update(self) -> Status:
         from bt_actions.ros.messages import fill
 
-        assert self._publisher is not None, "not set up"
+        assert self._speaker is not None, "not set up"
+        topic, listeners = self._speaker.topic, self._speaker.listeners
+        if listeners < (self._subscribers or self._speaker.listener_may_come() > 0.0):
+            if self._subscribers and self._timeout is not None and self._countdown.left() <= 0.0:
+                self.feedback_message = (
+                    f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
+                    f" {self._timeout:g} s{self._speaker.why_unheard()}"
+                )
+                return Status.FAILURE
+            self.feedback_message = f"waiting for who listens on {topic}"
+            return Status.RUNNING
         clock = self._node.get_clock()
         try:
             message: Any = fill(
@@ -207,11 +255,17 @@ class Publish(Behaviour):
         except ValueError as error:
             self.feedback_message = str(error)
             return Status.FAILURE
-        self._publisher.publish(message)
-        self.feedback_message = ""
+        self._speaker.publish(message)
+        if not listeners:
+            self.warning = f"nobody listens on {topic}{self._speaker.why_unheard()}"
+        self.feedback_message = self.warning
         return Status.SUCCESS
 
+    def due_in(self) -> float | None:
+        """Seconds until it looks again for who listens."""
+        return LOOKS
+
     def shutdown(self) -> None:
-        if self._publisher is not None:
-            self._node.destroy_publisher(self._publisher)
-        self._publisher = self._node = None
+        if self._speaker is not None:
+            self._speaker.close()
+        self._speaker = self._node = None

@@ -167,7 +167,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Culprit:
-    """One leaf that made the tree fail."""
+    """One leaf that made the tree fail, or is warned of."""
 
     node: Behaviour
     path: tuple[str, ...]
@@ -192,6 +192,7 @@ class Report:
     _rows: dict[UUID, Row] = field(default_factory=dict)
     _statuses: dict[UUID, tuple[Status, str]] = field(default_factory=dict)
     _unaccounted: list[str] = field(default_factory=list)
+    _warnings: dict[UUID, Culprit] = field(default_factory=dict)
 
     def observe(self, event: Event) -> None:
         """Take in one event, in the order of their coming."""
@@ -204,6 +205,11 @@ class Report:
             self._begun = self._clock()
         elif isinstance(event, NodeChanged):
             self._statuses[event.node.id] = (event.status, event.message)
+            warning = str(getattr(event.node, "warning", ""))
+            if warning and event.status is Status.SUCCESS:
+                node = event.node
+                warned = Culprit(node, event.path, warning, place_of(node), None)
+                self._warnings[node.id] = warned
             row = self._rows.get(event.node.id)
             if row is not None and event.status in (Status.SUCCESS, Status.FAILURE):
                 row.settle()
@@ -273,6 +279,11 @@ class Report:
     def message_of(self, node: Behaviour) -> str:
         """Return the feedback message that `node` last changed with."""
         return self._statuses.get(node.id, (Status.INVALID, ""))[1]
+
+    @property
+    def warnings(self) -> list[Culprit]:
+        """The leaves that succeeded in something that may not be what was meant, and why."""
+        return list(self._warnings.values())
 
     def culprits(self) -> list[Culprit]:
         """Return the leaves by whose failure the root has failed, in tree order."""

@@ -284,6 +284,15 @@ class JsonView:
                     }
                     for culprit in report.culprits()
                 ],
+                "warnings": [
+                    {
+                        "id": self._id(warned.node),
+                        "path": list(warned.path),
+                        "message": warned.message,
+                        "place": warned.place or None,
+                    }
+                    for warned in report.warnings
+                ],
                 "unaccounted": report.unaccounted,
                 "servers_gone": report.servers_gone,
                 "world": closing.verdict or None,

@@ -86,7 +86,8 @@ def brief(value: object) -> str:
 
 def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
-    lines = summary(report)
+    warned = [f"{' / '.join(each.path)}: {each.message}" for each in report.warnings]
+    lines = [f"warning: {clean(line)}" for line in warned] + summary(report)
     if report.servers_gone and not closing.verdict:
         lines.append(stood_still(report))
     lines += [line for line in (closing.complaint, closing.error) if line]

@@ -114,12 +114,16 @@ def _service(node: TreeNode, context: Context) -> Behaviour:
 
 def _publish(node: TreeNode, context: Context) -> Behaviour:
     values = node.values
+    subscribers: Any = values.get("subscribers", 0)
+    timeout: Any = values.get("timeout")
     return Publish(
         node.name or plain_name(f"publish {text_of(values, 'publish')}"),
         _interface(values["type"], "msg", context),
         context.name(values, "publish"),
         context.value(values.get("message", {})),
         qos=text_of(values, "qos") or "default",
+        subscribers=subscribers,
+        timeout=timeout,
     )
 
 

@@ -195,6 +195,12 @@ def _publish(checker: Checker, node: TreeNode) -> None:
     if "message" in node.values:
         kind = None if cls is None else Message(cls)
         checker.value(kind, node.values["message"], node.written["message"])
+    alone = "timeout" in node.values and "subscribers" not in node.values
+    if alone and not checker.doubts.own(node):
+        said = "'timeout' is how long to wait for 'subscribers', which are missing"
+        checker.source.report(
+            "BT108", span_of(node.written["timeout"]), said, hint="subscribers: 1"
+        )
 
 
 def _wait_for_message(checker: Checker, node: TreeNode) -> None:

@@ -351,10 +351,23 @@ def _all() -> Iterable[Kind]:
     yield _leaf(
         "publish",
         _TOPIC,
-        "Publishes a message.",
+        "Publishes a message. While a process is new (3.5 s), who listens may not be discovered "
+        "yet, so it waits for one until then; where nobody listens it succeeds with a warning.",
         "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
         Key("type", TypeName("msg"), "The message's type.", required=True),
         Key("message", Values(), "The fields of the message."),
+        Key(
+            "subscribers",
+            Whole(1),
+            "So many must listen before it publishes.",
+            default="whoever is there",
+        ),
+        Key(
+            "timeout",
+            Duration(or_none=True),
+            "After which it fails where fewer listen.",
+            default="none",
+        ),
         Key("qos", QOS, "How it is published.", default="default"),
         Key("namespace", NAMESPACE, "Put before a relative name."),
     )

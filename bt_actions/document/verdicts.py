@@ -56,7 +56,8 @@ class Verdicts:
             return Can(True, any(True for _ in computed_in(node.values.get(kind))))
         if kind in ("set", "publish"):
             data = node.values.get("set" if kind == "set" else "message")
-            return Can(True, any(True for _ in computed_in(data)))
+            waits = node.values.get("timeout") is not None
+            return Can(True, waits or any(True for _ in computed_in(data)))
         if kind == "subtree":
             return self._subtree(node)
         if not node.children:
@@ -117,7 +118,7 @@ class Verdicts:
             return _tries(_deadline(settings, "result"), settings.get("retry"))
         if kind == "service":
             return _tries(_deadline(node.values, "response"), node.values.get("retry"))
-        if kind in ("wait", "wait_until", "wait_for_message"):
+        if kind in ("wait", "wait_until", "wait_for_message", "publish"):
             limit = node.values.get("wait" if kind == "wait" else "timeout")
             return limit if isinstance(limit, float) else 0.0
         if node.included is not None and node.included.root is not None:

@@ -75,6 +75,13 @@ def test_what_a_server_may_go_on_with_is_said_and_what_to_do(
     assert not hints(Closing(Exit.FAILURE, verdict="The part lies there."))
 
 
+def test_a_success_that_warns_is_told_at_the_end(leaf: FakeAction, story: Story) -> None:
+    leaf.warning = "nobody listens on /lamp"  # type: ignore[attr-defined]
+    told_of = story.node(leaf, Status.SUCCESS), story.finish(Status.SUCCESS)
+    words = last_words(told(leaf, story.start(), *told_of), Closing(Exit.SUCCESS))
+    assert words[-1] == "warning: Move: nobody listens on /lamp"
+
+
 def test_a_success_after_its_deadline_is_told_as_late(leaf: FakeAction, story: Story) -> None:
     ended = {"outcome": Outcome.SUCCEEDED, "end": End.SUCCEEDED}
     late = story.goal(leaf, "DONE", **ended, reason="late: not finished within 1 s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -157,7 +158,10 @@ def test_a_message_that_is_published_is_read_as_a_variable(
 def test_a_topic_on_which_nothing_came_fails_a_check(load: Load, run: Run, name: str) -> None:
     root = run(load(TOPICS.format(topic=f"{name}/door", more="", root="check: $door.data")))
     assert root.status is Status.FAILURE
-    assert root.feedback_message == f"nothing has come on {name}/door yet ($door)"
+    assert (
+        root.feedback_message
+        == f"nothing has come on {name}/door yet ($door): nobody publishes on it"
+    )
 
 
 def test_a_message_that_is_too_old_fails_a_check(load: Load, run: Run, name: str) -> None:
@@ -313,13 +317,221 @@ def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_ti
     node.destroy_publisher(publisher)
 
 
+def test_messages_that_came_before_it_began_are_told(node: Any, name: str) -> None:
+    from rclpy.executors import SingleThreadedExecutor
+    from std_msgs.msg import Bool
+
+    from bt_actions.behaviours.topics import WaitForMessage
+
+    waits = WaitForMessage("w", Bool, name, timeout=0.05)
+    waits.setup(node=node)
+    publisher = node.create_publisher(Bool, name, 10)
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    publisher.publish(Bool())
+    until(
+        lambda: waits._latest is not None and waits._latest.came,
+        meanwhile=lambda: executor.spin_once(timeout_sec=0.01),
+    )
+    until(lambda: waits.status is Status.FAILURE, meanwhile=waits.tick_once)
+    executor.shutdown()
+    node.executor = None
+    waits.shutdown()
+    node.destroy_publisher(publisher)
+    assert waits.feedback_message == (
+        f"no such message on {name} within 0.05 s; 1 came before it began"
+    )
+
+
+@pytest.fixture(scope="module")
+def stranger(domain: int) -> Iterator[Any]:
+    """A node in another participant: within one, rmw_fastrtps refuses a second type of a name."""
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+    from bt_actions.ros.participant import close
+
+    context = Context()
+    context.init(domain_id=domain)
+    node = Node("stranger", context=context)
+    yield node
+    close(node, context)
+
+
+FOREIGN = [
+    ("String", "default", "default", "{what} is std_msgs/msg/String, not std_msgs/msg/Bool"),
+    ("Bool", "best_effort", "default", "{what} is best effort, write 'qos: best_effort'"),
+    ("Bool", "default", "latched", "{what} is not latched, write 'qos: default'"),
+]
+
+
+@pytest.mark.parametrize(("kind", "theirs", "ours", "said"), FOREIGN)
+def test_who_publishes_in_vain_is_told_where_no_message_comes(
+    load: Load,
+    run: Run,
+    node: Any,
+    stranger: Any,
+    name: str,
+    kind: str,
+    theirs: str,
+    ours: str,
+    said: str,
+) -> None:
+    import std_msgs.msg
+
+    from bt_actions.ros.topics import qos_profile
+
+    cls = getattr(std_msgs.msg, kind)
+    publisher = stranger.create_publisher(cls, f"{name}/door", qos_profile(theirs))
+    until(lambda: node.count_publishers(f"{name}/door"))
+    root = run(
+        load(
+            f"""
+            tree: t
+            root: {{wait_for_message: W, topic: {name}/door, type: std_msgs/msg/Bool,
+                   timeout: 50 ms, qos: {ours}}}
+            """
+        )
+    )
+    stranger.destroy_publisher(publisher)
+    why = said.format(what="what is published there")
+    assert root.feedback_message == f"no such message on {name}/door within 0.05 s: {why}"
+
+
+def test_a_topic_of_the_same_type_in_another_namespace_is_told(
+    load: Load, run: Run, node: Any, name: str
+) -> None:
+    from std_msgs.msg import Bool
+
+    publisher = node.create_publisher(Bool, f"{name}/left/door", 10)
+    root = run(load(TOPICS.format(topic=f"{name}/door", more="", root="check: $door.data")))
+    node.destroy_publisher(publisher)
+    assert root.feedback_message == (
+        f"nothing has come on {name}/door yet ($door): nobody publishes on it; there is"
+        f" {name}/left/door of that type"
+    )
+
+
+def test_a_service_of_another_type_or_in_another_namespace_is_told(
+    load: Load, run: Run, node: Any, stranger: Any, name: str
+) -> None:
+    from std_srvs.srv import SetBool, Trigger
+
+    others = [
+        stranger.create_service(Trigger, f"{name}/a", lambda _request, response: response),
+        stranger.create_service(SetBool, f"{name}/left/b", lambda _request, response: response),
+    ]
+    until(lambda: node.count_services(f"{name}/a") and node.count_services(f"{name}/left/b"))
+    more = "timeout: {server: 300 ms}"
+    a, b = (run(load(CALL.format(server=f"{name}/{each}", more=more))) for each in "ab")
+    for other in others:
+        stranger.destroy_service(other)
+    assert a.feedback_message == (
+        f"no service {name}/a within 0.3 s: what is there is std_srvs/srv/Trigger,"
+        " not std_srvs/srv/SetBool"
+    )
+    assert b.feedback_message == (
+        f"no service {name}/b within 0.3 s: nobody offers it; there is {name}/left/b of that type"
+    )
+
+
+LAMP = "tree: t\nroot: {{publish: {topic}, type: std_msgs/msg/Bool, message: {{data: true}}{more}}}"
+
+
+def test_a_message_is_published_when_so_many_listen(load: Load, node: Any, name: str) -> None:
+    from std_msgs.msg import Bool
+
+    root = load(LAMP.format(topic=name, more=", subscribers: 2, timeout: 20 s"))
+    heard: list[bool] = []
+    with TreeRunner(root, node=node) as runner:
+        runner.start()
+        listeners = []
+        for _ in range(2):
+            until(lambda: root.status is Status.RUNNING)
+            listeners.append(
+                node.create_subscription(Bool, name, lambda message: heard.append(message.data), 10)
+            )
+        assert runner.wait(10.0) is Status.SUCCESS
+        until(lambda: heard == [True, True])
+        for listener in listeners:
+            node.destroy_subscription(listener)
+    assert root.feedback_message == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "needed", "said"),
+    [
+        ("Bool", 2, "1 of 2 subscribers listen on {topic} after 0.1 s"),
+        ("String", 1, f"0 of 1 subscribers listen on {{topic}} after 0.1 s: {FOREIGN[0][-1]}"),
+    ],
+)
+def test_too_few_listeners_fail_in_time_and_are_counted(
+    load: Load,
+    run: Run,
+    node: Any,
+    stranger: Any,
+    name: str,
+    kind: str,
+    needed: int,
+    said: str,
+) -> None:
+    import std_msgs.msg
+
+    cls = getattr(std_msgs.msg, kind)
+    listener = stranger.create_subscription(cls, name, lambda _message: None, 10)
+    until(lambda: node.count_subscribers(name))
+    root = run(load(LAMP.format(topic=name, more=f", subscribers: {needed}, timeout: 100 ms")))
+    stranger.destroy_subscription(listener)
+    said = said.format(topic=name, what="what is asked for there")
+    assert (root.status, root.feedback_message) == (Status.FAILURE, said)
+
+
+@pytest.mark.parametrize("acknowledged", [True, False])
+def test_what_was_published_has_a_second_to_arrive_before_its_publisher_goes(
+    node: Any, name: str, acknowledged: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from std_msgs.msg import Bool
+
+    from bt_actions.ros.topics import Speaker
+
+    speaker = Speaker(node, Bool, name, "default")
+    answers = [True, False, False] if acknowledged else [False] * 1000
+    monkeypatch.setattr(speaker._publisher, "wait_for_all_acked", lambda _limit: answers.pop())
+    speaker.publish(Bool())
+    published_at = time.monotonic()
+    speaker.close()
+    assert acknowledged == (not answers)
+    assert acknowledged == (time.monotonic() - published_at < 0.9)
+
+
+def test_a_message_that_nobody_listens_to_is_published_with_a_warning_when_the_node_is_not_new(
+    load: Load, node: Any, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bt_actions.ros import topics
+
+    new = [0.5]
+    monkeypatch.setattr(topics, "discovers", lambda _node: new[0])
+    root: Any = load(LAMP.format(topic=name, more=""))
+    root.setup(node=node)
+    root.tick_once()
+    assert (root.status, root.warning) == (Status.RUNNING, "")
+    new[0] = 0.0
+    root.tick_once()
+    root.shutdown()
+    assert (root.status, root.warning) == (Status.SUCCESS, f"nobody listens on {name}")
+    assert root.feedback_message == root.warning
+
+
 def test_a_message_that_does_not_come_fails_in_time(load: Load, run: Run, name: str) -> None:
     text = (
         "tree: t\nroot: {wait_for_message: W, topic: %s, type: std_msgs/msg/Bool, timeout: 50 ms}"
     )
     root = run(load(text % f"{name}/door"))
     assert root.status is Status.FAILURE
-    assert root.feedback_message == f"no such message on {name}/door within 0.05 s"
+    assert (
+        root.feedback_message
+        == f"no such message on {name}/door within 0.05 s: nobody publishes on it"
+    )
 
 
 def test_timeout_waits_until_the_goal_it_stopped_has_ended(
