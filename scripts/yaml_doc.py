@@ -156,6 +156,11 @@ QOS = """\
 A subscription that asks for more than its publisher offers hears nothing: `default` and `latched`
 of a best effort publisher, `latched` of one that keeps nothing.
 """
+TOPICS = """\
+The latest message of a topic, read as a variable. While the first one may still be on its way (the
+process is younger than 3.5 s, or subscribed less than a second ago to a publisher that is there), a
+node that reads it is `RUNNING`; afterwards it counts as missing, and a check fails. So does
+`check: not $door.data` then; an `invert` around `check: $door.data` succeeds: its child failed."""
 DEFAULTS = """\
 `timeout`, `retry` and `busy` for all actions. They merge key by key, and the nearest wins: the
 node's own, the action's under `actions`, the tree's `defaults`, those that it imports."""
@@ -256,7 +261,7 @@ def yaml_page() -> str:
         "`actions`",
         "Settings merge key by key: `defaults`, then the action's here, then the node's.", ALIAS,
     )  # fmt: skip
-    lines += record("`topics`", "The latest message of a topic, read as a variable.", TOPIC)
+    lines += record("`topics`", TOPICS, TOPIC)
     lines += [example("topics"), ""]
     lines += part("`import`", IMPORT, "words", "imports")
     lines += part("`defaults`", DEFAULTS, "defaults")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from py_trees.behaviour import Behaviour
@@ -16,7 +16,7 @@ from bt_actions.expression import ExpressionError
 if TYPE_CHECKING:
     from bt_actions.ros.topics import Latest, Speaker
 
-__all__ = ["Publish", "TopicValue", "WaitForMessage"]
+__all__ = ["Publish", "TopicValue", "WaitForMessage", "patient"]
 
 LOOKS = 0.05
 """Seconds between two looks for somebody who listens: nothing announces that."""
@@ -72,12 +72,45 @@ class TopicValue:
             raise ExpressionError(f"the last message on {topic} is {age:.1f} s old (${self.name})")
         return message
 
+    def first_may_come(self) -> float:
+        """Seconds for which the first message may be on its way; 0 afterwards."""
+        return 0.0 if self._latest is None else self._latest.first_may_come()
+
     def _why(self) -> str:
         """Why nothing has come; looked up once a second at most, as a tree may ask at each tick."""
         now = time.monotonic()
         if self._latest is not None and now >= self._look_again_at:
             self._said, self._look_again_at = self._latest.why_silent(), now + 1.0
         return self._said
+
+
+def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
+    """Have a behaviour begin its visits only when the topics that it reads can be asked.
+
+    It is RUNNING as long as the first message of one may still be on its way, which is so when a
+    process has just begun. Its own code is not called before.
+    """
+    tick, due_in = behaviour.tick, getattr(behaviour, "due_in", None)
+    awaited: list[TopicValue] = []
+
+    def tick_patiently() -> Iterator[Behaviour]:
+        if awaited or behaviour.status is not Status.RUNNING:
+            awaited[:] = [topic for topic in topics if topic.first_may_come() > 0.0]
+            if awaited:
+                behaviour.feedback_message = f"waiting for a first message: ${awaited[0].name}"
+                behaviour.status = Status.RUNNING
+                yield behaviour
+                return
+            behaviour.status = Status.INVALID  # its visit begins now
+        yield from tick()
+
+    def due() -> float | None:
+        if awaited:
+            return max(topic.first_may_come() for topic in awaited)
+        return None if due_in is None else due_in()
+
+    behaviour.tick = tick_patiently  # type: ignore[method-assign]
+    behaviour.due_in = due  # type: ignore[attr-defined]
 
 
 class WaitForMessage(Behaviour):

@@ -19,15 +19,17 @@ from bt_actions.behaviours.limits import Deadline, While
 from bt_actions.behaviours.loops import ForEach, Repeat, RetryChild
 from bt_actions.behaviours.parallel import Parallel
 from bt_actions.behaviours.subtree import Subtree
-from bt_actions.behaviours.topics import TopicValue
+from bt_actions.behaviours.topics import TopicValue, patient
+from bt_actions.behaviours.waiting import WaitUntil
 from bt_actions.document.bounds import refuse_large
 from bt_actions.document.build_leaves import LEAVES, build_action
-from bt_actions.document.build_names import join_names, text_of
+from bt_actions.document.build_names import join_names, settings_of, text_of
 from bt_actions.document.context import Context, plain_name, table_of, written_text
 from bt_actions.document.findings import PLACE
 from bt_actions.document.inputs import check_inputs
 from bt_actions.document.scope import Scope
 from bt_actions.document.tree import Declared, Document, TreeNode
+from bt_actions.document.values import computed_in
 from bt_actions.document.writes import writes_of
 from bt_actions.shorten import shorten
 
@@ -73,9 +75,9 @@ def _connect(root: Behaviour, topics: list[TopicValue]) -> None:
     set_up, shut_down = root.setup, root.shutdown
 
     def setup(**kwargs: Any) -> None:
+        set_up(**kwargs)  # which shuts a leaf down that was set up before
         for topic in topics:
             topic.connect(kwargs.get("node"))
-        set_up(**kwargs)
 
     def shutdown() -> None:
         shut_down()
@@ -92,6 +94,11 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
     else:
         assert node.kind is not None
         behaviour = BUILDERS[node.kind.name](node, context)
+    if context.topics and not isinstance(behaviour, WaitUntil):  # which waits anyway
+        written = settings_of(node, context.document) if node.is_action else node.values
+        names = {name for each in computed_in(written) for name in each.expression.names}
+        if read := [topic for name, topic in context.topics.items() if name in names]:
+            patient(behaviour, read)
     setattr(behaviour, PLACE, node.place)
     return behaviour
 

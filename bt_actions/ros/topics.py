@@ -87,6 +87,7 @@ class Latest:
         self._kept: deque[Any] | None = None
         self._type = message_type
         self._qos = qos_profile(qos)
+        self._made_at = time.monotonic()
         self.came = 0
         """How many messages have come."""
         self._subscription = closable(
@@ -108,6 +109,17 @@ class Latest:
             self._age += max(0.0, now - self._aged_at)
             self._aged_at = now
             return self._message, self._age
+
+    def first_may_come(self) -> float:
+        """Seconds for which a message may be on its way though none has come; 0 afterwards.
+
+        Its publisher may not be discovered yet, or has only just been.
+        """
+        if self.came:
+            return 0.0
+        matched = self._subscription.get_publisher_count() > 0
+        arrives = self._made_at + ARRIVES - time.monotonic() if matched else 0.0
+        return max(discovers(self._node), arrives)
 
     def why_silent(self) -> str:
         """What the graph shows that explains why nothing has come, behind a colon; or ""."""

@@ -14,6 +14,7 @@ import pytest
 from bt_actions.cli import main
 from tests.cli.conftest import Start
 from tests.support.processes import Journal, Process
+from tests.support.waiting import until
 
 WRONG_GOAL = """\
 tree: t
@@ -34,6 +35,16 @@ root:
     - {grip: Open, goal: {position: 100.0}}
     - {move: To the part, goal: {distance: 2.0}}
     - {grip: Close, goal: {position: 0.0}}
+"""
+
+NEW = """\
+tree: new
+topics: {flag: {topic: flag, type: std_msgs/msg/Bool, qos: latched}}
+root:
+  sequence: S
+  children:
+    - check: $flag.data
+    - {publish: lamp, type: std_msgs/msg/Bool, message: {data: true}}
 """
 
 Tree = Callable[..., Path]
@@ -87,6 +98,33 @@ class TestExitCode0:
         assert "/cell/left: The part lies at 4.99 m, at the shelf." in run.lines
         assert "/cell/right: The part lies at 4.99 m, at the shelf." in run.lines
         assert not any("--sim serves only" in line for line in run.errors)
+
+    def test_a_new_process_is_heard_and_hears_what_was_latched_before_it(
+        self, start: Start, node: Any, namespace: str, tmp_path: Path
+    ) -> None:
+        from rclpy.executors import SingleThreadedExecutor
+        from std_msgs.msg import Bool
+
+        from bt_actions.ros.topics import qos_profile
+
+        path = tmp_path / "new.yaml"
+        path.write_text(NEW)
+        heard: list[bool] = []
+        lamp = node.create_subscription(
+            Bool, f"{namespace}/lamp", lambda m: heard.append(m.data), 10
+        )
+        flag = node.create_publisher(Bool, f"{namespace}/flag", qos_profile("latched"))
+        flag.publish(Bool(data=True))
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        run = start("run", str(path), "--namespace", namespace)
+        assert run.wait() == 0, run
+        until(lambda: heard, 5.0, meanwhile=lambda: executor.spin_once(timeout_sec=0.01))
+        executor.shutdown()
+        node.executor = None
+        node.destroy_subscription(lamp)
+        node.destroy_publisher(flag)
+        assert heard == [True]
 
     def test_json_is_nothing_but_objects_and_the_last_is_the_result(self, start: Start) -> None:
         run = start("run", "pick_and_place", "--sim", "--speed", "20", "--json")

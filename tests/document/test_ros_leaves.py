@@ -164,6 +164,79 @@ def test_a_topic_on_which_nothing_came_fails_a_check(load: Load, run: Run, name:
     )
 
 
+READS = {
+    "action": """action: A
+  type: robot_control_interfaces/action/MoveRobot
+  server: {name}
+  goal: {{distance: = $flag.data * 0.01}}""",
+    "check": "check: $flag.data == 1",
+    "for_each": "for_each: F\n  in: = [$flag.data]\n  child: {{success: S}}",
+    "log": "log: It is $(flag.data)",
+    "publish": "publish: {name}/x\n  type: std_msgs/msg/Int32\n  message: {{data: $flag.data}}",
+    "repeat": "repeat: R\n  times: $flag.data\n  child: {{success: S}}",
+    "retry": "retry: R\n  attempts: $flag.data\n  child: {{success: S}}",
+    "service": """service: S
+  type: std_srvs/srv/SetBool
+  server: {name}/switch
+  request: {{data: = $flag.data == 1}}""",
+    "set": "set: {{seen: $flag.data}}",
+    "subtree": "subtree: inner.yaml\n  with: {{n: $flag.data}}",
+    "timeout": "timeout: T\n  after: $flag.data\n  child: {{success: S}}",
+    "wait": "wait: = $flag.data * 0.01",
+    "while": "while: $flag.data == 1\n  child: {{success: S}}",
+}
+
+
+@pytest.mark.usefixtures("switch")
+@pytest.mark.parametrize("kind", READS)
+def test_who_reads_a_latched_topic_at_once_is_given_its_message(
+    load: Load, run: Run, serve: Any, node: Any, name: str, kind: str
+) -> None:
+    from std_msgs.msg import Int32
+
+    from bt_actions.ros.topics import qos_profile
+
+    if kind == "action":
+        serve()
+    publisher = node.create_publisher(Int32, f"{name}/flag", qos_profile("latched"))
+    publisher.publish(Int32(data=1))
+    text = f"""tree: t
+topics: {{flag: {{topic: {name}/flag, type: std_msgs/msg/Int32, qos: latched}}}}
+root:
+  {READS[kind].format(name=name)}
+"""
+    root = run(load(text, inner="tree: inner\ninputs: {n: int32}\nroot: {success: S}"))
+    node.destroy_publisher(publisher)
+    assert root.status is Status.SUCCESS, root.feedback_message
+
+
+def test_a_visit_begins_when_no_topic_is_waited_for_any_more(
+    load: Load, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bt_actions.behaviours.topics import TopicValue
+
+    left = [0.3]
+    monkeypatch.setattr(TopicValue, "first_may_come", lambda _self: left[0])
+    root: Any = load(
+        """
+        tree: t
+        topics: {limit: {topic: limit, type: std_msgs/msg/Float64}}
+        root: {timeout: T, after: $limit.data, child: {running: R}}
+        """
+    )
+    begun: list[Status] = []
+    root.initialise = lambda: begun.append(root.status)
+    for _ in range(2):
+        root.tick_once()
+        assert (root.status, root.due_in()) == (Status.RUNNING, 0.3)
+    root.stop(Status.INVALID)
+    root.tick_once()
+    assert (root.status, begun) == (Status.RUNNING, [])
+    left[0] = 0.0
+    root.tick_once()
+    assert begun == [Status.INVALID], "as the first tick of any visit"
+
+
 def test_a_message_that_is_too_old_fails_a_check(load: Load, run: Run, name: str) -> None:
     topic = f"{name}/door"
     children = [PUBLISH.format(topic=topic), "{wait_until: $door.data, timeout: 10 s}",
