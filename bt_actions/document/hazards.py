@@ -191,8 +191,9 @@ class _Hazards:
         if found is None:
             below = node.included.root if node.included is not None else None
             within = [*node.children, below] if below is not None else node.children
-            busy = node.kind is not None and node.kind.name in _BUSY
-            found = node.is_action or busy or any(self._takes_time(each) for each in within)
+            busy = node.is_action or (node.kind is not None and node.kind.name in _BUSY)
+            busy = busy or "subscribers" in node.values  # of a publish, which waits for them
+            found = busy or any(self._takes_time(each) for each in within)
             self._slow[id(node)] = found
         return found
 
