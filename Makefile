@@ -70,7 +70,7 @@ python:
 $(VENV)/interfaces.stamp: $(INTERFACES) | python
 	@scripts/compiler.sh
 	@rm -rf $(VENV)/wheels
-	@scripts/pip.sh $(VENV) "Building the ROS interfaces" wheel --no-deps --wheel-dir $(VENV)/wheels ./interfaces
+	@scripts/pip.sh $(VENV) "Building the ROS interfaces" wheel --no-deps --wheel-dir $(VENV)/wheels ./interfaces/*/
 	@scripts/pip.sh $(VENV) "Installing the ROS interfaces" install --no-deps --force-reinstall $(VENV)/wheels/*.whl
 	@touch $@
 
@@ -82,12 +82,12 @@ $(VENV)/dev.stamp: setup.cfg constraints.txt | $(VENV)/runtime.stamp
 	@scripts/pip.sh $(VENV) "Installing the tools for tests and checks" install --editable '.[dev]'
 	@touch $@
 
-# An environment of its own: colcon builds robot_control_interfaces, so its wheel must not be installed.
+# An environment of its own: colcon builds the interfaces, so their wheels must not be installed.
 
 colcon-python:
 	@scripts/venv.sh $(COLCON)/venv $(PYTHON)
 
-$(COLCON)/venv.stamp: setup.cfg interfaces/pyproject.toml constraints.txt scripts/colcon_requirements.py | colcon-python
+$(COLCON)/venv.stamp: setup.cfg $(wildcard interfaces/*/pyproject.toml) constraints.txt scripts/colcon_requirements.py | colcon-python
 	@scripts/compiler.sh
 	@$(COLCON)/venv/bin/python scripts/colcon_requirements.py >$(COLCON)/requirements.txt
 	@scripts/pip.sh $(COLCON)/venv "Installing ROS 2 Jazzy and colcon" install --requirement $(COLCON)/requirements.txt

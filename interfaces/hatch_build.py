@@ -1,6 +1,6 @@
-"""Builds this ament_cmake package and hands its files to the wheel.
+"""Builds an ament_cmake package of this folder and hands its files to the package's wheel.
 
-It runs CMake on the CMakeLists.txt beside it, as colcon does, against the ROS 2 wheels of the build
+It runs CMake on the package's CMakeLists.txt, as colcon does, against the ROS 2 wheels of the build
 environment. Headers and CMake exports stay out of the wheel: it is for running, not for building
 upon.
 """
@@ -28,8 +28,8 @@ class AmentCMakeHook(BuildHookInterface):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if version == "editable":
-            raise SystemExit("robot_control_interfaces is generated code: install it without -e.")
-        self._work = tempfile.TemporaryDirectory(prefix="robot_control_interfaces-")
+            raise SystemExit(f"{self.metadata.name} is generated code: install it without -e.")
+        self._work = tempfile.TemporaryDirectory(prefix=f"{self.metadata.name}-")
         prefix = self._build(Path(self._work.name))
 
         build_data["pure_python"] = False
@@ -62,7 +62,7 @@ class AmentCMakeHook(BuildHookInterface):
         build, prefix = work / "build", work / "prefix"
         configure = [
             "cmake", "-S", source, "-B", build, "-G", "Ninja",
-            f"-DCMAKE_PROJECT_INCLUDE={source / 'cmake' / 'ros_wheels.cmake'}",
+            f"-DCMAKE_PROJECT_INCLUDE={Path(__file__).with_name('ros_wheels.cmake')}",
             f"-DCMAKE_INSTALL_PREFIX={prefix}",
             f"-DPython3_EXECUTABLE={sys.executable}",
             "-DPYTHON_INSTALL_DIR=python",

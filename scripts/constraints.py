@@ -9,7 +9,7 @@ import sys
 
 HEADER = """\
 # The exact version of every package that any target of the Makefile installs, ROS 2 Jazzy included.
-# Made by scripts/constraints.py. setup.cfg and interfaces/pyproject.toml name the same versions.
+# Made by scripts/constraints.py. setup.cfg and interfaces/*/pyproject.toml name the same versions.
 """
 # The ROS wheels carry metadata of a second distribution each (rclpy beside ros-rclpy), which no
 # index has and pip did not install by that name.
@@ -20,7 +20,7 @@ for found in distributions():
     if (found.read_text("INSTALLER") or "").strip() == "pip":
         print(re.sub("[-_.]+", "-", found.name).lower(), found.version)
 """
-OURS = {"bt-actions", "robot-control-interfaces", "pip"}
+OURS = {"bt-actions", "bt-actions-interfaces", "robot-control-interfaces", "pip"}
 
 versions: dict[str, set[str]] = {}
 for python in sys.argv[1:]:

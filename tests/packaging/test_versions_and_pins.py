@@ -7,12 +7,14 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from importlib.metadata import distributions
 from pathlib import Path
+from typing import Any
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
+INTERFACES = sorted(path.parent for path in ROOT.glob("interfaces/*/package.xml"))
 
 
 def setup_cfg() -> configparser.ConfigParser:
@@ -33,9 +35,14 @@ def development() -> list[Requirement]:
     return requirements(setup_cfg()["options.extras_require"]["dev"])
 
 
+def pyprojects() -> list[dict[str, Any]]:
+    return [tomllib.loads((folder / "pyproject.toml").read_text()) for folder in INTERFACES]
+
+
 def interfaces() -> list[Requirement]:
-    pyproject = tomllib.loads((ROOT / "interfaces" / "pyproject.toml").read_text())
-    lines = pyproject["build-system"]["requires"] + pyproject["project"]["dependencies"]
+    lines = pyprojects()[0]["build-system"]["requires"]
+    for pyproject in pyprojects():
+        lines += pyproject["project"]["dependencies"]
     return [Requirement(line) for line in lines]
 
 
@@ -75,9 +82,16 @@ def test_name_and_version_are_the_same_for_pip_and_for_ros() -> None:
 
 
 def test_the_interfaces_of_this_very_version_are_required() -> None:
-    name, version = package_xml(ROOT / "interfaces")
     required = {requirement.name: requirement for requirement in runtime()}
-    assert exact_version(required[name]) == version
+    for folder in INTERFACES:
+        name, version = package_xml(folder)
+        assert name == folder.name
+        assert exact_version(required[name]) == version
+
+
+def test_all_interfaces_are_built_with_the_same_tools() -> None:
+    assert len(INTERFACES) == 2
+    assert len({str(pyproject["build-system"]) for pyproject in pyprojects()}) == 1
 
 
 @pytest.mark.parametrize("source", [runtime, development, interfaces], ids=lambda f: f.__name__)
@@ -93,7 +107,7 @@ def test_every_ros_package_is_pinned_to_the_version_in_the_constraints(
 def test_the_constraints_fit_what_is_required() -> None:
     pinned = constraints()
     for requirement in runtime() + development() + interfaces():
-        if requirement.name != "robot_control_interfaces":
+        if requirement.name not in {folder.name for folder in INTERFACES}:
             assert pinned[canonicalize_name(requirement.name)] in requirement.specifier
 
 
