@@ -15,9 +15,11 @@ from bt_actions.document.findings import (
 )
 from bt_actions.document.inputs import InputError, TreeInput, parse_input
 from bt_actions.document.load import (
+    Tree,
     check_file,
     check_source,
     load_tree,
+    open_tree,
     tree_inputs,
     tree_name,
     tree_outputs,
@@ -36,6 +38,7 @@ __all__ = [
     "Severity",
     "Source",
     "Span",
+    "Tree",
     "TreeInput",
     "TreeNotFoundError",
     "check_file",
@@ -43,6 +46,7 @@ __all__ = [
     "find_tree",
     "installed_trees",
     "load_tree",
+    "open_tree",
     "parse_input",
     "place_of",
     "read_source",

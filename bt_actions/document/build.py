@@ -24,6 +24,7 @@ from bt_actions.behaviours.waiting import WaitUntil
 from bt_actions.document.bounds import refuse_large
 from bt_actions.document.build_leaves import LEAVES, build_action
 from bt_actions.document.build_names import join_names, settings_of, text_of
+from bt_actions.document.classes import Python
 from bt_actions.document.context import Context, plain_name, table_of, written_text
 from bt_actions.document.findings import PLACE
 from bt_actions.document.inputs import check_inputs
@@ -42,12 +43,12 @@ def build(
     *,
     namespace: str = "",
     types: bool = True,
-    python: bool = True,
+    python: Python = True,
 ) -> Behaviour:
     """The behaviours of a document; each has the place it was written at in `place`.
 
-    What cannot be made is reported to the document's source. Raises TooManyErrors. With
-    `python=False` that holds for every ``python:`` node.
+    What cannot be made is reported to the document's source, as is every ``python:`` node that
+    `python` does not allow. Raises TooManyErrors.
     """
     assert document.root is not None
     inner = join_names(namespace, document.namespace)

@@ -17,8 +17,7 @@ from bt_actions.behaviours.service import CallService
 from bt_actions.behaviours.topics import Publish, WaitForMessage
 from bt_actions.behaviours.waiting import Wait, WaitUntil
 from bt_actions.document.build_names import settings_of, text_of
-from bt_actions.document.check_kinds import NO_PYTHON
-from bt_actions.document.classes import ClassError, make_behaviour
+from bt_actions.document.classes import ClassError, make_behaviour, refusal
 from bt_actions.document.context import Context, plain_name, table_of, written_text
 from bt_actions.document.nodes import span_of
 from bt_actions.document.tree import TreeNode
@@ -169,8 +168,8 @@ def _python(node: TreeNode, context: Context) -> Behaviour:
     """What cannot be made is reported to the document's source, and `Failure` stands for it."""
     path = text_of(node.values, "python")
     name = node.name or path.rpartition(".")[2]
-    if not context.python:  # the checker said so before; here nothing is imported whatever it said
-        node.source.report("BT214", span_of(node.key), NO_PYTHON)
+    if refused := refusal(path, context.python):  # nothing is imported, whatever the checker said
+        node.source.report("BT214", span_of(node.key), refused)
         return Failure(name)
     try:
         return make_behaviour(path, name, table_of(node.values.get("arguments")))

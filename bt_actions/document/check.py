@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from bt_actions.document.build_names import when_of
 from bt_actions.document.elsewhere import notation_here
@@ -36,6 +36,9 @@ from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import Either, FieldType, Message
 from bt_actions.suggest import closest, listing
 
+if TYPE_CHECKING:
+    from bt_actions.document.classes import Python
+
 __all__ = ["Checker", "Read"]
 
 
@@ -54,8 +57,8 @@ Types = MappingType[str, FieldType | None]
 class Checker:
     """Checks one document; the trees that it includes are checked by their own."""
 
-    def __init__(self, document: Document, *, types: bool, python: bool = True) -> None:
-        """With `python=False` a ``python:`` node is an error, and its module is not imported."""
+    def __init__(self, document: Document, *, types: bool, python: Python = True) -> None:
+        """A ``python:`` node that `python` does not allow is an error, and nothing is imported."""
         self.document = document
         self.source = document.source
         self.doubts = Doubts(document)

@@ -19,9 +19,7 @@ from bt_actions.suggest import did_you_mean, listing
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker
 
-__all__ = ["CHECKS", "NO_PYTHON"]
-
-NO_PYTHON = "python: is not allowed here, because it runs code that the tree names"
+__all__ = ["CHECKS"]
 
 
 def _subtree(checker: Checker, node: TreeNode) -> None:
@@ -242,8 +240,10 @@ def _log(checker: Checker, node: TreeNode) -> None:
 
 def _python(checker: Checker, node: TreeNode) -> None:
     path, arguments = node.values.get("python"), node.values.get("arguments", {})
-    if not checker.python:
-        checker.source.report("BT214", span_of(node.key), NO_PYTHON)
+    from bt_actions.document.classes import ClassError, find_behaviour, refusal, wrong_arguments
+
+    if refused := refusal(path, checker.python):
+        checker.source.report("BT214", span_of(node.key), refused)
         return
     computed = list(computed_in(arguments))
     for one in computed:
@@ -251,8 +251,6 @@ def _python(checker: Checker, node: TreeNode) -> None:
         checker.source.report("BT204", span_of(one.node), text)
     if computed or not isinstance(path, str) or not checker.types:
         return
-    from bt_actions.document.classes import ClassError, find_behaviour, wrong_arguments
-
     try:
         cls = find_behaviour(path)
     except ClassError as error:

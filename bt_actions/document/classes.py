@@ -11,15 +11,26 @@ import inspect
 import re
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
 
 from bt_actions.plain_text import raised
-from bt_actions.suggest import did_you_mean
+from bt_actions.suggest import did_you_mean, listing
 
-__all__ = ["ClassError", "Misfit", "find_behaviour", "make_behaviour", "wrong_arguments"]
+__all__ = [
+    "ClassError",
+    "Misfit",
+    "Python",
+    "find_behaviour",
+    "make_behaviour",
+    "refusal",
+    "wrong_arguments",
+]
+
+Python = bool | Collection[str]
+"""Which classes a tree may name: all, none, or those of some packages."""
 
 _PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", re.ASCII)
 
@@ -34,6 +45,20 @@ class Misfit(NamedTuple):
     name: str
     text: str
     at_key: bool = True
+
+
+def refusal(path: object, python: Python) -> str:
+    """Why a ``python:`` node may not name this class, before anything is imported; or ""."""
+    if isinstance(python, bool):
+        return (
+            ""
+            if python
+            else "python: is not allowed here, because it runs code that the tree names"
+        )
+    if isinstance(path, str) and path.partition(".")[0] in python:
+        return ""
+    named = f"those of {listing(python)}" if python else "none"
+    return f"python: may name no other classes here than {named}"
 
 
 def find_behaviour(path: str) -> type[Behaviour]:

@@ -9,6 +9,7 @@ from typing import Any
 from bt_actions.behaviours.topics import TopicValue
 from bt_actions.document.bounds import refuse_large
 from bt_actions.document.build_names import join_names, text_of
+from bt_actions.document.classes import Python
 from bt_actions.document.inputs import convert
 from bt_actions.document.nodes import Scalar
 from bt_actions.document.scope import Scope
@@ -28,8 +29,8 @@ class Context:
     namespace: str
     types: bool
     topics: Mapping[str, TopicValue]
-    python: bool = True
-    """Whether ``python:`` nodes may be made."""
+    python: Python = True
+    """Which ``python:`` nodes may be made."""
 
     def read(self, name: str) -> object:
         """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,9 +25,19 @@ from bt_actions.expression_values import plain
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
+    from bt_actions.document.classes import Python
     from bt_actions.document.scope import Scope
 
-__all__ = ["check_file", "check_source", "load_tree", "tree_inputs", "tree_name", "tree_outputs"]
+__all__ = [
+    "Tree",
+    "check_file",
+    "check_source",
+    "load_tree",
+    "open_tree",
+    "tree_inputs",
+    "tree_name",
+    "tree_outputs",
+]
 
 PathLike = str | os.PathLike[str]
 
@@ -55,7 +65,92 @@ def _no_collecting() -> Iterator[None]:
             gc.enable()
 
 
+class Tree:
+    """A tree that was read and checked, from which behaviours are made as often as wanted.
+
+    What it was read from may change meanwhile: this stays what it is.
+    """
+
+    def __init__(
+        self, workspace: Workspace, document: Document, *, types: bool, python: Python
+    ) -> None:
+        self._workspace, self._document = workspace, document
+        self._types, self._python = types, python
+
+    def __repr__(self) -> str:
+        return f"<Tree {self.name}>"
+
+    @property
+    def name(self) -> str:
+        """As its file says, which may be called otherwise."""
+        return self._document.name
+
+    @property
+    def description(self) -> str:
+        """What it is for, in its own words; may be empty."""
+        return str(self._document.values.get("description", ""))
+
+    @property
+    def inputs(self) -> dict[str, TreeInput]:
+        """What it wants to be given."""
+        return inputs_of(self._document)
+
+    @property
+    def warnings(self) -> list[Finding]:
+        """What was found in it; no errors."""
+        return self._workspace.findings
+
+    @property
+    def files(self) -> dict[Path, str]:
+        """Every file that it is made of, resolved, with the text that was read (none of data)."""
+        return self._workspace.files
+
+    def check_inputs(self, inputs: Mapping[str, object]) -> None:
+        """Raise InputError where `build` would."""
+        check_inputs(self._document, inputs, types=self._types)
+
+    @_no_collecting()
+    def build(self, inputs: Mapping[str, object] | None = None) -> Behaviour:
+        """New behaviours, with variables of their own; needs no node and no server.
+
+        Raises InputError for inputs that do not fit, DocumentError for a class of a ``python:``
+        node that fails when it is made.
+        """
+        from bt_actions.document.build import build
+        from bt_actions.document.scope import Scope
+
+        values = check_inputs(self._document, inputs or {}, types=self._types)
+        scope = Scope.of_load(self._document.name)
+        scope.write_all(values)
+        try:
+            root = build(self._document, scope, types=self._types, python=self._python)
+        except TooManyErrors:
+            raise DocumentError(_errors(self._workspace)) from None
+        _refuse(self._workspace)  # a class of one's own may fail when it is made
+        setattr(root, LOADED, Loaded(self._document, scope))
+        return root
+
+
 @_no_collecting()
+def open_tree(
+    path: PathLike,
+    *,
+    types: bool = True,
+    python: Python = True,
+    within: Iterable[Path] | None = None,
+) -> Tree:
+    """Read and check a tree, with all that it includes and imports.
+
+    `types` and `python` as for `load_tree`; `python` may also be the names of the packages whose
+    classes a tree may name. With `within`, no file is read that does not lie in one of these
+    folders, wherever links lead.
+
+    Raises DocumentError with everything that is wrong with the tree.
+    """
+    workspace, document = _open(path, types=types, python=python, within=within)
+    return Tree(workspace, document, types=types, python=python)
+
+
 def load_tree(
     path: PathLike,
     inputs: Mapping[str, object] | None = None,
@@ -73,20 +168,7 @@ def load_tree(
     Raises DocumentError with everything that is wrong with the tree, InputError for inputs that do
     not fit; both are ValueErrors.
     """
-    from bt_actions.document.build import build
-    from bt_actions.document.scope import Scope
-
-    workspace, document = _open(path, types=types, python=python)
-    values = check_inputs(document, inputs or {}, types=types)
-    scope = Scope.of_load(document.name)
-    scope.write_all(values)
-    try:
-        root = build(document, scope, types=types, python=python)
-    except TooManyErrors:
-        raise DocumentError(_errors(workspace)) from None
-    _refuse(workspace)  # a class of one's own may fail when it is made
-    setattr(root, LOADED, Loaded(document, scope))
-    return root
+    return open_tree(path, types=types, python=python).build(inputs)
 
 
 def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
@@ -144,7 +226,7 @@ def check_source(source: Source, *, types: bool = True, python: bool = True) -> 
     return _checked(workspace, types=types, python=python)
 
 
-def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[Finding]:
+def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> list[Finding]:
     # Libraries first: what is wrong with them by themselves is not told of the trees they are in.
     for document in sorted(workspace.documents, key=lambda one: one.root is not None):
         with contextlib.suppress(TooManyErrors):  # which are errors of this document: it is refused
@@ -158,8 +240,14 @@ def _checked(workspace: Workspace, *, types: bool, python: bool = True) -> list[
     return workspace.findings
 
 
-def _open(path: PathLike, *, types: bool, python: bool = True) -> tuple[Workspace, Document]:
-    workspace = Workspace()
+def _open(
+    path: PathLike,
+    *,
+    types: bool,
+    python: Python = True,
+    within: Iterable[Path] | None = None,
+) -> tuple[Workspace, Document]:
+    workspace = Workspace(within)
     try:
         found = _found(path)
         document = workspace.open(found, _shown(path, found))

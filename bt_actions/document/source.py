@@ -83,6 +83,8 @@ class Source:
     """Scalars about which enough was said."""
     decoded: tuple[Node, list[Char]] | None = None
     """The scalar that inner.py was last asked about, and where its characters are written."""
+    within: tuple[Path, ...] | None = None
+    """The folders, resolved, in which every file must lie that it names; None: anywhere."""
     files: dict[Path, object] = field(default_factory=dict)
     """What was read for it from other files as data, or the ValueError that came of it."""
     items: int = 0
@@ -111,6 +113,18 @@ class Source:
             numbers = enumerate(self.lines, 1) if "#" in self.text else ()
             self._commented = frozenset(number for number, line in numbers if "#" in line)
         return self._commented
+
+    def refusal(self, path: Path) -> str:
+        """Why it may not name this file, wherever links lead; or ""."""
+        if self.within is None:
+            return ""
+        try:
+            resolved = path.resolve()
+        except (OSError, RuntimeError):
+            return f"{path.name} cannot be found"
+        if any(resolved.is_relative_to(folder) for folder in self.within):
+            return ""
+        return f"{path.name} lies outside of the folders whose trees are served"
 
     def report(
         self,

@@ -194,6 +194,8 @@ def _read_file(node: Scalar, source: Source) -> object:
         path = source.path.parent / path
     if path not in source.files:
         try:
+            if refusal := source.refusal(path):
+                raise ValueError(refusal)
             source.files[path] = read_data(path)
         except ValueError as error:
             source.files[path] = error

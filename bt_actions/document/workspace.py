@@ -6,11 +6,12 @@ do not include themselves and do not unfold without bound.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from bt_actions.document.elsewhere import package_here
 from bt_actions.document.find import TreeNotFoundError, find_tree
-from bt_actions.document.findings import DocumentError, Finding, Related
+from bt_actions.document.findings import DocumentError, Finding, Related, Span
 from bt_actions.document.nodes import Listing, Node, span_of
 from bt_actions.document.read import read_document, read_root
 from bt_actions.document.source import SUFFIXES, Source, read_source
@@ -31,7 +32,9 @@ _MAX_FILES = 2 * _MAX_CHAIN
 class Workspace:
     """The documents that belong to one or several trees."""
 
-    def __init__(self) -> None:
+    def __init__(self, within: Iterable[Path] | None = None) -> None:
+        """`within` are the folders in which every file must lie, links resolved; None: anywhere."""
+        self._within = None if within is None else tuple(each.resolve() for each in within)
         self._documents: dict[tuple[Path, bool], Document | None] = {}
         self._sources: list[Source] = []
         self._sizes: dict[int, int] = {}
@@ -43,7 +46,12 @@ class Workspace:
 
         Raises DocumentError when the file cannot be read at all.
         """
-        return self._open_tree(read_source(path, name), (_key(path),))
+        source = read_source(path, name)
+        source.within = self._within
+        if refusal := source.refusal(path):
+            source.report("BT209", Span(1, 1, 1, 2), refusal)
+            raise DocumentError(source.findings)
+        return self._open_tree(source, (_key(path),))
 
     def open_source(self, source: Source) -> Document | None:
         """The tree in a source that was read already (standard input, an editor's buffer)."""
@@ -54,6 +62,12 @@ class Workspace:
     def documents(self) -> list[Document]:
         """Every document that was opened, in the order of opening."""
         return [document for document in self._documents.values() if document is not None]
+
+    @property
+    def files(self) -> dict[Path, str]:
+        """Every file that was read, resolved, with its text; that of data files is empty."""
+        found = {_key(each.path): each.text for each in self._sources if each.path is not None}
+        return found | {_key(path): "" for each in self._sources for path in each.files}
 
     @property
     def findings(self) -> list[Finding]:
@@ -144,13 +158,18 @@ class Workspace:
             text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"
             source.report("BT209", span_of(written), text)
             return None
+        if refusal := source.refusal(path):
+            source.report("BT209", span_of(written), refusal)
+            return None
         return path
 
     def _read(self, path: Path, written: Node, source: Source) -> Source | None:
         key = _key(path)
         if key not in self._failed:
             try:
-                return read_source(path, _shown(path, source), pipes=False)
+                opened = read_source(path, _shown(path, source), pipes=False)
+                opened.within = self._within
+                return opened
             except DocumentError as error:
                 self._failed[key] = error
         first = self._failed[key].findings[0]
