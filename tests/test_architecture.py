@@ -13,7 +13,8 @@ import bt_actions
 ROOT = Path(bt_actions.__file__).parent
 PARTS = [
     {"cli"},
-    {"render"},
+    {"serving"},
+    {"render", "run_report"},
     {"document", "runner", "simulation"},
     {"behaviours"},
     {"ros"},
@@ -39,7 +40,7 @@ TOOLS = {
     "whole_file",
 }
 """Small modules that anybody may import; they import no part but behaviours' and policy's names."""
-MAY_IMPORT_RCLPY = {"ros", "simulation"}
+MAY_IMPORT_RCLPY = {"ros", "serving", "simulation"}
 FILES = sorted(ROOT.rglob("*.py"))
 
 

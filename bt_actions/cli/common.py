@@ -263,23 +263,3 @@ def split(word: str, what: str) -> tuple[str, str]:
     if not equals or not name.strip():
         raise BadInput(f"{what} {word!r}: expected name=value, as in distance=2.0")
     return name.strip(), text
-
-
-def path_of(node: Behaviour) -> tuple[str, ...]:
-    """Return the names from the root down to `node`."""
-    names = [node.name]
-    above = node.parent
-    while above is not None:
-        names.append(above.name)
-        above = above.parent
-    return tuple(reversed(names))
-
-
-def place_of(node: Behaviour) -> str:
-    """Return file:line:column where a tree file says `node`, or "" for a node made in Python."""
-    from bt_actions import document
-
-    place = document.place_of(node)
-    if place is None:
-        return ""
-    return f"{place.file}:{place.line}:{place.column}"

@@ -24,11 +24,11 @@ from py_trees.common import Status
 
 from bt_actions.cli.common import Exit, discard_stdout, note
 from bt_actions.cli.patient_output import PatientOutput
-from bt_actions.cli.report import Report
 from bt_actions.cli.results import results
 from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import QuietView, View
 from bt_actions.cli.words import Closing, waiting_text
+from bt_actions.run_report import Report
 
 if TYPE_CHECKING:
     from bt_actions.events import Event

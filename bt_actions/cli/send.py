@@ -16,9 +16,9 @@ from bt_actions.cli.values import goal_fields
 if TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour
     from bt_actions.cli.parser import Subparsers
-    from bt_actions.cli.report import Report
     from bt_actions.cli.words import Closing
     from bt_actions.events import Event
+    from bt_actions.run_report import Report
 
 _EPILOG = """\
 examples:

@@ -21,12 +21,12 @@ from bt_actions.cli.common import BadInput, Exit, no_ros, note, starting_ros
 from bt_actions.cli.drive import Drive, Ended, leave
 from bt_actions.cli.patient_file import gap_text
 from bt_actions.cli.patient_output import PatientOutput
-from bt_actions.cli.report import Report
 from bt_actions.cli.results import results
 from bt_actions.cli.signals import Signals
 from bt_actions.cli.simulated import Wanted, remark, wanted
 from bt_actions.cli.views import JsonView, LineView, View
 from bt_actions.cli.words import Closing
+from bt_actions.run_report import Report
 
 if TYPE_CHECKING:
     from bt_actions.events import Event

@@ -16,12 +16,11 @@ from uuid import UUID
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.cli.common import place_of
-from bt_actions.cli.report import DONE, Report, Row
 from bt_actions.cli.words import Closing, goal_text, last_words, outputs_of, troubles
 from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
 from bt_actions.render import action_of, kind, rows
+from bt_actions.run_report import DONE, Report, Row, place_of
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, GoalChanged

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from py_trees.common import Status
 
 from bt_actions.cli.common import Exit
-from bt_actions.cli.report import Report, Row, summary, table
 from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
+from bt_actions.run_report import Report, Row, summary, table
 from bt_actions.shorten import shorten
 
 _USUAL_ENDS = {

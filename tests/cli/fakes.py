@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.cli.common import path_of
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
 from bt_actions.policy import End, Outcome
+from bt_actions.ticking import path_of
 
 
 @dataclass

@@ -16,12 +16,12 @@ from py_trees.common import Status
 
 from bt_actions.cli.common import Exit
 from bt_actions.cli.drive import Drive, Ended
-from bt_actions.cli.report import Report
 from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import LineView
 from bt_actions.cli.words import Closing
 from bt_actions.events import Event
 from bt_actions.policy import End, Outcome
+from bt_actions.run_report import Report
 from bt_actions.runner import GoalReport
 from tests.cli.fakes import FakeAction, FakeRunner, Story
 from tests.support.waiting import until

@@ -21,13 +21,13 @@ from rich.console import Console
 from bt_actions.cli.choosing import choose
 from bt_actions.cli.common import Exit
 from bt_actions.cli.live import LiveView, suits
-from bt_actions.cli.report import Report
 from bt_actions.cli.views import JsonView, LineView, View
 from bt_actions.cli.words import Closing, fields_text, last_words, result_lines
 from bt_actions.document import load_tree
 from bt_actions.document.findings import LOADED
 from bt_actions.events import Event, TreeFinished
 from bt_actions.policy import End, Outcome
+from bt_actions.run_report import Report
 from tests.cli.fakes import FakeAction, FakeProgress, Story
 
 

@@ -17,10 +17,11 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector
 
+from bt_actions import document
 from bt_actions.behaviours.gate import Gate
-from bt_actions.cli.common import path_of, place_of
 from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
+from bt_actions.ticking import path_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -328,6 +329,12 @@ class Report:
                 waiting.extend(reversed(below))
             else:
                 yield node
+
+
+def place_of(node: Behaviour) -> str:
+    """Return file:line:column where a tree file says `node`, or "" for a node made in Python."""
+    place = document.place_of(node)
+    return "" if place is None else f"{place.file}:{place.line}:{place.column}"
 
 
 def table(report: Report, width: int | None = None) -> list[str]:
