@@ -5,9 +5,11 @@ Names of a tree, messages of a server, variables: whatever is shown or logged co
 
 from __future__ import annotations
 
+import json
+import math
 import re
 
-__all__ = ["clean", "clean_lines", "in_words", "raised"]
+__all__ = ["as_json", "clean", "clean_lines", "in_words", "raised"]
 
 _NONE = "\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
 """Controls, those that turn the direction of what follows, and characters that are none."""
@@ -39,3 +41,19 @@ def raised(error: BaseException) -> str:
     except Exception:  # noqa: BLE001 - one of a stranger's may be wrong in that, too
         said = ""
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
+
+
+def as_json(data: object, *, ascii_only: bool = False) -> str:
+    """Return plain data as one line of JSON; null for what JSON has no number for."""
+    try:
+        return json.dumps(data, ensure_ascii=ascii_only, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(data), ensure_ascii=ascii_only)
+
+
+def _finite(data: object) -> object:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data

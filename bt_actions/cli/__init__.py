@@ -23,6 +23,7 @@ from bt_actions.cli import (
     run,
     schema,
     send,
+    serve,
     sim,
 )
 from bt_actions.cli import format as format_
@@ -34,6 +35,7 @@ from bt_actions.ros.environment import Reach, prepare
 COMMANDS: dict[str, ModuleType] = {
     "run": run,
     "send": send,
+    "serve": serve,
     "sim": sim,
     "cleanup": cleanup,
     "check": check,

@@ -6,8 +6,6 @@ it decides nothing.
 
 from __future__ import annotations
 
-import json
-import math
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TextIO
@@ -17,7 +15,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.cli.words import Closing, goal_text, last_words, outputs_of, troubles
-from bt_actions.plain_text import clean
+from bt_actions.plain_text import as_json, clean
 from bt_actions.policy import End, Outcome
 from bt_actions.render import action_of, kind, rows
 from bt_actions.run_report import DONE, Report, Row, place_of
@@ -330,21 +328,9 @@ class JsonView:
         }
 
     def _write(self, data: dict[str, object]) -> None:
-        ascii_only = not _is_utf8(self._out)
-        try:
-            line = json.dumps(data, ensure_ascii=ascii_only, allow_nan=False)
-        except ValueError:  # JSON has no word for it
-            line = json.dumps(_finite(data), ensure_ascii=ascii_only)
+        line = as_json(data, ascii_only=not _is_utf8(self._out))
         self._out.write(line + "\n")
         self._out.flush()
-
-
-def _finite(data: object) -> object:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def _is_utf8(stream: TextIO) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bt_actions.suggest import did_you_mean
 
-__all__ = ["TreeNotFoundError", "find_tree", "installed_trees", "tree_folders"]
+__all__ = ["TreeNotFoundError", "find_tree", "installed_trees", "tree_folder", "tree_folders"]
 
 _SUFFIXES = (".yaml", ".yml")
 _SEARCH_PATH = "BT_ACTIONS_TREE_PATH"
@@ -64,6 +64,19 @@ def tree_folders() -> Iterator[Path]:
         for package in _packages(prefix):
             if package != "bt_actions":
                 yield share / package / "trees"
+
+
+def tree_folder(place: str | os.PathLike[str]) -> Path:
+    """A folder of trees: a path, or `package://pkg/trees`. Raises TreeNotFoundError."""
+    wanted = os.fspath(place)
+    if not wanted.startswith("package://"):
+        return Path(wanted)
+    package, _, inner = wanted.removeprefix("package://").partition("/")
+    for prefix in _prefixes():
+        candidate = prefix / "share" / package / inner
+        if package and ".." not in Path(inner).parts and candidate.is_dir():
+            return candidate
+    raise TreeNotFoundError(f"there is no folder {wanted!r}: it is written package://pkg/trees")
 
 
 def installed_trees() -> dict[str, Path]:

@@ -1,0 +1,79 @@
+"""What is told of trees and runs, as messages of bt_actions_interfaces. No node, no state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from bt_actions_interfaces.action import RunTree
+from bt_actions_interfaces.msg import ActionReport, Finding, RunningLeaf, TreeInfo, TreeInput
+from builtin_interfaces.msg import Duration
+from unique_identifier_msgs.msg import UUID
+
+from bt_actions.plain_text import as_json
+from bt_actions.serving.catalog import Entry
+from bt_actions.serving.outcome import ActionOutcome, RunOutcome
+from bt_actions.serving.requests import Said
+from bt_actions.serving.run import Leaf
+
+__all__ = ["feedback", "finding", "info", "result"]
+
+
+def result(outcome: RunOutcome) -> RunTree.Result:
+    """What a goal is answered with."""
+    return RunTree.Result(
+        error_code=outcome.code,
+        error_msg=outcome.message,
+        outputs=outcome.outputs,
+        settled=outcome.settled,
+        actions=[_action(each) for each in outcome.actions],
+    )
+
+
+def feedback(running: Iterable[Leaf], leaves_ended: int) -> RunTree.Feedback:
+    """How far a run is."""
+    leaves = [RunningLeaf(**leaf._asdict()) for leaf in running]
+    return RunTree.Feedback(running=leaves, leaves_ended=leaves_ended)
+
+
+def finding(said: Said) -> Finding:
+    """One thing that is wrong."""
+    return Finding(**said._asdict())
+
+
+def info(entry: Entry, running: Iterable[UUID]) -> TreeInfo:
+    """A tree that can be run."""
+    tree = entry.tree
+    return TreeInfo(
+        name=entry.name,
+        description="" if tree is None else tree.description,
+        file=str(entry.file),
+        digest=entry.digest,
+        state=entry.state.value,
+        findings=[finding(each) for each in entry.findings],
+        running=list(running),
+        inputs=[
+            TreeInput(
+                name=each.name,
+                type=each.type,
+                unit=each.unit,
+                description=each.description,
+                required=each.required,
+                default_json="" if each.required else as_json(each.default),
+            )
+            for each in ({} if tree is None else tree.inputs).values()
+        ],
+    )
+
+
+def _action(each: ActionOutcome) -> ActionReport:
+    seconds = int(each.duration)
+    return ActionReport(
+        path=each.path,
+        server=each.server,
+        attempts=min(each.attempts, 65535),
+        outcome=each.outcome,
+        end=each.end,
+        reason=each.reason,
+        duration=Duration(sec=seconds, nanosec=int((each.duration - seconds) * 1e9)),
+        place=each.place,
+    )

@@ -1,0 +1,63 @@
+"""The inputs of a RunTree goal: a text from a stranger, read within bounds. No ROS.
+
+Nothing in it is computed, and no file is read: a dollar sign and an @ mean themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from bt_actions.document import DocumentError, source_of
+from bt_actions.document.bounds import refuse_large
+from bt_actions.document.nodes import Mapping as YamlMapping
+from bt_actions.document.nodes import compose, data_of
+from bt_actions.plain_text import clean
+
+__all__ = ["MAX_BYTES", "Refused", "inputs_of"]
+
+MAX_BYTES = 256 * 1024
+"""Of a goal's `inputs`, in UTF-8."""
+
+
+class Refused(Exception):
+    """A goal is not accepted. `code` is a rule's (BT104), or a word in capitals."""
+
+    def __init__(self, code: str, message: str, place: str = "") -> None:
+        super().__init__(message)
+        self.finding = Said(code, clean(message), place)
+
+
+class Said(NamedTuple):
+    """One thing that is wrong, as a Finding message has it."""
+
+    code: str
+    message: str
+    place: str
+
+
+def inputs_of(text: str) -> Mapping[str, object]:
+    """The mapping that a text holds, as YAML or JSON; empty for an empty one. Raises Refused."""
+    data = text.encode("utf-8", "surrogatepass")
+    if len(data) > MAX_BYTES:
+        size = f"{len(data):,} bytes of inputs"
+        raise Refused("INPUTS", f"{size} are more than {MAX_BYTES:,}; put large data into a file")
+    if not text.strip():
+        return {}
+    try:
+        source = source_of(data, "inputs")
+        node = compose(source)
+        if source.findings:
+            raise DocumentError(source.findings)
+        if not isinstance(node, YamlMapping):
+            raise Refused("INPUTS", "inputs are a mapping, such as {pick_at: 2.0}", "inputs:1:1")
+        values = data_of(node)
+        refuse_large(values)
+    except DocumentError as error:
+        first = error.findings[0]
+        place = f"{first.file}:{first.line}:{first.column}"
+        raise Refused(first.code, first.message, place) from None
+    except (ValueError, RecursionError) as error:
+        raise Refused("INPUTS", str(error), "inputs:1:1") from None
+    assert isinstance(values, dict)
+    return values

@@ -1,0 +1,169 @@
+"""One run of a served tree: on a thread of its own, from its behaviours to its outcome.
+
+The node and its executor are somebody else's. Nothing here knows who asked for the run.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Failure
+from py_trees.common import Status
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.document import Tree, tree_outputs
+from bt_actions.events import Event, NodeChanged
+from bt_actions.run_report import Report
+from bt_actions.runner import TreeRunner
+from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
+from bt_actions.ticking import path_of
+
+__all__ = ["Leaf", "Run"]
+
+SHOWN = 3
+"""Running leaves that are told of."""
+
+
+class Leaf(NamedTuple):
+    """A leaf that runs; see RunningLeaf.msg."""
+
+    path: str
+    message: str
+    attempt: int
+    attempts: int
+
+
+class Run:
+    """A tree that runs, or waits for its turn.
+
+    Args:
+        tree: the version that was checked; a newer one does not matter any more.
+        inputs: values that were checked with it.
+        node: where goals are sent from; somebody spins it.
+        ended: called with the outcome, on the run's own thread, when all is over.
+    """
+
+    def __init__(
+        self,
+        tree: Tree,
+        inputs: Mapping[str, object],
+        node: Any,
+        ended: Callable[[RunOutcome], None],
+    ) -> None:
+        self.tree = tree
+        self._inputs = inputs
+        self._node = node
+        self._ended = ended
+        self._lock = threading.Lock()
+        self._runner: TreeRunner | None = None
+        self._paused = False
+        self.ending: Ending | None = None
+        self.leaves_ended = 0
+        self._running: dict[Behaviour, None] = {}
+        self.changes = 0
+        """How often something has changed that is told of while it runs."""
+        self._thread = threading.Thread(target=self._run, name=f"bt_actions-serve-{tree.name}")
+        self._thread.daemon = True  # as that of TreeRunner.start: what it leaves is drained at exit
+
+    def start(self) -> None:
+        """Run. Returns at once."""
+        self._thread.start()
+
+    def end(self, ending: Ending, *, abandon: bool = False) -> None:
+        """End it before its time: its goals are canceled and drained. Returns at once.
+
+        With `abandon`, goals that are being drained are waited for no longer.
+        """
+        with self._lock:
+            self.ending = self.ending or ending
+            if self._runner is not None:
+                self._runner.interrupt(abandon=abandon)
+
+    def pause(self) -> None:
+        """No new goal begins; those that run finish."""
+        self._pause(True)
+
+    def resume(self) -> None:
+        """Go on."""
+        self._pause(False)
+
+    def _pause(self, wanted: bool) -> None:
+        with self._lock:
+            self._paused = wanted
+            if self._runner is not None:
+                (self._runner.pause if wanted else self._runner.resume)()
+
+    def join(self, timeout: float | None = None) -> bool:
+        """Wait until all is over; whether it is."""
+        if self._thread.ident is not None:
+            self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    def running(self) -> list[Leaf]:
+        """The leaves that run, deepest first; on any thread."""
+        paths = [(path_of(leaf), leaf) for leaf in list(self._running)]
+        paths.sort(key=lambda each: -len(each[0]))
+        return [_leaf(path, leaf) for path, leaf in paths[:SHOWN]]
+
+    # On the run's thread
+
+    def _run(self) -> None:
+        try:
+            outcome = self._to_end()
+        except BaseException as error:  # noqa: BLE001 - whoever asked for it must be answered
+            outcome = outcome_of(Report(Failure("nothing")), succeeded=False, error=error)
+        self._ended(outcome)
+
+    def _to_end(self) -> RunOutcome:
+        root = self.tree.build(self._inputs)
+        report = Report(root)
+        status, error = Status.INVALID, None
+        runner = TreeRunner(root, node=self._node)
+        runner.observe(report.observe)
+        runner.observe(self._note)
+        try:
+            with self._lock:
+                self._runner = runner
+                if self.ending is not None:
+                    runner.interrupt()
+                if self._paused:
+                    runner.pause()
+            status = runner.run()
+        except Exception as raised:  # noqa: BLE001 - a behaviour's, or nobody spins the node
+            error = raised
+        finally:
+            with self._lock:
+                self._runner = None
+            runner.shutdown()
+        succeeded = status is Status.SUCCESS
+        from bt_actions.ros.messages import to_plain
+
+        outputs = {name: to_plain(value) for name, value in tree_outputs(root).items()}
+        return outcome_of(
+            report,
+            succeeded=succeeded,
+            ending=None if status is Status.FAILURE else self.ending,
+            error=error,
+            outputs=outputs if succeeded else None,
+            unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
+        )
+
+    def _note(self, event: Event) -> None:
+        if not isinstance(event, NodeChanged) or event.node.children:
+            return
+        if event.status is Status.RUNNING:
+            self._running[event.node] = None
+        else:
+            self._running.pop(event.node, None)
+            self.leaves_ended += event.status is not Status.INVALID
+        self.changes += 1
+
+
+def _leaf(path: tuple[str, ...], leaf: Behaviour) -> Leaf:
+    attempt, attempts = 0, 0
+    if isinstance(leaf, ActionBehaviour):
+        attempt, attempts = leaf.attempt, leaf.retry.attempts
+    return Leaf(SEPARATOR.join(path), leaf.feedback_message, attempt, attempts)

@@ -1,0 +1,355 @@
+"""`TreeServer`: trees as an action of a node, for other nodes to run by their names.
+
+The node and its executor are the user's. Which trees there are is catalog.py's, whose turn it is
+turns.py's, and a run its own (run.py); here is what they have to do with ROS.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from bt_actions_interfaces.action import RunTree
+from bt_actions_interfaces.msg import Rejection
+from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
+from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from bt_actions.document.find import tree_folder
+from bt_actions.plain_text import clean
+from bt_actions.ros.log import log
+from bt_actions.serving.catalog import Catalog
+from bt_actions.serving.messages import feedback, finding, info, result
+from bt_actions.serving.outcome import Code, Ending, RunOutcome
+from bt_actions.serving.requests import Refused
+from bt_actions.serving.run import Run
+from bt_actions.serving.turns import Policy, Turns
+from bt_actions.serving.wire import RunTreeServer, off_the_executor
+
+__all__ = ["TreeServer"]
+
+RESULT_TIMEOUT = 60
+"""Seconds for which an ended goal's result can be asked for; each one kept makes a goal slower."""
+REJECTIONS = 10
+FASTEST, SLOWEST = 0.1, 1.0
+"""Seconds between two messages of feedback: where something has changed, and where nothing has."""
+_LAST_WORDS = 2.0
+"""Seconds for the last results to be sent when the server is closed."""
+_ECHO = 200
+"""Characters of a goal's own words in what is said of it."""
+
+
+@dataclass(slots=True, eq=False)
+class _Goal:
+    """An accepted goal: its handle, its run, and when its client last heard of it."""
+
+    handle: ServerGoalHandle
+    run: Run
+    tree: str
+    told: int = -1
+    told_at: float = 0.0
+    begun: bool = False
+
+    @property
+    def id(self) -> bytes:
+        return bytes(self.handle.goal_id.uuid)
+
+
+class TreeServer:
+    """Serves `run_tree`, and beside it the services by which others list, check and control trees.
+
+    Args:
+        node: where all of it is, and from where the trees' goals are sent. Somebody spins it, on
+            another thread than the one that makes or closes this; any executor will do.
+        trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Nothing
+            outside of them is read.
+        policy: what to do with a goal while another runs: "reject", "queue", "replace" or
+            "parallel".
+        most: how many goals may wait (queue), or run (parallel).
+        python: the packages whose classes the trees' ``python:`` nodes may name.
+
+    Names, relative to the node: the action ``run_tree``; the services ``~/list_trees``,
+    ``~/check_tree`` and ``~/control_tree``; the topic ``~/rejections``, which keeps the last ten.
+
+    Raises NotADirectoryError for a folder that is none, TreeNotFoundError for a package without it,
+    ValueError for a policy that is none.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        *,
+        trees: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+        policy: Policy | str = Policy.REJECT,
+        most: int = 10,
+        python: Iterable[str] = (),
+    ) -> None:
+        folders = [trees] if isinstance(trees, str | os.PathLike) else list(trees)
+        self.node = node
+        self.catalog = Catalog(map(tree_folder, folders), python=python)
+        self.catalog.entries()  # so that what is wrong with a file is known, and it is read once
+        self._lock = threading.RLock()
+        self._answered = threading.Condition(self._lock)
+        self.unaccounted: list[str] = []
+        """A line for each goal of a tree whose end is not known."""
+        self._turns: Turns[_Goal] = Turns(Policy(policy), most)
+        self._goals: dict[bytes, _Goal] = {}
+        self._admitted: dict[int, tuple[Any, Callable[[ServerGoalHandle], _Goal]]] = {}
+        self._refuses = ""
+        self._worker = ThreadPoolExecutor(1, "bt_actions-check")
+        group = ReentrantCallbackGroup()
+        self._rejections = node.create_publisher(
+            Rejection,
+            "~/rejections",
+            QoSProfile(
+                depth=REJECTIONS,
+                reliability=ReliabilityPolicy.RELIABLE,
+                durability=DurabilityPolicy.TRANSIENT_LOCAL,
+            ),
+        )
+        self._action = RunTreeServer(
+            node,
+            RunTree,
+            "run_tree",
+            execute_callback=_never,
+            callback_group=group,
+            goal_callback=self._on_goal,
+            handle_accepted_callback=self._on_accepted,
+            cancel_callback=self._on_cancel,
+            result_timeout=RESULT_TIMEOUT,
+        )
+        self._action.request_is_over = self._on_request_over
+        self._services = [
+            node.create_service(kind, f"~/{name}", callback, callback_group=group)
+            for kind, name, callback in (
+                (ListTrees, "list_trees", self._on_list),
+                (CheckTree, "check_tree", self._on_check),
+                (ControlTree, "control_tree", self._on_control),
+            )
+        ]
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(
+            FASTEST, self._tell, callback_group=group, clock=steady, autostart=False
+        )
+
+    def close(self) -> None:
+        """Accept nothing more, end all runs, answer their goals, and be gone.
+
+        Returns when every goal of the trees has ended, or its `timeout.cancel` has passed. Not on a
+        thread of the node's executor.
+        """
+        self.halt(Ending.DEACTIVATED)
+        with self._answered:
+            self._answered.wait_for(lambda: not self._goals, _LAST_WORDS)
+        self._action.flush(_LAST_WORDS)
+        self.node.destroy_timer(self._timer)
+        for service in self._services:
+            self.node.destroy_service(service)
+        self._action.destroy()
+        self.node.destroy_publisher(self._rejections)
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def halt(self, ending: Ending = Ending.HALTED) -> None:
+        """Accept nothing more, and end all runs; returns when they have ended."""
+        with self._lock:
+            self._refuses = "this server accepts no goals any more"
+            goals = list(self._goals.values())
+        for goal in goals:
+            self._end(goal, ending)
+        for goal in goals:
+            goal.run.join()
+
+    def abandon(self) -> None:
+        """Have `halt` and `close` wait for no goal any more; `unaccounted` tells which are left."""
+        for goal in list(self._goals.values()):
+            goal.run.end(Ending.DEACTIVATED, abandon=True)
+
+    # Requests; on the executor's threads
+
+    async def _on_goal(self, goal: RunTree.Goal) -> GoalResponse:
+        try:
+            self._refuse_more()
+            entry, tree, values = await self._off(self.catalog.check, goal.tree, goal.inputs)
+            with self._lock:  # the other goals that came meanwhile are admitted by now
+                self._refuse_more()
+                self._turns.expected += 1
+
+                def make(handle: ServerGoalHandle) -> _Goal:
+                    run = Run(tree, values, self.node, lambda outcome: self._ended(made, outcome))
+                    made = _Goal(handle, run, entry.name)
+                    return made
+
+                self._admitted[id(goal)] = goal, make
+        except Refused as refused:
+            self._reject(goal, refused)
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _refuse_more(self) -> None:
+        with self._lock:
+            if self._refuses:
+                raise Refused("INACTIVE", self._refuses)
+            if refusal := self._turns.refusal():
+                raise Refused("BUSY", refusal)
+
+    def _reject(self, goal: RunTree.Goal, refused: Refused) -> None:
+        said = refused.finding
+        place = f" ({said.place})" if said.place else ""
+        log.warning(f"goal for {clean(goal.tree)[:_ECHO]!r} rejected: {said.code}: "
+                    f"{said.message}{place}")  # fmt: skip
+        self._rejections.publish(
+            Rejection(
+                stamp=self.node.get_clock().now().to_msg(),
+                tree=_sendable(goal.tree),
+                goal_name=_sendable(goal.goal_name),
+                code=said.code,
+                message=f"{said.message}{place}",
+            )
+        )
+
+    def _on_accepted(self, handle: ServerGoalHandle) -> None:
+        with self._lock:
+            _, make = self._admitted.pop(id(handle.request))
+            goal = make(handle)
+            self._goals[goal.id] = goal
+            begun, halted = self._turns.come(goal)
+        for each in halted:
+            self._end(each, Ending.REPLACED)
+        self._begin(begun)
+
+    def _on_request_over(self, goal: RunTree.Goal) -> None:
+        with self._lock:
+            if self._admitted.pop(id(goal), None) is not None:  # its client could not be told
+                self._turns.expected -= 1
+
+    def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
+        with self._lock:
+            goal = self._goals.get(bytes(handle.goal_id.uuid))
+        if goal is None:
+            return CancelResponse.REJECT
+        self._end(goal, Ending.CANCELED)
+        return CancelResponse.ACCEPT
+
+    async def _on_list(self, _: Any, response: ListTrees.Response) -> ListTrees.Response:
+        entries = await self._off(self.catalog.entries)
+        with self._lock:
+            goals = list(self._goals.values())
+        response.trees = [
+            info(entry, [goal.handle.goal_id for goal in goals if goal.tree == entry.name])
+            for entry in entries
+        ]
+        return response
+
+    async def _on_check(
+        self, request: CheckTree.Request, response: CheckTree.Response
+    ) -> CheckTree.Response:
+        try:
+            await self._off(self.catalog.check, request.tree, request.inputs)
+            self._refuse_more()
+        except Refused as refused:
+            response.findings = [finding(refused.finding)]
+        response.accepted = not response.findings
+        return response
+
+    def _on_control(
+        self, request: ControlTree.Request, response: ControlTree.Response
+    ) -> ControlTree.Response:
+        with self._lock:
+            goal = self._goals.get(bytes(request.goal_id.uuid))
+        commands: dict[int, Callable[[_Goal], None]] = {
+            ControlTree.Request.PAUSE: lambda goal: goal.run.pause(),
+            ControlTree.Request.RESUME: lambda goal: goal.run.resume(),
+            ControlTree.Request.HALT: lambda goal: self._end(goal, Ending.HALTED),
+        }
+        if goal is None:
+            response.message = "no such goal runs here"
+        elif request.command not in commands:
+            response.message = f"{request.command} is no command"
+        else:
+            asks = clean(request.requested_by)[:_ECHO] or "somebody"
+            log.info(f"{goal.tree}: {asks} asks for command {request.command}")
+            commands[request.command](goal)
+            response.accepted = True
+        return response
+
+    async def _off(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        """Do something that takes its time on a thread that is not the executor's."""
+        return await off_the_executor(
+            self.node.executor, self._worker.submit, lambda: work(*arguments)
+        )
+
+    # Runs
+
+    def _begin(self, goals: Iterable[_Goal]) -> None:
+        for goal in goals:
+            goal.begun = True
+            if not goal.handle.is_cancel_requested:
+                goal.handle.execute()
+            self._timer.reset()
+            log.info(f"{goal.tree}: begins")
+            goal.run.start()
+
+    def _end(self, goal: _Goal, ending: Ending) -> None:
+        """End a goal before its time, also one that waits for its turn."""
+        goal.run.end(ending)
+        with self._lock:
+            waits = goal in self._turns.waiting
+            if waits:
+                self._turns.leave(goal)
+        if waits:
+            code, words = ending.value
+            outcome = RunOutcome(int(code), f"{words} before it began")
+            self._worker.submit(self._ended, goal, outcome)  # not here: this may be a callback
+
+    def _ended(self, goal: _Goal, outcome: RunOutcome) -> None:
+        """A run is over: have its goal answered, and let the next one begin."""
+        said = f": {outcome.message}" if outcome.message else ""
+        (log.info if outcome.code == Code.NONE else log.error)(f"{goal.tree}: ends{said}")
+        handle, canceled = goal.handle, outcome.code == Code.CANCELED
+        until = time.monotonic() + _LAST_WORDS
+        while canceled and not handle.is_cancel_requested and time.monotonic() < until:
+            time.sleep(0.001)  # the executor is about to say that the cancel is granted
+        if not goal.begun and not handle.is_cancel_requested:
+            handle.execute()
+        if outcome.code == Code.NONE:
+            handle.succeed()
+        elif canceled and outcome.settled and handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            handle.abort()
+        self._action.finish(handle, result(outcome))
+        with self._answered:
+            self.unaccounted += outcome.unaccounted
+            self._goals.pop(goal.id, None)
+            self._answered.notify_all()
+            begun = self._turns.leave(goal)
+        self._begin(begun)
+
+    def _tell(self) -> None:
+        """Tell the clients how far their runs are; the timer's callback."""
+        with self._lock:
+            goals = [goal for goal in self._turns.running if goal.begun]
+            if not goals:
+                self._timer.cancel()
+        now = time.monotonic()
+        for goal in goals:
+            changes = goal.run.changes
+            if changes != goal.told or now - goal.told_at >= SLOWEST - FASTEST / 2:
+                goal.told, goal.told_at = changes, now
+                goal.handle.publish_feedback(feedback(goal.run.running(), goal.run.leaves_ended))
+
+
+def _sendable(text: str) -> str:
+    return clean(text)[:_ECHO]
+
+
+def _never(_: ServerGoalHandle) -> None:
+    raise AssertionError("goals are executed by RunTreeServer.finish")

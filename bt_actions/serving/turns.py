@@ -1,0 +1,78 @@
+"""Whose turn it is: which goals run, which wait, and which are refused. Pure; no ROS, no thread.
+
+Whoever uses it holds a lock around each call.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections import deque
+from typing import Generic, TypeVar
+
+__all__ = ["Policy", "Turns"]
+
+T = TypeVar("T")
+
+
+class Policy(enum.StrEnum):
+    """What to do with a goal that comes while another runs."""
+
+    REJECT = "reject"
+    QUEUE = "queue"
+    """It waits; at most `most` do."""
+    REPLACE = "replace"
+    """The older one is halted, and the newer begins when all goals of the older have ended."""
+    PARALLEL = "parallel"
+    """They run beside each other, at most `most`."""
+
+
+class Turns(Generic[T]):
+    """The goals that were admitted and have not ended."""
+
+    def __init__(self, policy: Policy, most: int) -> None:
+        if most < 1:
+            raise ValueError(f"most must be 1 at least, not {most!r}")
+        self.policy, self.most = policy, most
+        self.expected = 0
+        """Goals that were admitted and have not come yet."""
+        self.running: list[T] = []
+        self.waiting: deque[T] = deque()
+
+    def refusal(self) -> str:
+        """Why one more goal cannot be admitted at this moment; or ""."""
+        there = len(self.running) + len(self.waiting) + self.expected
+        if self.policy is Policy.REJECT and there:
+            return "another tree runs here"
+        if self.policy is Policy.QUEUE and there > self.most:
+            return f"{self.most} goals wait already"
+        if self.policy is Policy.PARALLEL and there >= self.most:
+            return f"{self.most} trees run already"
+        return ""
+
+    def come(self, goal: T) -> tuple[list[T], list[T]]:
+        """A goal that was admitted is here. Return who is to begin now, and who is to be halted.
+
+        Who is halted still has to `leave`, also where it was only waiting.
+        """
+        self.expected = max(0, self.expected - 1)
+        self.waiting.append(goal)
+        halted = []
+        if self.policy is Policy.REPLACE:
+            halted = [*self.running, *list(self.waiting)[:-1]]
+        return self._next(), halted
+
+    def leave(self, goal: T) -> list[T]:
+        """A goal has ended, wherever it was. Return who is to begin now."""
+        if goal in self.running:
+            self.running.remove(goal)
+        elif goal in self.waiting:
+            self.waiting.remove(goal)
+        return self._next()
+
+    def _next(self) -> list[T]:
+        room = self.most if self.policy is Policy.PARALLEL else 1
+        begun = []
+        while self.waiting and len(self.running) < room:
+            begun.append(self.waiting.popleft())
+            self.running.append(begun[-1])
+        return begun
