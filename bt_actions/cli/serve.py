@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import threading
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, namespace, no_ros, note, starting_ros
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from bt_actions.cli.parser import Subparsers
+    from bt_actions.cli.signals import Signals
     from bt_actions.serving import TreeServer
 
 _EPILOG = """\
@@ -105,12 +105,7 @@ def run(args: argparse.Namespace) -> int:
                 pass
         finally:
             if server is not None:
-                closing = threading.Thread(target=_close, args=(server, signals.poke))
-                closing.start()
-                while closing.is_alive():
-                    if signals.wait(None)[0]:
-                        server.abandon()
-                closing.join()
+                _close(server, signals)
             spinner.stop(lambda: None)
     for each in server.unaccounted:
         note(f"bt-actions serve: may still be running: {each}")
@@ -119,11 +114,21 @@ def run(args: argparse.Namespace) -> int:
     return Exit.UNKNOWN if server.unaccounted else Exit.FAILURE if errors else Exit.SUCCESS
 
 
-def _close(server: TreeServer, done: Callable[[], None]) -> None:
-    try:
-        server.close()
-    finally:
-        done()
+def _close(server: TreeServer, signals: Signals) -> None:
+    """Drain all; one more signal ends the wait."""
+    closed = threading.Event()
+
+    def close() -> None:
+        try:
+            server.close()
+        finally:
+            closed.set()
+            signals.poke()
+
+    threading.Thread(target=close, name="bt_actions-close").start()
+    while not closed.is_set():
+        if signals.wait(None)[0]:
+            server.abandon()
 
 
 def _server(node: Node, args: argparse.Namespace) -> TreeServer:

@@ -1,0 +1,70 @@
+"""A process that serves trees, a client of it, and servers below that keep a journal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.processes import Process
+from tests.support.tree_client import TreeClient
+
+MAIN = "import sys; from bt_actions.cli import main; sys.exit(main())"
+MOVE = """\
+tree: move
+description: Move, and say where it ended.
+inputs: {{distance: {{type: float64, unit: m}}}}
+outputs: {{at: float64}}
+root:
+  sequence: Move
+  children:
+    - action: Go
+      type: robot_control_interfaces/action/MoveRobot
+      server: {server}
+      goal: {{distance: $distance}}
+      timeout: {{result: 60 s, cancel: {cancel}}}
+      save: {{at: result.final_pose}}
+    - {{success: Done}}
+"""
+
+Serve = Callable[..., Process]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, name: str) -> Path:
+    """The folder of trees that is served."""
+    folder = tmp_path / "trees"
+    folder.mkdir()
+    (folder / "move.yaml").write_text(MOVE.format(server=name, cancel="5 s"))
+    (folder / "empty.yaml").write_text("tree: empty\nroot: {success: }\n")
+    (folder / "broken.yaml").write_text("tree: broken\nroot: {sucess: }\n")
+    return folder
+
+
+@pytest.fixture
+def space(name: str) -> str:
+    """The namespace of the server."""
+    return name.rpartition("/")[0]
+
+
+@pytest.fixture
+def serve_trees(start_program: Callable[..., Process], folder: Path, space: str) -> Serve:
+    """Start `bt-actions serve` in the test's namespace, and wait until it is ready."""
+
+    def start(*options: str) -> Process:
+        command = ["-c", MAIN, "serve", "--trees", str(folder), "--namespace", space, *options]
+        process = start_program(*command, short_lease=True)
+        process.line("ready: ")
+        return process
+
+    return start
+
+
+@pytest.fixture
+def client(context: Any, space: str) -> Iterator[TreeClient]:
+    """A client of the server in the test's namespace."""
+    client = TreeClient(context, space)
+    yield client
+    client.close()

@@ -1,0 +1,300 @@
+"""Trees run for other nodes: server, client and the servers below in processes apart."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from action_msgs.msg import GoalStatus
+from bt_actions_interfaces.action import RunTree
+from bt_actions_interfaces.msg import ActionReport, TreeInfo
+from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
+
+from tests.serving.conftest import MOVE, Serve
+from tests.support.processes import Journal
+from tests.support.tree_client import TreeClient
+
+R = RunTree.Result
+LONG = "{distance: 20.0}"
+
+
+def test_a_tree_runs_to_its_end_and_tells_what_it_did(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, name: str, folder: Path
+) -> None:
+    serve()
+    serve_trees()
+    status, result = client.result(client.send("move", "{distance: 0.3}"))
+    assert (status, result.error_code, result.settled) == (
+        GoalStatus.STATUS_SUCCEEDED,
+        R.NONE,
+        True,
+    )
+    assert json.loads(result.outputs).keys() == {"at"}
+    (action,) = result.actions
+    assert (action.path, action.server, action.attempts) == ("Move / Go", name, 1)
+    assert (action.outcome, action.end) == (ActionReport.SUCCEEDED, ActionReport.END_SUCCEEDED)
+    assert action.place.startswith(str(folder / "move.yaml"))
+
+
+def test_feedback_names_what_runs_and_counts_what_has_ended(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    serve()
+    serve_trees()
+    sent = client.send("move", "{distance: 2.5}")
+    client.result(sent)
+    running = [each for each in sent.feedback if each.running]
+    assert running[0].running[0].path == "Move / Go"
+    assert running[0].running[0].attempts == 1
+    assert len(running) >= 2, "at least once a second"
+
+
+@pytest.mark.parametrize(
+    ("tree", "inputs", "code"),
+    [
+        ("nothing", "", "UNKNOWN_TREE"),
+        ("../trees/move", "", "UNKNOWN_TREE"),
+        ("broken", "", "BT201"),
+        ("move", "", "INPUTS"),
+        ("move", "{distance: far}", "INPUTS"),
+        ("move", "{distance: 1.0, speed: 2.0}", "INPUTS"),
+        ("move", "{distance: [", "BT102"),
+        ("move", "{distance: 1.0} #" + "x" * 1_000_000, "INPUTS"),
+    ],
+    ids=["unknown", "path", "broken tree", "missing", "type", "extra", "broken inputs", "1 MB"],
+)
+def test_a_goal_that_cannot_be_run_is_rejected_and_the_reason_is_told_to_all(
+    serve_trees: Serve, client: TreeClient, tree: str, inputs: str, code: str
+) -> None:
+    server = serve_trees()
+    assert not client.send(tree, inputs, "mine").accepted
+    client.until(lambda: client.rejections, "the rejection is published")
+    told = client.rejections[0]
+    assert (told.tree, told.goal_name, told.code) == (tree, "mine", code)
+    assert told.stamp.sec > 0
+    client.until(lambda: any(told.message in line for line in server.errors), "it is in the log")
+    answer = client.call(CheckTree, tree=tree, inputs=inputs)
+    assert not answer.accepted
+    assert [(each.code, each.message) for each in answer.findings] == [
+        (code, told.message.removesuffix(f" ({answer.findings[0].place})"))
+    ]
+
+
+def test_whoever_comes_late_still_hears_of_the_rejections(
+    serve_trees: Serve, client: TreeClient, context: object, space: str
+) -> None:
+    serve_trees()
+    client.send("nothing")
+    late = TreeClient(context, space)
+    try:
+        late.until(lambda: late.rejections, "the rejection is there")
+    finally:
+        late.close()
+
+
+def test_reject_runs_one_tree_at_a_time(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    journal = serve()
+    serve_trees()
+    first = client.send("move", LONG)
+    journal.wait_for("accepted")
+    assert not client.send("move", LONG).accepted
+    client.until(lambda: client.rejections, "the rejection is published")
+    assert client.rejections[0].code == "BUSY"
+    assert not client.call(CheckTree, tree="move", inputs=LONG).accepted
+    client.cancel(first)
+    client.result(first)
+    assert client.send("empty").accepted
+    assert journal.max_live == 1
+
+
+def test_a_queued_goal_runs_the_version_of_the_tree_that_it_was_checked_against(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path
+) -> None:
+    serve()
+    serve_trees("--policy", "queue")
+    first, second = client.send("move", "{distance: 1.0}"), client.send("empty")
+    (folder / "empty.yaml").write_text("tree: empty\nroot: {failure: }\n")
+    third = client.send("empty")
+    statuses = [client.result(each)[0] for each in (first, second, third)]
+    assert statuses == [GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_SUCCEEDED,
+                        GoalStatus.STATUS_ABORTED]  # fmt: skip
+
+
+def test_a_queue_that_is_full_rejects_and_a_goal_in_it_can_be_canceled(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    journal = serve()
+    serve_trees("--policy", "queue", "--max", "1")
+    first, second = client.send("move", LONG), client.send("move", LONG)
+    assert not client.send("move", LONG).accepted
+    journal.wait_for("accepted")
+    assert client.cancel(second) == 1
+    status, result = client.result(second)
+    assert (status, result.error_code, result.settled) == (
+        GoalStatus.STATUS_CANCELED, R.CANCELED, True,
+    )  # fmt: skip
+    assert not result.actions
+    client.cancel(first)
+    client.result(first)
+    assert journal.count("accepted") == 1
+
+
+def test_replace_begins_the_newer_tree_when_all_goals_of_the_older_have_ended(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    journal = serve("1:delay_cancel=0.5")
+    serve_trees("--policy", "replace")
+    older = client.send("move", LONG)
+    journal.wait_for("accepted")
+    newer = client.send("move", "{distance: 0.2}")
+    status, result = client.result(older)
+    assert (status, result.error_code, result.settled) == (
+        GoalStatus.STATUS_ABORTED, R.REPLACED, True,
+    )  # fmt: skip
+    assert client.result(newer)[0] == GoalStatus.STATUS_SUCCEEDED
+    assert journal.max_live == 1
+
+
+def test_parallel_trees_share_resources_as_trees_of_one_process_do(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    journal = serve()
+    serve_trees("--policy", "parallel", "--max", "2")
+    both = [client.send("move", "{distance: 0.5}") for _ in range(2)]
+    assert not client.send("empty").accepted
+    assert [client.result(each)[0] for each in both] == [GoalStatus.STATUS_SUCCEEDED] * 2
+    assert journal.max_live == 1
+
+
+def test_a_cancel_is_answered_as_canceled_only_when_every_goal_below_has_ended(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    journal = serve("1:delay_cancel=0.5")
+    serve_trees()
+    sent = client.send("move", LONG)
+    journal.wait_for("accepted")
+    assert client.cancel(sent) == 1
+    status, result = client.result(sent)
+    assert journal.ends() == ["canceled"]
+    assert (status, result.error_code, result.settled) == (
+        GoalStatus.STATUS_CANCELED, R.CANCELED, True,
+    )  # fmt: skip
+    assert result.actions[0].end == ActionReport.END_CANCELED
+
+
+def test_a_goal_below_that_cannot_be_accounted_for_makes_the_answer_unsettled(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path, name: str
+) -> None:
+    (folder / "move.yaml").write_text(MOVE.format(server=name, cancel="500 ms"))
+    journal = serve("1:ignore_cancel")
+    server = serve_trees()
+    sent = client.send("move", "{distance: 4.0}")
+    journal.wait_for("accepted")
+    client.cancel(sent)
+    status, result = client.result(sent)
+    assert (status, result.error_code, result.settled) == (
+        GoalStatus.STATUS_ABORTED, R.CANCELED, False,
+    )  # fmt: skip
+    assert f"may still be running: Go on {name}" in result.error_msg
+    assert result.actions[0].end == ActionReport.END_UNKNOWN
+    server.send(signal.SIGINT)
+    assert server.wait() == 3
+
+
+def test_a_failure_names_the_action_to_blame_with_its_place(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path
+) -> None:
+    serve("1:abort=0.1")
+    serve_trees()
+    status, result = client.result(client.send("move", "{distance: 0.2}"))
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.error_code == R.ACTION_FAILED + ActionReport.ABORTED
+    assert result.error_msg.startswith("Move / Go: ABORTED")
+    assert f"({folder / 'move.yaml'}:8:7)" in result.error_msg
+    assert result.settled
+
+
+def test_a_failure_without_an_action_to_blame_has_a_code_of_its_own(
+    serve_trees: Serve, client: TreeClient, folder: Path
+) -> None:
+    (folder / "empty.yaml").write_text("tree: empty\nroot: {failure: Never}\n")
+    serve_trees()
+    status, result = client.result(client.send("empty"))
+    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.TREE_FAILED)
+
+
+def test_trees_are_listed_with_their_inputs_and_with_what_runs(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    serve()
+    serve_trees()
+    sent = client.send("move", LONG)
+    trees = {tree.name: tree for tree in client.call(ListTrees).trees}
+    assert {name: tree.state for name, tree in trees.items()} == {
+        "broken": TreeInfo.INVALID, "empty": TreeInfo.OK, "move": TreeInfo.OK,
+    }  # fmt: skip
+    move = trees["move"]
+    assert move.description == "Move, and say where it ended."
+    assert [bytes(each.uuid) for each in move.running] == [bytes(sent.handle.goal_id.uuid)]
+    (distance,) = move.inputs
+    assert (distance.name, distance.type, distance.unit) == ("distance", "float64", "m")
+    assert (distance.required, distance.default_json) == (True, "")
+    assert trees["broken"].findings[0].code == "BT201"
+    client.cancel(sent)
+    client.result(sent)
+
+
+def test_a_run_is_paused_resumed_and_halted_by_its_goals_id(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    journal = serve()
+    serve_trees()
+    sent = client.send("move", "{distance: 0.5}")
+    ours = sent.handle.goal_id
+    journal.wait_for("accepted")
+
+    def control(command: int, **more: object) -> ControlTree.Response:
+        return client.call(ControlTree, command=command, **more)
+
+    assert control(ControlTree.Request.PAUSE, goal_id=ours, requested_by="test").accepted
+    journal.wait_for("succeeded")
+    assert not sent.result_future.done(), "its next leaf is not ticked"
+    assert control(ControlTree.Request.RESUME, goal_id=ours).accepted
+    assert client.result(sent)[0] == GoalStatus.STATUS_SUCCEEDED
+
+    sent = client.send("move", LONG)
+    assert not control(ControlTree.Request.HALT).accepted, "of nobody"
+    assert not control(0, goal_id=sent.handle.goal_id).accepted, "nothing"
+    assert control(ControlTree.Request.HALT, goal_id=sent.handle.goal_id).accepted
+    status, result = client.result(sent)
+    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.HALTED)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_drains_all_goals_and_answers_before_the_process_ends(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, number: signal.Signals
+) -> None:
+    journal = serve("1:delay_cancel=0.5")
+    server = serve_trees("--policy", "queue")
+    running, waiting = client.send("move", LONG), client.send("move", LONG)
+    journal.wait_for("accepted")
+    server.send(number)
+    for sent in (running, waiting):
+        status, result = client.result(sent)
+        assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.DEACTIVATED)
+        assert result.settled
+    assert server.wait() == 0
+    assert journal.ends() == ["canceled"]
+
+
+def test_a_folder_that_is_none_is_bad_input(start_program: Callable[..., object]) -> None:
+    from tests.serving.conftest import MAIN
+
+    program = start_program("-c", MAIN, "serve", "--trees", "/no/such/folder")
+    assert program.wait() == 2  # type: ignore[attr-defined]
+    assert "/no/such/folder is no folder of trees" in program.errors[-1]  # type: ignore[attr-defined]
