@@ -1,5 +1,6 @@
 """What the README and the examples show works as it stands there."""
 
+import json
 import re
 import signal
 from collections.abc import Callable
@@ -51,6 +52,20 @@ def test_the_python_in_the_readme_runs_and_is_as_short_as_promised(
     assert program.wait(40.0) == 0, program
     assert program.lines[0] == "Status.SUCCESS", program
     assert [line.split()[-3:-1] for line in program.lines[1:]] == [["SUCCEEDED"] * 2] * 5, program
+
+
+def test_the_example_of_a_server_runs_trees_for_the_example_of_a_client(
+    start_program: Start, server: Host
+) -> None:
+    server.robot("", speed=10.0)
+    serving = start_program("examples/tree_server.py")
+    serving.line("ready: ")
+    client = start_program("examples/tree_client.py", "pick_and_place", "{place_at: 4.5}")
+    assert client.wait(60.0) == 0, (client, serving)
+    assert json.loads(client.lines[-1])["final_pose"] == pytest.approx(4.5, abs=0.1)
+    serving.send(signal.SIGINT)
+    assert serving.wait() == 0, serving
+    assert not serving.errors or "Traceback" not in "".join(serving.errors)
 
 
 def test_the_example_of_embedding_delivers_the_part(start_program: Start, server: Host) -> None:
