@@ -228,6 +228,19 @@ def test_a_failure_without_an_action_to_blame_has_a_code_of_its_own(
     assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.TREE_FAILED)
 
 
+def test_a_behaviour_that_raises_is_named(
+    serve_trees: Serve, client: TreeClient, folder: Path
+) -> None:
+    (folder / "empty.yaml").write_text(
+        "tree: empty\nroot: {python: tests.support.trees.Raises, arguments: {method: update}}\n"
+    )
+    serve_trees("--python", "tests")
+    status, result = client.result(client.send("empty"))
+    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.EXCEPTION)
+    assert result.error_msg.startswith("Raises: tick raised ")
+    assert client.send("empty").accepted, "the server goes on"
+
+
 def test_trees_are_listed_with_their_inputs_and_with_what_runs(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:
