@@ -57,15 +57,20 @@ def test_the_python_in_the_readme_runs_and_is_as_short_as_promised(
 def test_the_example_of_a_server_runs_trees_for_the_example_of_a_client(
     start_program: Start, server: Host
 ) -> None:
-    server.robot("", speed=10.0)
+    journal = server.robot("", speed=10.0)
     serving = start_program("examples/tree_server.py")
     serving.line("ready: ")
     client = start_program("examples/tree_client.py", "pick_and_place", "{place_at: 4.5}")
     assert client.wait(60.0) == 0, (client, serving)
     assert json.loads(client.lines[-1])["final_pose"] == pytest.approx(4.5, abs=0.1)
+    before = journal.count("accepted")
+    waiting = start_program("examples/tree_client.py", "patrol")
+    journal.wait_for("accepted", before + 1, within=20.0)
     serving.send(signal.SIGINT)
     assert serving.wait() == 0, serving
-    assert not serving.errors or "Traceback" not in "".join(serving.errors)
+    assert waiting.wait() == 1, waiting
+    assert waiting.lines[-1].startswith("its server was deactivated"), waiting
+    assert "Traceback" not in "\n".join(serving.errors), serving
 
 
 def test_the_example_of_embedding_delivers_the_part(start_program: Start, server: Host) -> None:

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from bt_actions.document.find import tree_folder
-from bt_actions.plain_text import clean
+from bt_actions.plain_text import clean, in_words
 from bt_actions.ros.log import log
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.messages import feedback, finding, info, result
@@ -78,6 +78,9 @@ class TreeServer:
 
     Names, relative to the node: the action ``run_tree``; the services ``~/list_trees``,
     ``~/check_tree`` and ``~/control_tree``; the topic ``~/rejections``, which keeps the last ten.
+
+    Close it while the node is spun, and before its context is shut down (as rclpy's own handler of
+    Ctrl-C does it): otherwise the trees' goals are drained all the same, and no client is answered.
 
     Raises NotADirectoryError for a folder that is none, TreeNotFoundError for a package without it,
     ValueError for a policy that is none.
@@ -312,7 +315,20 @@ class TreeServer:
     def _ended(self, goal: _Goal, outcome: RunOutcome) -> None:
         """A run is over: have its goal answered, and let the next one begin."""
         said = f": {outcome.message}" if outcome.message else ""
-        (log.info if outcome.code == Code.NONE else log.error)(f"{goal.tree}: ends{said}")
+        as_wanted = outcome.settled and outcome.code in (Code.NONE, *(e.value[0] for e in Ending))
+        (log.info if as_wanted else log.error)(f"{goal.tree}: ends{said}")
+        try:
+            self._answer(goal, outcome)
+        except Exception as error:  # noqa: BLE001 - the context was shut down before; by version
+            log.warning(f"{goal.tree}: its client could not be answered: {in_words(error)}")
+        with self._answered:
+            self.unaccounted += outcome.unaccounted
+            self._goals.pop(goal.id, None)
+            self._answered.notify_all()
+            begun = self._turns.leave(goal)
+        self._begin(begun)
+
+    def _answer(self, goal: _Goal, outcome: RunOutcome) -> None:
         handle, canceled = goal.handle, outcome.code == Code.CANCELED
         until = time.monotonic() + _LAST_WORDS
         while canceled and not handle.is_cancel_requested and time.monotonic() < until:
@@ -326,12 +342,6 @@ class TreeServer:
         else:
             handle.abort()
         self._action.finish(handle, result(outcome))
-        with self._answered:
-            self.unaccounted += outcome.unaccounted
-            self._goals.pop(goal.id, None)
-            self._answered.notify_all()
-            begun = self._turns.leave(goal)
-        self._begin(begun)
 
     def _tell(self) -> None:
         """Tell the clients how far their runs are; the timer's callback."""

@@ -14,7 +14,7 @@ from bt_actions_interfaces.msg import ActionReport, TreeInfo
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
 
 from tests.serving.conftest import MOVE, Serve
-from tests.support.processes import Journal
+from tests.support.processes import Journal, Process
 from tests.support.tree_client import TreeClient
 
 R = RunTree.Result
@@ -303,6 +303,43 @@ def test_a_signal_drains_all_goals_and_answers_before_the_process_ends(
         assert result.settled
     assert server.wait() == 0
     assert journal.ends() == ["canceled"]
+
+
+OWN_NODE = """
+import sys, rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from bt_actions.serving import TreeServer
+rclpy.init()
+node = rclpy.create_node("bt_actions_serve", namespace=sys.argv[2])
+executor = SingleThreadedExecutor()
+executor.add_node(node)
+server = TreeServer(node, trees=sys.argv[1])
+print("ready: ", flush=True)
+try:
+    executor.spin()
+except (KeyboardInterrupt, ExternalShutdownException):
+    pass
+server.close()
+"""
+
+
+def test_where_the_context_is_shut_down_first_all_goals_are_drained_and_nobody_can_be_answered(
+    serve: Callable[..., Journal],
+    start_program: Callable[..., Process],
+    client: TreeClient,
+    folder: Path,
+    space: str,
+) -> None:
+    journal = serve()
+    server = start_program("-c", OWN_NODE, str(folder), space, short_lease=True)
+    server.line("ready: ")
+    client.send("move", LONG)
+    journal.wait_for("accepted")
+    server.send(signal.SIGINT)
+    assert server.wait() == 0
+    assert journal.ends() == ["canceled"]
+    assert any("its client could not be answered" in line for line in server.errors)
+    assert "Traceback" not in "\n".join(server.errors)
 
 
 def test_a_folder_that_is_none_is_bad_input(start_program: Callable[..., object]) -> None:
