@@ -437,7 +437,8 @@ class TreeRunner:
             thread.join()
         self._tell_unheard()
         try:
-            self.tree.shutdown()
+            if self._set_up.has_begun:  # else it is not ours: another runner may run it
+                self.tree.shutdown()
         except Exception as error:  # noqa: BLE001 - the user's: any
             _error(f"shutdown of a behaviour raised: {raised(error)}")
             for behaviour in self.tree.root.iterate():  # ours must let go all the same
@@ -477,7 +478,7 @@ class TreeRunner:
         self._patience.begin(deadline)
         try:
             self._guarded(self._set_up_all)  # clients are made before anything spins
-            self._spinner.start()
+            self._spinner.start(lambda: self._stop_wanted or _past(deadline))
             self._emit(TreeStarted(time.monotonic()))
             status = self._tick_until(deadline)
         except BaseException:

@@ -301,6 +301,26 @@ class TestOneRunAtATime:
                 other.interrupt()
                 assert other.run() is Status.INVALID
 
+    def test_who_never_ran_a_tree_does_not_shut_it_down(self, node: Any) -> None:
+        root = ShutsDown("root")
+        with TreeRunner(root, node=node) as runner:
+            runner.start()
+            until(lambda: root.status is Status.RUNNING)
+            TreeRunner(root).shutdown()
+            assert not root.downs
+            root.passed = True
+            assert runner.wait(5.0) is Status.SUCCESS
+        assert root.downs == 1
+
+
+class ShutsDown(Gate):
+    """Counts how often it was shut down."""
+
+    downs = 0
+
+    def shutdown(self) -> None:
+        self.downs += 1
+
 
 class WithoutStatus(Behaviour):
     def __init__(self, status: Any = None) -> None:
@@ -779,6 +799,21 @@ class TestWhoSpins:
         ):
             runner.run(timeout=9.0)
         assert 0.5 <= time.monotonic() - started < 9.0
+        executor.shutdown()
+        node.executor = None
+
+    def test_an_interrupt_and_a_timeout_are_heard_while_it_waits_for_somebody_to_spin(
+        self, node: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(spinning, "PATIENCE_SPUN", 60.0)
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        with TreeRunner(Gate(), node=node) as runner:
+            with pytest.raises(TimeoutError):
+                runner.run(timeout=0.1)
+            runner.start()
+            runner.interrupt()
+            assert runner.wait(9.0) is Status.INVALID
         executor.shutdown()
         node.executor = None
 

@@ -221,8 +221,8 @@ class Publish(Behaviour):
         data: gives the fields of the message; may raise ValueError.
         qos: as the tree language calls it.
         subscribers: so many must listen before it publishes.
-        timeout: seconds on the node's clock after which it fails where fewer do; never where not
-            given.
+        timeout: seconds on the node's clock after which it fails where fewer do, and not while the
+            node is new; never where not given.
     """
 
     def __init__(
@@ -272,7 +272,7 @@ class Publish(Behaviour):
         assert self._speaker is not None, "not set up"
         topic, listeners = self._speaker.topic, self._speaker.listeners
         if listeners < (self._subscribers or self._speaker.listener_may_come() > 0.0):
-            if self._subscribers and self._timeout is not None and self._countdown.left() <= 0.0:
+            if self._subscribers and self._is_late(self._speaker):
                 self.feedback_message = (
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
                     f" {self._timeout:g} s{self._speaker.why_unheard()}"
@@ -293,6 +293,12 @@ class Publish(Behaviour):
             self.warning = f"nobody listens on {topic}{self._speaker.why_unheard()}"
         self.feedback_message = self.warning
         return Status.SUCCESS
+
+    def _is_late(self, speaker: Speaker) -> bool:
+        """Whether nobody more is waited for: the time is over, and who is there is discovered."""
+        if self._timeout is None or self._countdown.left() > 0.0:
+            return False
+        return speaker.listener_may_come() <= 0.0
 
     def due_in(self) -> float | None:
         """Seconds until it looks again for who listens."""

@@ -10,7 +10,9 @@ import threading
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, namespace, no_ros, note, starting_ros
+from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.sim import say
+from bt_actions.plain_text import raised
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -75,10 +77,12 @@ def add_parser(subparsers: Subparsers) -> None:
         default="",
         help="namespace of the node, and thereby of run_tree and every relative action name",
     )
+    add_ros_args(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it, or the executor dies."""
+    parameters(args.ros_args, args.namespace)
     try:
         from bt_actions.cli.signals import Signals
         from bt_actions.ros.spinning import Spinner
@@ -110,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
     for each in server.unaccounted:
         note(f"bt-actions serve: may still be running: {each}")
     if errors:
-        note(f"bt-actions serve: the executor died: {errors[0]!r}")
+        note(f"bt-actions serve: the executor died: {raised(errors[0])}")
     return Exit.UNKNOWN if server.unaccounted else Exit.FAILURE if errors else Exit.SUCCESS
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, namespace, note, seconds, speed, starting_ros
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
+from bt_actions.plain_text import raised
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -124,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
         finally:
             spinner.stop(simulation.close if simulation else lambda: None)
     if errors:
-        note(f"bt-actions sim: the executor died: {errors[0]!r}")
+        note(f"bt-actions sim: the executor died: {raised(errors[0])}")
         return Exit.FAILURE
     say(simulation.describe())
     return Exit.SUCCESS

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,6 +77,7 @@ class Tree:
     ) -> None:
         self._workspace, self._document = workspace, document
         self._types, self._python = types, python
+        self._building = threading.Lock()  # what goes wrong is gathered in the sources
 
     def __repr__(self) -> str:
         return f"<Tree {self.name}>"
@@ -122,11 +124,12 @@ class Tree:
         values = check_inputs(self._document, inputs or {}, types=self._types)
         scope = Scope.of_load(self._document.name)
         scope.write_all(values)
-        try:
-            root = build(self._document, scope, types=self._types, python=self._python)
-        except TooManyErrors:
-            raise DocumentError(_errors(self._workspace)) from None
-        _refuse(self._workspace)  # a class of one's own may fail when it is made
+        with self._building, self._workspace.as_it_was():
+            try:
+                root = build(self._document, scope, types=self._types, python=self._python)
+            except TooManyErrors:
+                raise DocumentError(_errors(self._workspace)) from None
+            _refuse(self._workspace)  # a class of one's own may fail when it is made
         setattr(root, LOADED, Loaded(self._document, scope))
         return root
 

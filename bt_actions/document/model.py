@@ -365,7 +365,7 @@ def _all() -> Iterable[Kind]:
         Key(
             "timeout",
             Duration(or_none=True),
-            "After which it fails where fewer listen.",
+            "After which it fails where fewer listen; not while a process is new.",
             default="none",
         ),
         Key("qos", QOS, "How it is published.", default="default"),

@@ -6,7 +6,8 @@ do not include themselves and do not unfold without bound.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import contextlib
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from bt_actions.document.elsewhere import package_here
@@ -77,6 +78,17 @@ class Workspace:
         for source in self._sources:
             found += sorted(source.findings, key=lambda one: (one.line, one.column, one.code))
         return list(dict.fromkeys(found))  # what an alias repeats is wrong once
+
+    @contextlib.contextmanager
+    def as_it_was(self) -> Iterator[None]:
+        """Forget in the end what is found meanwhile."""
+        before = [(source, len(source.findings), source.errors) for source in self._sources]
+        try:
+            yield
+        finally:
+            for source, findings, errors in before:
+                del source.findings[findings:]
+                source.errors = errors
 
     def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
         key = (_key(source.path or Path(source.name)), False)

@@ -107,10 +107,10 @@ class Spinner:
         """Whether the node was made here."""
         return self._own_node
 
-    def start(self) -> None:
+    def start(self, give_up: Callable[[], bool] = lambda: False) -> None:
         """Begin to spin; where somebody else should be spinning, make sure that they do.
 
-        Raises RuntimeError when nobody does, for 5 s.
+        Raises RuntimeError when nobody does, for 5 s; not where `give_up` says so before.
         """
         if self.spins:
             if self._thread is None:
@@ -120,6 +120,8 @@ class Spinner:
             return
         self._ask_for_life()
         while not self._alive.wait(0.05) and _callbacks_in(self.executor) is None:
+            if give_up():
+                return
             self._check()
 
     def check(self) -> None:

@@ -132,7 +132,7 @@ class Run:
                 if self._paused:
                     runner.pause()
             status = runner.run()
-        except Exception as raised:  # noqa: BLE001 - a behaviour's, or nobody spins the node
+        except BaseException as raised:  # noqa: BLE001 - a behaviour's, or nobody spins the node
             error = raised
         finally:
             with self._lock:

@@ -6,6 +6,7 @@ turns.py's, and a run its own (run.py); here is what they have to do with ROS.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 import time
@@ -17,7 +18,7 @@ from typing import Any
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import Rejection
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
-from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.action.server import CancelResponse, GoalResponse, RCLError, ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -162,8 +163,10 @@ class TreeServer:
 
     def halt(self, ending: Ending = Ending.HALTED) -> None:
         """Accept nothing more, and end all runs; returns when they have ended."""
-        with self._lock:
+        with self._answered:
             self._refuses = "this server accepts no goals any more"
+            # What was admitted before comes now, if anybody spins the node, and ends as it comes.
+            self._answered.wait_for(lambda: not self._admitted, _LAST_WORDS)
             goals = list(self._goals.values())
         for goal in goals:
             self._end(goal, ending)
@@ -224,14 +227,18 @@ class TreeServer:
             goal = make(handle)
             self._goals[goal.id] = goal
             begun, halted = self._turns.come(goal)
+            refuses = self._refuses
         for each in halted:
             self._end(each, Ending.REPLACED)
+        if refuses:  # it was admitted before
+            self._end(goal, Ending.DEACTIVATED)
         self._begin(begun)
 
     def _on_request_over(self, goal: RunTree.Goal) -> None:
         with self._lock:
             if self._admitted.pop(id(goal), None) is not None:  # its client could not be told
                 self._turns.expected -= 1
+            self._answered.notify_all()
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         with self._lock:
@@ -293,10 +300,12 @@ class TreeServer:
 
     def _begin(self, goals: Iterable[_Goal]) -> None:
         for goal in goals:
-            goal.begun = True
-            if not goal.handle.is_cancel_requested:
-                goal.handle.execute()
-            self._timer.reset()
+            with self._lock:  # the timer's callback stops it where nothing has begun
+                goal.begun = True
+                self._timer.reset()
+            with contextlib.suppress(RCLError):  # a cancel comes at this moment
+                if not goal.handle.is_cancel_requested:
+                    goal.handle.execute()
             log.info(f"{goal.tree}: begins")
             goal.run.start()
 
@@ -362,4 +371,4 @@ def _sendable(text: str) -> str:
 
 
 def _never(_: ServerGoalHandle) -> None:
-    raise AssertionError("goals are executed by RunTreeServer.finish")
+    raise AssertionError("a goal is answered by RunTreeServer.finish")

@@ -8,6 +8,7 @@ answered when it has ended.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,10 +17,12 @@ from rclpy.task import Future
 
 __all__ = ["RunTreeServer", "off_the_executor"]
 
-_ROUNDS = 5
-"""Rounds of an executor in which a result is set, and then sent to all who wait for it."""
+_SENT = 0.25
+"""Seconds in which an executor that is spun sends a result, once that is set."""
 _NUDGE = 0.01
 """Seconds between two reminders of an executor that something awaited is there."""
+_SPUN = 10.0
+"""Seconds after which nobody spins it any more."""
 
 
 class RunTreeServer(ActionServer):  # type: ignore[misc]
@@ -29,6 +32,12 @@ class RunTreeServer(ActionServer):  # type: ignore[misc]
     """Called when a goal request was answered, or could not be: its client may have gone away, and
     then rclpy drops the goal without a word."""
 
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        self._told = threading.Condition()
+        self._unset = 0
+        """Goals that have ended, and whose result nobody has set yet."""
+        super().__init__(*arguments, **options)
+
     def notify_execute(
         self, goal_handle: ServerGoalHandle, execute_callback: Callable[..., Any]
     ) -> None:
@@ -36,22 +45,32 @@ class RunTreeServer(ActionServer):  # type: ignore[misc]
 
     def finish(self, goal_handle: ServerGoalHandle, result: Any) -> None:
         """Answer whoever asks for the result of a goal in its terminal state; on any thread."""
-        if self._node.executor is not None:  # else nobody will spin it any more
-            super().notify_execute(goal_handle, lambda _: result)
+        if (executor := self._node.executor) is None:  # nobody will spin it any more
+            return
+        with self._told:
+            self._unset += 1
+
+        async def finish() -> None:
+            try:
+                await self._execute_goal(lambda _: result, goal_handle)  # waits for nothing
+            finally:
+                with self._told:
+                    self._unset -= 1
+                    self._told.notify_all()
+
+        executor.create_task(finish)
 
     def flush(self, patience: float) -> None:
-        """Wait until the executor has done what it was given, for so many seconds at most."""
-        executor, done = self._node.executor, threading.Event()
-
-        def after(rounds: int) -> None:
-            if rounds:
-                executor.create_task(after, rounds - 1)
-            else:
-                done.set()
-
-        if executor is not None:
-            executor.create_task(after, _ROUNDS)
-            done.wait(patience)
+        """Wait until all results are set, for so many seconds at most, and sent."""
+        executor = self._node.executor
+        with self._told:
+            if executor is None or not self._told.wait_for(lambda: not self._unset, patience):
+                return
+        until = time.monotonic() + _SENT
+        while time.monotonic() < until:
+            done = threading.Event()
+            executor.create_task(done.set)
+            done.wait(_NUDGE)
 
     async def _execute_goal_request(self, request_header_and_message: Any) -> None:
         try:
@@ -72,7 +91,8 @@ async def off_the_executor(
         except Exception as error:  # noqa: BLE001 - raised again where it is awaited
             future.set_exception(error)
         # An executor that has just looked may wait for something else to happen now.
-        while executor.context.ok() and not taken.wait(_NUDGE):
+        until = time.monotonic() + _SPUN
+        while executor.context.ok() and time.monotonic() < until and not taken.wait(_NUDGE):
             executor.wake()
 
     submit(do)

@@ -158,6 +158,8 @@ def test_launch_starts_a_server_a_goal_and_a_cleanup_with_names_and_parameters(
     assert goal.wait() == 0, goal
     cleanup = start("cleanup", "move_robot", "--look", "1", *launch)
     assert cleanup.wait() == 0, cleanup
+    serve = start("serve", "--trees", "trees", *launch)
+    assert serve.line("ready: ").startswith("ready: /by_launch/run_tree, ")
 
 
 def test_a_run_takes_its_inputs_from_a_file_of_parameters(start: Start, tmp_path: Path) -> None:

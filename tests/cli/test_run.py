@@ -37,14 +37,11 @@ root:
     - {grip: Close, goal: {position: 0.0}}
 """
 
-NEW = """\
+SPEAKS = "tree: new\nroot: {publish: lamp, type: std_msgs/msg/Bool, message: {data: true}}\n"
+HEARS = """\
 tree: new
 topics: {flag: {topic: flag, type: std_msgs/msg/Bool, qos: latched}}
-root:
-  sequence: S
-  children:
-    - check: $flag.data
-    - {publish: lamp, type: std_msgs/msg/Bool, message: {data: true}}
+root: {check: $flag.data}
 """
 
 Tree = Callable[..., Path]
@@ -108,7 +105,6 @@ class TestExitCode0:
         from bt_actions.ros.topics import qos_profile
 
         path = tmp_path / "new.yaml"
-        path.write_text(NEW)
         heard: list[bool] = []
         lamp = node.create_subscription(
             Bool, f"{namespace}/lamp", lambda m: heard.append(m.data), 10
@@ -117,8 +113,10 @@ class TestExitCode0:
         flag.publish(Bool(data=True))
         executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)
-        run = start("run", str(path), "--namespace", namespace)
-        assert run.wait() == 0, run
+        for text in (SPEAKS, HEARS):
+            path.write_text(text)
+            run = start("run", str(path), "--namespace", namespace)
+            assert run.wait() == 0, run
         until(lambda: heard, 5.0, meanwhile=lambda: executor.spin_once(timeout_sec=0.01))
         executor.shutdown()
         node.executor = None

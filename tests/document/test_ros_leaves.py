@@ -584,13 +584,21 @@ def test_a_message_that_nobody_listens_to_is_published_with_a_warning_when_the_n
 
     new = [0.5]
     monkeypatch.setattr(topics, "discovers", lambda _node: new[0])
+    hasty: Any = load(LAMP.format(topic=name, more=", subscribers: 1, timeout: 1 ns"))
     root: Any = load(LAMP.format(topic=name, more=""))
+    hasty.setup(node=node)
+    hasty.tick_once()
+    hasty.tick_once()
+    assert hasty.status is Status.RUNNING
     root.setup(node=node)
     root.tick_once()
     assert (root.status, root.warning) == (Status.RUNNING, "")
     new[0] = 0.0
     root.tick_once()
+    hasty.tick_once()
+    assert hasty.status is Status.FAILURE, "it does not wait for discovery any more"
     root.shutdown()
+    hasty.shutdown()
     assert (root.status, root.warning) == (Status.SUCCESS, f"nobody listens on {name}")
     assert root.feedback_message == root.warning
 

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
 
 from bt_actions.serving.catalog import Catalog, State
 from bt_actions.serving.requests import Refused
@@ -169,6 +171,30 @@ def test_python_comes_from_named_packages_only(write: Write, tmp_path: Path) -> 
     assert refusal(Catalog([tmp_path / "trees"]), "go")[0] == "BT214"
     assert refusal(Catalog([tmp_path / "trees"], python=["other"]), "go")[0] == "BT214"
     Catalog([tmp_path / "trees"], python=["py_trees"]).check("go", "")
+
+
+class Moody(Behaviour):
+    """Cannot be made at first."""
+
+    ready = False
+
+    def __init__(self, name: str) -> None:
+        if not Moody.ready:
+            raise OSError("no device")
+        super().__init__(name)
+
+    def update(self) -> Status:
+        return Status.SUCCESS
+
+
+def test_a_tree_that_could_not_be_built_can_be_built_later(write: Write, tmp_path: Path) -> None:
+    write("go.yaml", f"tree: go\nroot: {{python: {__name__}.Moody}}\n")
+    _, tree, values = Catalog([tmp_path / "trees"], python=["tests"]).check("go", "")
+    for _ in range(2):
+        with pytest.raises(ValueError, match="no device"):
+            tree.build(values)
+    Moody.ready = True
+    assert isinstance(tree.build(values), Moody)
 
 
 def test_a_folder_that_is_none_is_said_at_once(tmp_path: Path) -> None:

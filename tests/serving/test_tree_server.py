@@ -19,6 +19,21 @@ from tests.support.tree_client import TreeClient
 
 R = RunTree.Result
 LONG = "{distance: 20.0}"
+LEAVES = """\
+tree: move
+root:
+  parallel: Both
+  children:
+    - action: Go
+      type: robot_control_interfaces/action/MoveRobot
+      server: {server}
+      goal: {{distance: 4.0}}
+      timeout: {{cancel: 500 ms}}
+    - sequence: Later
+      children:
+        - wait: 1500 ms
+        - {{python: tests.support.trees.LeavesLate}}
+"""
 
 
 def test_a_tree_runs_to_its_end_and_tells_what_it_did(
@@ -238,6 +253,20 @@ def test_a_behaviour_that_raises_is_named(
     status, result = client.result(client.send("empty"))
     assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.EXCEPTION)
     assert result.error_msg.startswith("Raises: tick raised ")
+    assert client.send("empty").accepted, "the server goes on"
+
+
+def test_a_behaviour_that_wants_to_end_the_program_leaves_no_goal_below_unsaid(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path, name: str
+) -> None:
+    (folder / "move.yaml").write_text(LEAVES.format(server=name))
+    journal = serve("1:ignore_cancel")
+    serve_trees("--python", "tests")
+    status, result = client.result(client.send("move"))
+    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.EXCEPTION)
+    assert not result.settled
+    assert [action.end for action in result.actions] == [ActionReport.END_UNKNOWN]
+    assert journal.count("accepted") == 1
     assert client.send("empty").accepted, "the server goes on"
 
 

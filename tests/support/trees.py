@@ -80,3 +80,15 @@ def together(*children: Behaviour, name: str = "together") -> Parallel:
 def state(leaf: ActionBehaviour) -> str:
     """The state of the goal that the leaf is at."""
     return leaf.progress().state
+
+
+class LeavesLate(Behaviour):
+    """Ends the program at its third tick, as a call of `sys.exit` in a behaviour does."""
+
+    ticks = 0
+
+    def update(self) -> Status:
+        self.ticks += 1
+        if self.ticks == 3:
+            raise SystemExit(1)
+        return Status.RUNNING
