@@ -72,13 +72,19 @@ class Deliverer:
                 status = runner.run()
             finally:
                 del self._runners[goal_id]
+        result = Deliver.Result(message=f"the tree ended with {status.value}")
+        for leaf in root.iterate():
+            if isinstance(leaf, MoveRobot) and leaf.result is not None:
+                result.final_pose = leaf.result.final_pose
         if status is Status.SUCCESS:
             goal_handle.succeed()
         elif goal_handle.is_cancel_requested:
+            result.status = result.STATUS_CANCELED
             goal_handle.canceled()
         else:
+            result.status = result.STATUS_FAULT
             goal_handle.abort()
-        return Deliver.Result(message=f"the tree ended with {status.value}")
+        return result
 
     def close(self) -> None:
         """End all runs."""

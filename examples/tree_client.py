@@ -9,11 +9,12 @@ import sys
 import rclpy
 from bt_actions_interfaces.action import RunTree
 from rclpy.action import ActionClient
+from rclpy.signals import SignalHandlerOptions
 
 
 def main(tree: str, inputs: str = "") -> int:
     """Return an exit code: 0 where the tree has succeeded and nothing of it runs any more."""
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C is for the goal, see below
     node = rclpy.create_node("tree_client")
     client = ActionClient(node, RunTree, "run_tree")
     client.wait_for_server()
@@ -23,10 +24,14 @@ def main(tree: str, inputs: str = "") -> int:
         print("rejected; the server's log and its topic ~/rejections say why")
         return 2
     ended = sent.result().get_result_async()
-    rclpy.spin_until_future_complete(node, ended)
+    try:
+        rclpy.spin_until_future_complete(node, ended)
+    except KeyboardInterrupt:  # the result tells what became of it
+        rclpy.spin_until_future_complete(node, sent.result().cancel_goal_async())
+        rclpy.spin_until_future_complete(node, ended)
     result = ended.result().result
     for action in result.actions:
-        print(f"{action.path}: {action.attempts} goals sent")
+        print(f"{action.path}: attempts {action.attempts}")
     print(result.outputs if not result.error_code else result.error_msg)
     if not result.settled:
         return 3

@@ -202,7 +202,8 @@ class Spinner:
     def _gone(self) -> RuntimeError:
         return RuntimeError(
             f"node {self.node.get_fully_qualified_name()} was taken out of its executor, or that "
-            "was shut down, while a tree runs; shut the runner down first"
+            "was shut down, while a tree runs; spin a node of your own before its runner is made "
+            "(rclpy.spin(node) takes it, too), and shut the runner down first"
         )
 
     def _spinning(self) -> bool:

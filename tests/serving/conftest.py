@@ -62,9 +62,24 @@ def serve_trees(start_program: Callable[..., Process], folder: Path, space: str)
     return start
 
 
+@pytest.fixture(scope="module")
+def fresh_context(domain: int) -> Iterator[Any]:
+    """A young participant, as a client has it.
+
+    That of all tests was seen to get no answers from new processes late in a whole run, which
+    bt_actions' own clients make up for (ros/way.py), and rclpy's do not.
+    """
+    from rclpy.context import Context
+
+    context = Context()
+    context.init(domain_id=domain)
+    yield context
+    context.shutdown()
+
+
 @pytest.fixture
-def client(context: Any, space: str) -> Iterator[TreeClient]:
+def client(fresh_context: Any, space: str) -> Iterator[TreeClient]:
     """A client of the server in the test's namespace."""
-    client = TreeClient(context, space)
+    client = TreeClient(fresh_context, space)
     yield client
     client.close()

@@ -99,11 +99,11 @@ def test_a_goal_that_cannot_be_run_is_rejected_and_the_reason_is_told_to_all(
 
 
 def test_whoever_comes_late_still_hears_of_the_rejections(
-    serve_trees: Serve, client: TreeClient, context: object, space: str
+    serve_trees: Serve, client: TreeClient, fresh_context: object, space: str
 ) -> None:
     serve_trees()
     client.send("nothing")
-    late = TreeClient(context, space)
+    late = TreeClient(fresh_context, space)
     try:
         late.until(lambda: late.rejections, "the rejection is there")
     finally:
