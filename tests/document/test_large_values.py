@@ -81,6 +81,23 @@ def test_a_large_variable_is_read_set_and_handed_on_as_it_is(load: Load) -> None
     assert len(same) == 4_000_000
 
 
+def test_an_image_is_saved_as_it_is(load: Load) -> None:
+    root = load(
+        """
+        tree: t
+        inputs: {seen: sensor_msgs/msg/Image}
+        outputs: {kept: sensor_msgs/msg/Image}
+        root: {set: {kept: $seen}}
+        """,
+        {"seen": {}},
+    )
+    scope = getattr(root, LOADED).scope
+    scope.write("seen", Image(data=array.array("B", bytes(24_000_000))))
+    with at_once():
+        assert tick(root) is Status.SUCCESS, root.feedback_message
+    assert len(scope.read("kept").data) == 24_000_000
+
+
 @pytest.mark.parametrize("given", [MANY, MANY.tolist()], ids=["an array", "a list"])
 def test_a_message_takes_many_numbers_at_once(given: Any) -> None:
     with at_once():
