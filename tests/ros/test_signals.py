@@ -134,8 +134,10 @@ class Blocks(py_trees.behaviours.Success):
             itself(signal.SIGINT)
         threading.Event().wait()
 
+runner = TreeRunner(Blocks("blocks"))
+runner.run()
 try:
-    TreeRunner(Blocks("blocks")).shutdown()
+    runner.shutdown()
 except KeyboardInterrupt:
     say("goes on")
 """

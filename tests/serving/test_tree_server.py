@@ -27,11 +27,11 @@ root:
     - action: Go
       type: robot_control_interfaces/action/MoveRobot
       server: {server}
-      goal: {{distance: 4.0}}
+      goal: {{distance: 20.0}}
       timeout: {{cancel: 500 ms}}
     - sequence: Later
       children:
-        - wait: 1500 ms
+        - wait: 4 s
         - {{python: tests.support.trees.LeavesLate}}
 """
 
