@@ -181,11 +181,9 @@ class Ledger:
         return (seen.st_dev, seen.st_ino) == self._identity
 
     def _open(self, prefix: bytes) -> None:
-        directory = _directory()
-        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-        _check(directory)
-        _tidy(directory)
-        path = directory / (prefix.hex() + _SUFFIX)
+        home = directory()
+        _tidy(home)
+        path = home / (prefix.hex() + _SUFFIX)
         how = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
         self._file = os.open(path, how, 0o600)
         self._path, self._prefix = path, prefix
@@ -289,6 +287,14 @@ def mark_lost(goals: Iterable[Sent]) -> None:
                     os.pwrite(file, text, sent.row * LENGTH)
             finally:
                 os.close(file)
+
+
+def directory() -> Path:
+    """Make the directory of the records where it is not there. Raises OSError for an unsafe one."""
+    found = _directory()
+    found.mkdir(mode=0o700, parents=True, exist_ok=True)
+    _check(found)
+    return found
 
 
 def _directory() -> Path:

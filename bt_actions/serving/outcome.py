@@ -86,6 +86,11 @@ class RunOutcome:
         """Whether the end of every goal below is known."""
         return not self.unaccounted
 
+    @property
+    def as_wanted(self) -> bool:
+        """Whether it is settled, and succeeded or was ended by somebody."""
+        return self.settled and self.code in (Code.NONE, *(each.value[0] for each in Ending))
+
 
 def outcome_of(
     report: Report,

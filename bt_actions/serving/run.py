@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure
 from py_trees.common import Status
+from rclpy.expand_topic_name import expand_topic_name
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
@@ -43,6 +44,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: where goals are sent from; somebody spins it.
+        begins: called with the full names of the actions that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
     """
 
@@ -51,12 +53,14 @@ class Run:
         tree: Tree,
         inputs: Mapping[str, object],
         node: Any,
+        *,
+        begins: Callable[[set[str]], None],
         ended: Callable[[RunOutcome], None],
     ) -> None:
         self.tree = tree
         self._inputs = inputs
         self._node = node
-        self._ended = ended
+        self._begins, self._ended = begins, ended
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
         self._paused = False
@@ -108,6 +112,11 @@ class Run:
         paths.sort(key=lambda each: -len(each[0]))
         return [_leaf(path, leaf) for path, leaf in paths[:SHOWN]]
 
+    def retrying(self) -> bool:
+        """Whether an action that runs is not at its first attempt; on any thread."""
+        leaves = list(self._running)
+        return any(isinstance(each, ActionBehaviour) and each.attempt > 1 for each in leaves)
+
     # On the run's thread
 
     def _run(self) -> None:
@@ -119,6 +128,7 @@ class Run:
 
     def _to_end(self) -> RunOutcome:
         root = self.tree.build(self._inputs)
+        self._begins(self._actions(root))
         report = Report(root)
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node)
@@ -150,6 +160,11 @@ class Run:
             outputs=outputs if succeeded else None,
             unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
         )
+
+    def _actions(self, root: Behaviour) -> set[str]:
+        name, space = self._node.get_name(), self._node.get_namespace()
+        leaves = [each for each in root.iterate() if isinstance(each, ActionBehaviour)]
+        return {str(expand_topic_name(each.action_name, name, space)) for each in leaves}
 
     def _note(self, event: Event) -> None:
         if not isinstance(event, NodeChanged) or event.node.children:

@@ -12,56 +12,37 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 from bt_actions_interfaces.action import RunTree
-from bt_actions_interfaces.msg import Rejection
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
 from rclpy.action.server import CancelResponse, GoalResponse, RCLError, ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from bt_actions.document.find import tree_folder
 from bt_actions.plain_text import clean, in_words
 from bt_actions.ros.log import log
 from bt_actions.serving.catalog import Catalog
-from bt_actions.serving.messages import feedback, finding, info, result
+from bt_actions.serving.diagnostics import Diagnostics, Standing
+from bt_actions.serving.goal import FASTEST, Goal
+from bt_actions.serving.lifecycle import Lifecycle
+from bt_actions.serving.messages import finding, info, result
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
+from bt_actions.serving.rejections import ECHO, Rejections
 from bt_actions.serving.requests import Refused
 from bt_actions.serving.run import Run
 from bt_actions.serving.turns import Policy, Turns
+from bt_actions.serving.underway import Underway
 from bt_actions.serving.wire import RunTreeServer, off_the_executor
 
 __all__ = ["TreeServer"]
 
 RESULT_TIMEOUT = 60
 """Seconds for which an ended goal's result can be asked for; each one kept makes a goal slower."""
-REJECTIONS = 10
-FASTEST, SLOWEST = 0.1, 1.0
-"""Seconds between two messages of feedback: where something has changed, and where nothing has."""
 _LAST_WORDS = 2.0
 """Seconds for the last results to be sent when the server is closed."""
-_ECHO = 200
-"""Characters of a goal's own words in what is said of it."""
-
-
-@dataclass(slots=True, eq=False)
-class _Goal:
-    """An accepted goal: its handle, its run, and when its client last heard of it."""
-
-    handle: ServerGoalHandle
-    run: Run
-    tree: str
-    told: int = -1
-    told_at: float = 0.0
-    begun: bool = False
-
-    @property
-    def id(self) -> bytes:
-        return bytes(self.handle.goal_id.uuid)
 
 
 class TreeServer:
@@ -76,6 +57,8 @@ class TreeServer:
             "parallel".
         most: how many goals may wait (queue), or run (parallel).
         python: the packages whose classes the trees' ``python:`` nodes may name.
+        managed: be unconfigured at first, and have the services of a managed node; `lifecycle`
+            changes the state from here. Otherwise goals are accepted at once.
 
     Names, relative to the node: the action ``run_tree``; the services ``~/list_trees``,
     ``~/check_tree`` and ``~/control_tree``; the topic ``~/rejections``, which keeps the last ten.
@@ -95,30 +78,26 @@ class TreeServer:
         policy: Policy | str = Policy.REJECT,
         most: int = 10,
         python: Iterable[str] = (),
+        managed: bool = False,
     ) -> None:
         folders = [trees] if isinstance(trees, str | os.PathLike) else list(trees)
         self.node = node
-        self.catalog = Catalog(map(tree_folder, folders), python=python)
-        self.catalog.entries()  # so that what is wrong with a file is known, and it is read once
+        self._folders = Catalog(map(tree_folder, folders)).folders
+        self._python = tuple(python)
+        self.catalog = Catalog(())
         self._lock = threading.RLock()
         self._answered = threading.Condition(self._lock)
         self.unaccounted: list[str] = []
         """A line for each goal of a tree whose end is not known."""
-        self._turns: Turns[_Goal] = Turns(Policy(policy), most)
-        self._goals: dict[bytes, _Goal] = {}
-        self._admitted: dict[int, tuple[Any, Callable[[ServerGoalHandle], _Goal]]] = {}
-        self._refuses = ""
+        self._turns: Turns[Goal] = Turns(Policy(policy), most)
+        self._goals: dict[bytes, Goal] = {}
+        self._admitted: dict[int, tuple[Any, Callable[[ServerGoalHandle], Goal]]] = {}
+        self._refuses = "it is unconfigured"
+        self._last: dict[str, RunOutcome] = {}
+        self._underway = Underway(node.context.get_domain_id())
         self._worker = ThreadPoolExecutor(1, "bt_actions-check")
         group = ReentrantCallbackGroup()
-        self._rejections = node.create_publisher(
-            Rejection,
-            "~/rejections",
-            QoSProfile(
-                depth=REJECTIONS,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            ),
-        )
+        self._rejections = Rejections(node)
         self._action = RunTreeServer(
             node,
             RunTree,
@@ -143,6 +122,20 @@ class TreeServer:
         self._timer = node.create_timer(
             FASTEST, self._tell, callback_group=group, clock=steady, autostart=False
         )
+        self._diagnostics = Diagnostics(node, self._standings, self._worker.submit, group)
+        self.lifecycle: Lifecycle | None = None
+        if managed:
+            steps = {
+                "configuring": self._configure,
+                "activating": self._activate,
+                "deactivating": lambda: self.halt(Ending.DEACTIVATED, "it is inactive"),
+                "cleaningup": self._forget,
+                "shuttingdown": self._finalize,
+            }
+            self.lifecycle = Lifecycle(node, steps, group)
+        else:
+            self._configure()
+            self._activate()
 
     def close(self) -> None:
         """Accept nothing more, end all runs, answer their goals, and be gone.
@@ -150,21 +143,22 @@ class TreeServer:
         Returns when every goal of the trees has ended, or its `timeout.cancel` has passed. Not on a
         thread of the node's executor.
         """
+        if self.lifecycle is not None:
+            self.lifecycle.close()
         self.halt(Ending.DEACTIVATED)
-        with self._answered:
-            self._answered.wait_for(lambda: not self._goals, _LAST_WORDS)
         self._action.flush(_LAST_WORDS)
+        self._diagnostics.close()
         self.node.destroy_timer(self._timer)
         for service in self._services:
             self.node.destroy_service(service)
         self._action.destroy()
-        self.node.destroy_publisher(self._rejections)
+        self._rejections.close()
         self._worker.shutdown(wait=False, cancel_futures=True)
 
-    def halt(self, ending: Ending = Ending.HALTED) -> None:
+    def halt(self, ending: Ending = Ending.HALTED, why: str = "it ends") -> None:
         """Accept nothing more, and end all runs; returns when they have ended."""
         with self._answered:
-            self._refuses = "this server accepts no goals any more"
+            self._refuses = why
             # What was admitted before comes now, if anybody spins the node, and ends as it comes.
             self._answered.wait_for(lambda: not self._admitted, _LAST_WORDS)
             goals = list(self._goals.values())
@@ -172,11 +166,43 @@ class TreeServer:
             self._end(goal, ending)
         for goal in goals:
             goal.run.join()
+        with self._answered:
+            self._answered.wait_for(lambda: not self._goals, _LAST_WORDS)
 
     def abandon(self) -> None:
         """Have `halt` and `close` wait for no goal any more; `unaccounted` tells which are left."""
         for goal in list(self._goals.values()):
             goal.run.end(Ending.DEACTIVATED, abandon=True)
+
+    # A managed node's life
+
+    def _configure(self) -> None:
+        self.catalog = Catalog(self._folders, python=self._python)
+        self.catalog.entries()  # so that what is wrong with a file is known, and it is read once
+        self._refuses = "it is inactive"
+
+    def _activate(self) -> None:
+        self._refuses = ""
+
+    def _forget(self) -> None:
+        self._refuses, self.catalog = "it is unconfigured", Catalog(())
+        self._last = {}
+
+    def _finalize(self) -> None:
+        self.halt(Ending.DEACTIVATED, "it is finalized")
+        self.catalog = Catalog(())
+
+    def _standings(self) -> tuple[list[Standing], str]:
+        entries = self.catalog.entries()
+        with self._lock:
+            goals = [goal for goal in self._turns.running if goal.begun]
+            found = []
+            for entry in entries:
+                runs = [goal.run for goal in goals if goal.tree == entry.name]
+                retrying = any(run.retrying() for run in runs)
+                last = self._last.get(entry.name)
+                found.append(Standing(entry.name, entry.state, len(runs), retrying, last))
+            return found, self._refuses
 
     # Requests; on the executor's threads
 
@@ -188,38 +214,32 @@ class TreeServer:
                 self._refuse_more()
                 self._turns.expected += 1
 
-                def make(handle: ServerGoalHandle) -> _Goal:
-                    run = Run(tree, values, self.node, lambda outcome: self._ended(made, outcome))
-                    made = _Goal(handle, run, entry.name)
+                def make(handle: ServerGoalHandle) -> Goal:
+                    run = Run(
+                        tree,
+                        values,
+                        self.node,
+                        ended=lambda outcome: self._ended(made, outcome),
+                        begins=lambda actions: self._underway.begins(made.id, actions),
+                    )
+                    made = Goal(handle, run, entry.name)
                     return made
 
                 self._admitted[id(goal)] = goal, make
         except Refused as refused:
-            self._reject(goal, refused)
+            self._rejections.tell(goal, refused)
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
     def _refuse_more(self) -> None:
         with self._lock:
-            if self._refuses:
-                raise Refused("INACTIVE", self._refuses)
+            self._refuse_inactive()
             if refusal := self._turns.refusal():
                 raise Refused("BUSY", refusal)
 
-    def _reject(self, goal: RunTree.Goal, refused: Refused) -> None:
-        said = refused.finding
-        place = f" ({said.place})" if said.place else ""
-        log.warning(f"goal for {clean(goal.tree)[:_ECHO]!r} rejected: {said.code}: "
-                    f"{said.message}{place}")  # fmt: skip
-        self._rejections.publish(
-            Rejection(
-                stamp=self.node.get_clock().now().to_msg(),
-                tree=_sendable(goal.tree),
-                goal_name=_sendable(goal.goal_name),
-                code=said.code,
-                message=f"{said.message}{place}",
-            )
-        )
+    def _refuse_inactive(self) -> None:
+        if self._refuses:
+            raise Refused("INACTIVE", f"this server accepts no goals: {self._refuses}")
 
     def _on_accepted(self, handle: ServerGoalHandle) -> None:
         with self._lock:
@@ -262,6 +282,7 @@ class TreeServer:
         self, request: CheckTree.Request, response: CheckTree.Response
     ) -> CheckTree.Response:
         try:
+            self._refuse_inactive()
             await self._off(self.catalog.check, request.tree, request.inputs)
             self._refuse_more()
         except Refused as refused:
@@ -274,7 +295,7 @@ class TreeServer:
     ) -> ControlTree.Response:
         with self._lock:
             goal = self._goals.get(bytes(request.goal_id.uuid))
-        commands: dict[int, Callable[[_Goal], None]] = {
+        commands: dict[int, Callable[[Goal], None]] = {
             ControlTree.Request.PAUSE: lambda goal: goal.run.pause(),
             ControlTree.Request.RESUME: lambda goal: goal.run.resume(),
             ControlTree.Request.HALT: lambda goal: self._end(goal, Ending.HALTED),
@@ -284,7 +305,7 @@ class TreeServer:
         elif request.command not in commands:
             response.message = f"{request.command} is no command"
         else:
-            asks = clean(request.requested_by)[:_ECHO] or "somebody"
+            asks = clean(request.requested_by)[:ECHO] or "somebody"
             log.info(f"{goal.tree}: {asks} asks for command {request.command}")
             commands[request.command](goal)
             response.accepted = True
@@ -298,7 +319,7 @@ class TreeServer:
 
     # Runs
 
-    def _begin(self, goals: Iterable[_Goal]) -> None:
+    def _begin(self, goals: Iterable[Goal]) -> None:
         for goal in goals:
             with self._lock:  # the timer's callback stops it where nothing has begun
                 goal.begun = True
@@ -309,7 +330,7 @@ class TreeServer:
             log.info(f"{goal.tree}: begins")
             goal.run.start()
 
-    def _end(self, goal: _Goal, ending: Ending) -> None:
+    def _end(self, goal: Goal, ending: Ending) -> None:
         """End a goal before its time, also one that waits for its turn."""
         goal.run.end(ending)
         with self._lock:
@@ -321,11 +342,13 @@ class TreeServer:
             outcome = RunOutcome(int(code), f"{words} before it began")
             self._worker.submit(self._ended, goal, outcome)  # not here: this may be a callback
 
-    def _ended(self, goal: _Goal, outcome: RunOutcome) -> None:
+    def _ended(self, goal: Goal, outcome: RunOutcome) -> None:
         """A run is over: have its goal answered, and let the next one begin."""
         said = f": {outcome.message}" if outcome.message else ""
-        as_wanted = outcome.settled and outcome.code in (Code.NONE, *(e.value[0] for e in Ending))
-        (log.info if as_wanted else log.error)(f"{goal.tree}: ends{said}")
+        (log.info if outcome.as_wanted else log.error)(f"{goal.tree}: ends{said}")
+        self._last[goal.tree] = outcome
+        if outcome.settled:
+            self._underway.ends(goal.id)
         try:
             self._answer(goal, outcome)
         except Exception as error:  # noqa: BLE001 - the context was shut down before; by version
@@ -337,7 +360,7 @@ class TreeServer:
             begun = self._turns.leave(goal)
         self._begin(begun)
 
-    def _answer(self, goal: _Goal, outcome: RunOutcome) -> None:
+    def _answer(self, goal: Goal, outcome: RunOutcome) -> None:
         handle, canceled = goal.handle, outcome.code == Code.CANCELED
         until = time.monotonic() + _LAST_WORDS
         while canceled and not handle.is_cancel_requested and time.monotonic() < until:
@@ -360,14 +383,7 @@ class TreeServer:
                 self._timer.cancel()
         now = time.monotonic()
         for goal in goals:
-            changes = goal.run.changes
-            if changes != goal.told or now - goal.told_at >= SLOWEST - FASTEST / 2:
-                goal.told, goal.told_at = changes, now
-                goal.handle.publish_feedback(feedback(goal.run.running(), goal.run.leaves_ended))
-
-
-def _sendable(text: str) -> str:
-    return clean(text)[:_ECHO]
+            goal.tell(now)
 
 
 def _never(_: ServerGoalHandle) -> None:

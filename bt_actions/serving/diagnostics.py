@@ -1,0 +1,103 @@
+"""How each served tree stands, on /diagnostics once a second. Changes nothing."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from bt_actions.serving.catalog import State
+from bt_actions.serving.outcome import RunOutcome
+
+__all__ = ["Diagnostics", "Standing", "judge"]
+
+PERIOD = 1.0
+"""Seconds."""
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+class Standing(NamedTuple):
+    """A tree, and what runs of it and has run."""
+
+    tree: str
+    state: State = State.OK
+    running: int = 0
+    retrying: bool = False
+    last: RunOutcome | None = None
+    """How its last run ended."""
+
+
+def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
+    """The level of a tree, and why; `refuses` says why its server accepts nothing."""
+    last, running = standing.last, standing.running
+    if refuses:
+        return ERROR, f"not serving: {refuses}"
+    if standing.state is State.INVALID:
+        return ERROR, "its file does not check"
+    if last is not None and not last.settled:
+        return ERROR, f"the last run is not settled: {last.unaccounted[0]} may still be running"
+    if last is not None and not last.as_wanted and not running:
+        return WARN, f"the last run failed: {last.message.partition(chr(10))[0]}"
+    if standing.retrying:
+        return WARN, "an action is tried again"
+    if standing.state is State.KEPT_LAST_GOOD:
+        return WARN, "its file does not check; the last good version is used"
+    return OK, "running" if running else "ready"
+
+
+class Diagnostics:
+    """Publishes what `look` returns: how the trees stand, and why the server accepts nothing.
+
+    `look` is called by what `submit` submits it to, not on the executor's threads.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        look: Callable[[], tuple[Iterable[Standing], str]],
+        submit: Callable[[Callable[[], None]], object],
+        group: CallbackGroup,
+    ) -> None:
+        self._node, self._look, self._submit = node, look, submit
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._timer = node.create_timer(
+            PERIOD,
+            self._on_timer,
+            callback_group=group,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
+
+    def close(self) -> None:
+        """Publish nothing more."""
+        self._node.destroy_timer(self._timer)
+        self._node.destroy_publisher(self._publisher)
+
+    def _on_timer(self) -> None:
+        with contextlib.suppress(RuntimeError):  # the server is closed at this moment
+            self._submit(self._tell)
+
+    def _tell(self) -> None:
+        standings, refuses = self._look()
+        message = DiagnosticArray(status=[self._status(each, refuses) for each in standings])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def _status(self, standing: Standing, refuses: str) -> DiagnosticStatus:
+        level, message = judge(standing, refuses)
+        values = {
+            "state": standing.state.name,
+            "running": str(standing.running),
+            "last_error_code": "" if standing.last is None else str(standing.last.code),
+        }
+        return DiagnosticStatus(
+            level=level,
+            name=f"{self._node.get_fully_qualified_name()}: {standing.tree}",
+            message=message,
+            hardware_id=self._node.get_namespace(),
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )

@@ -1,0 +1,153 @@
+"""The standard interface of a managed node, on a plain one. What a change does is its user's.
+
+The states are rcl's own table. rclpy's LifecycleNode will not do: an illegal request kills its
+executor, and nothing is answered during a change.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
+from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
+from rclpy.action.server import RCLError
+from rclpy.callback_groups import CallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+
+from bt_actions.plain_text import in_words
+from bt_actions.ros.log import log
+from bt_actions.serving.wire import off_the_executor
+
+__all__ = ["Lifecycle"]
+
+
+class Lifecycle:
+    """The state of a node, and the services that tell and change it; unconfigured at first.
+
+    `steps` has what is done in a state of transition ("configuring", ...): what raises fails, and
+    the state is as before. One change at a time.
+    """
+
+    def __init__(
+        self, node: Node, steps: Mapping[str, Callable[[], None]], group: CallbackGroup
+    ) -> None:
+        self._node, self._steps = node, steps
+        self._changes = threading.Lock()
+        with node.handle:
+            self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
+        self._events = node.create_publisher(TransitionEvent, "~/transition_event", 10)
+        self._services = [
+            node.create_service(kind, f"~/{name}", callback, callback_group=group)
+            for kind, name, callback in (
+                (ChangeState, "change_state", self._on_change),
+                (GetState, "get_state", self._on_state),
+                (GetAvailableStates, "get_available_states", self._on_states),
+                (GetAvailableTransitions, "get_available_transitions", self._on_transitions),
+                (GetAvailableTransitions, "get_transition_graph", self._on_graph),
+            )
+        ]
+
+    @property
+    def state(self) -> str:
+        """The state's label."""
+        return str(self._machine.current_state[1])
+
+    def change(self, transition: str | int) -> bool:
+        """Make a transition by its label or id; whether it succeeded. Returns when it is done."""
+        if not self._changes.acquire(blocking=False):
+            return False
+        try:
+            if isinstance(transition, str):
+                transition = int(self._machine.get_transition_by_label(transition))
+            self._trigger(self._machine.trigger_transition_by_id, transition)
+            state = self.state
+            log.info(f"{self._node.get_name()}: {state}")
+            try:
+                self._steps[state]()
+                how = "success"
+            except Exception as error:  # noqa: BLE001 - it is told, and the state is as before
+                log.error(f"{self._node.get_name()}: {state} failed: {in_words(error)}")
+                how = "failure"
+            self._trigger(self._machine.trigger_transition_by_label, f"transition_{how}")
+        except RCLError:
+            return False
+        finally:
+            self._changes.release()
+        return how == "success"
+
+    def close(self) -> None:
+        """Be gone, when a change that is under way is over; none follows."""
+        self._changes.acquire()
+        for service in self._services:
+            self._node.destroy_service(service)
+        self._node.destroy_publisher(self._events)
+        self._machine.destroy_when_not_in_use()
+
+    def _trigger(self, trigger: Callable[[Any, bool], None], transition: Any) -> None:
+        start = State(**_state(self._machine.current_state))
+        possible = self._machine.available_transitions
+        trigger(transition, False)  # raises RCLError for one that is not possible
+        number, label = next(each[:2] for each in possible if transition in each[:2])
+        self._events.publish(
+            TransitionEvent(
+                timestamp=self._node.get_clock().now().nanoseconds,
+                transition=Transition(id=number, label=label),
+                start_state=start,
+                goal_state=State(**_state(self._machine.current_state)),
+            )
+        )
+
+    # Requests; on the executor's threads
+
+    async def _on_change(
+        self, request: ChangeState.Request, response: ChangeState.Response
+    ) -> ChangeState.Response:
+        wanted = request.transition.label or int(request.transition.id)
+        response.success = await off_the_executor(
+            self._node.executor,
+            lambda work: threading.Thread(target=work, name="bt_actions-change").start(),
+            lambda: self.change(wanted),
+        )
+        return response
+
+    def _on_state(self, _: Any, response: GetState.Response) -> GetState.Response:
+        response.current_state = State(**_state(self._machine.current_state))
+        return response
+
+    def _on_states(
+        self, _: Any, response: GetAvailableStates.Response
+    ) -> GetAvailableStates.Response:
+        response.available_states = [
+            State(**_state(each)) for each in self._machine.available_states
+        ]
+        return response
+
+    def _on_transitions(
+        self, _: Any, response: GetAvailableTransitions.Response
+    ) -> GetAvailableTransitions.Response:
+        response.available_transitions = _described(self._machine.available_transitions)
+        return response
+
+    def _on_graph(
+        self, _: Any, response: GetAvailableTransitions.Response
+    ) -> GetAvailableTransitions.Response:
+        response.available_transitions = _described(self._machine.transition_graph)
+        return response
+
+
+def _state(pair: tuple[int, str]) -> dict[str, Any]:
+    return {"id": pair[0], "label": pair[1]}
+
+
+def _described(transitions: Iterable[tuple[Any, ...]]) -> list[TransitionDescription]:
+    return [
+        TransitionDescription(
+            transition=Transition(id=each[0], label=each[1]),
+            start_state=State(**_state((each[2], each[3]))),
+            goal_state=State(**_state((each[4], each[5]))),
+        )
+        for each in transitions
+    ]

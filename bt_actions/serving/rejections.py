@@ -1,0 +1,54 @@
+"""Why goals were rejected, told to all: ROS gives a rejection no reason. Decides nothing."""
+
+from __future__ import annotations
+
+from bt_actions_interfaces.action import RunTree
+from bt_actions_interfaces.msg import Rejection
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from bt_actions.plain_text import clean
+from bt_actions.ros.log import log
+from bt_actions.serving.requests import Refused
+
+__all__ = ["ECHO", "Rejections"]
+
+REJECTIONS = 10
+ECHO = 200
+"""Characters of a goal's own words in what is said of it."""
+
+
+class Rejections:
+    """The log, and the topic ``~/rejections``, which keeps the last ten."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(
+            Rejection,
+            "~/rejections",
+            QoSProfile(
+                depth=REJECTIONS,
+                reliability=ReliabilityPolicy.RELIABLE,
+                durability=DurabilityPolicy.TRANSIENT_LOCAL,
+            ),
+        )
+
+    def tell(self, goal: RunTree.Goal, refused: Refused) -> None:
+        """Say why a goal is rejected."""
+        said = refused.finding
+        place = f" ({said.place})" if said.place else ""
+        log.warning(f"goal for {clean(goal.tree)[:ECHO]!r} rejected: {said.code}: "
+                    f"{said.message}{place}")  # fmt: skip
+        self._publisher.publish(
+            Rejection(
+                stamp=self._node.get_clock().now().to_msg(),
+                tree=clean(goal.tree)[:ECHO],
+                goal_name=clean(goal.goal_name)[:ECHO],
+                code=said.code,
+                message=f"{said.message}{place}",
+            )
+        )
+
+    def close(self) -> None:
+        """Be gone."""
+        self._node.destroy_publisher(self._publisher)
