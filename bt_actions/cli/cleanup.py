@@ -109,9 +109,10 @@ def sweep(
     namespace: str = "",
     *,
     accept: float = 0.0,
-    first: bool = False,
+    first: str = "",
 ) -> Exit:
-    """Clean up, saying what is found and how it ended; `first`: another run is to follow.
+    """Clean up, saying what is found and how it ended; `first`: another run is to follow,
+    and this is what to do where that is not wanted.
 
     Where not every server of one of the `wanted` actions answers, or none of any action is in
     sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread only.
@@ -126,7 +127,7 @@ def sweep(
                 "BT_ACTIONS_MACHINE)"
             )
         hint = "; start it" if wanted else ""
-        hint += ", or run without --cleanup-first" if wanted and first else ""
+        hint += f", or {first}" if wanted and first else ""
         code = _tell_what_is_open(swept, unseen, stop.signal, hint, any_will_do=wanted is not None)
         tell = functools.partial(note, end="") if first else write  # whose results are to follow
         try:

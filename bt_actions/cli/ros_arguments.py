@@ -27,9 +27,10 @@ def add_ros_args(parser: argparse.ArgumentParser, help_more: str = "") -> None:
     )
 
 
-def parameters(words: Sequence[str], namespace: str = "") -> dict[str, object]:
+def parameters(words: Sequence[str], namespace: str = "", name: str = "") -> dict[str, object]:
     """Return the parameters that `words` give to the command's node, without rclpy's own.
 
+    `name` is the node's, for files of parameters that name it.
     Raises BadInput for what rcl does not understand.
     """
     if not words:
@@ -42,7 +43,7 @@ def parameters(words: Sequence[str], namespace: str = "") -> dict[str, object]:
         raise no_ros(error) from error
 
     try:
-        return parameters_in(words, namespace)
+        return parameters_in(words, namespace, name)
     except ValueError as error:
         raise BadInput(f"--ros-args: {error}") from error
 

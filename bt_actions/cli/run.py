@@ -161,7 +161,8 @@ def _clean_up(wanted: set[str], namespace: str) -> Exit:
     """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
     from bt_actions.cli.cleanup import sweep
 
-    return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=True)
+    instead = "run without --cleanup-first"
+    return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=instead)
 
 
 def _refuse_without_sim(args: argparse.Namespace) -> None:

@@ -20,7 +20,7 @@ __all__ = ["parameters_in"]
 _OF_EVERY_NODE = frozenset({"use_sim_time", "start_type_description_service"})
 
 
-def parameters_in(words: Sequence[str], namespace: str = "") -> dict[str, object]:
+def parameters_in(words: Sequence[str], namespace: str = "", name: str = "") -> dict[str, object]:
     """The values that the words behind `--ros-args` give to a node, without rclpy's own parameters.
 
     Raises ValueError, with rcl's reason, for words that it does not understand.
@@ -29,7 +29,7 @@ def parameters_in(words: Sequence[str], namespace: str = "") -> dict[str, object
     try:
         context.init(args=["--ros-args", *words])
         node = Node(
-            f"bt_actions_{os.getpid()}_parameters",
+            name or f"bt_actions_{os.getpid()}_parameters",
             context=context,
             namespace=namespace,
             enable_rosout=False,

@@ -62,6 +62,19 @@ def serve_trees(start_program: Callable[..., Process], folder: Path, space: str)
     return start
 
 
+@pytest.fixture
+def start_managed(start_program: Callable[..., Process], folder: Path, space: str) -> Serve:
+    """Start `bt-actions serve --managed`, and wait until it can be managed."""
+
+    def start(*options: str) -> Process:
+        command = ["-c", MAIN, "serve", "--managed", "--trees", str(folder), *options]
+        process = start_program(*command, "--namespace", space, short_lease=True)
+        process.line("unconfigured: ")
+        return process
+
+    return start
+
+
 @pytest.fixture(scope="module")
 def fresh_context(domain: int) -> Iterator[Any]:
     """A young participant, as a client has it.

@@ -1,0 +1,115 @@
+"""The options of `bt-actions serve`, as parameters too."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from rclpy.parameter import Parameter
+
+from bt_actions.cli import main
+from bt_actions.cli.signals import SAME_WISH
+from tests.serving.conftest import MAIN, Serve
+from tests.support.processes import Journal, Process
+from tests.support.tree_client import TreeClient
+from tests.support.waiting import holds_for, until
+
+NODE = "bt_actions_serve"
+FILE = """\
+bt_actions_serve:
+  ros__parameters: {{trees: [{folder}], policy: queue, max: 7, managed: true, pick_at: 2.0}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--max", "3"], "--max is for the policies queue and parallel, and this is reject"),
+        (["--policy", "replace", "--ros-args", "-p", "max:=3"],
+         "--max is for the policies queue and parallel, and this is replace"),
+        (["--ros-args", "-p", "policy:=que"],
+         "the parameter 'policy' is 'que', and not reject, queue, replace, parallel"),
+        (["--ros-args", "-p", "max:=0"],
+         "the parameter 'max' is 0, and not a whole number, 1 to 1000"),
+        (["--ros-args", "-p", "trees:=trees"],
+         "the parameter 'trees' is 'trees', and not a list of texts"),
+        (["--ros-args", "-p", "managed:=1"],
+         "the parameter 'managed' is 1, and not true or false"),
+        (["--ros-args", "-p", "polcy:=queue"],
+         "there is no parameter 'polcy'; did you mean 'policy'?"),
+    ],
+)  # fmt: skip
+@pytest.mark.usefixtures("domain")
+def test_a_wrong_option_is_bad_input(
+    words: list[str], message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["serve", *words]) == 2
+    assert message in capfd.readouterr().err.splitlines()[-1]
+
+
+def test_options_are_read_only_parameters_and_the_command_line_wins(
+    start_program: Callable[..., Process],
+    client: TreeClient,
+    folder: Path,
+    space: str,
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "parameters.yaml"
+    path.write_text(FILE.format(folder=folder).replace("bt_actions_serve", f"{space}/{NODE}"))
+    command = ["-c", MAIN, "serve", "--max", "5", "--namespace", space]
+    server = start_program(*command, "--ros-args", "--params-file", str(path), short_lease=True)
+    server.line(f"unconfigured: {space}/{NODE}")
+    names = ["trees", "policy", "max", "managed"]
+
+    def ask(kind: type, what: str, **fields: object) -> object:
+        service = client.node.create_client(kind, f"{NODE}/{what}")
+        client.until(service.service_is_ready, "the service is there")
+        future = service.call_async(kind.Request(**fields))  # type: ignore[attr-defined]
+        client.until(future.done, "the call is answered")
+        return future.result()
+
+    got = ask(GetParameters, "get_parameters", names=names).values  # type: ignore[attr-defined]
+    assert [list(got[0].string_array_value), got[1].string_value, got[2].integer_value,
+            got[3].bool_value] == [[str(folder)], "queue", 5, True]  # fmt: skip
+    told = ask(DescribeParameters, "describe_parameters", names=names)
+    assert all(each.read_only and each.description for each in told.descriptors)  # type: ignore[attr-defined]
+    change = [Parameter("max", value=6).to_parameter_msg()]
+    answer = ask(SetParameters, "set_parameters", parameters=change)
+    assert not answer.results[0].successful  # type: ignore[attr-defined]
+
+
+def test_ready_counts_the_trees_that_can_be_run_and_names_the_others(serve_trees: Serve) -> None:
+    server = serve_trees()
+    assert server.lines[0].endswith("/run_tree, 2 trees, 1 broken: broken")
+
+
+def test_a_ctrl_c_that_comes_twice_within_a_moment_counts_once(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    journal = serve("1:delay_cancel=1.0")
+    server = serve_trees()
+    client.send("move", "{distance: 20.0}")
+    journal.wait_for("accepted")
+    assert holds_for(lambda: server.send(signal.SIGINT) > 0.0, 0.4 * SAME_WISH)
+    assert server.wait() == 0
+    assert journal.ends() == ["canceled"]
+
+
+def test_a_second_ctrl_c_waits_for_no_goal_and_names_what_may_still_run(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, name: str
+) -> None:
+    journal = serve("1:ignore_cancel")
+    server = serve_trees()
+    client.send("move", "{distance: 20.0}")
+    journal.wait_for("accepted")
+    began = server.send(signal.SIGINT)
+    until(
+        lambda: server.popen.poll() is not None,
+        meanwhile=lambda: time.monotonic() > began + SAME_WISH and server.send(signal.SIGINT),
+    )
+    assert server.wait() == 3
+    assert any(f"may still be running: Go on {name}" in line for line in server.errors)
