@@ -89,6 +89,11 @@ def add_parser(subparsers: Subparsers) -> None:
         "--json", action="store_true", help="print one JSON object a line, the result last"
     )
     parser.add_argument(
+        "--plain",
+        action="store_true",
+        help="lines in a terminal, too, as in a pipe; so it is where TERM is dumb",
+    )
+    parser.add_argument(
         "-v",
         "--verbose",
         action="store_true",
@@ -146,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
     with Session(
         root, executor=args.executor, namespace=args.namespace, simulation=wish
     ) as session:
-        view = session.view(as_json=args.json, verbose=args.verbose)
+        view = session.view(as_json=args.json, plain=args.plain, verbose=args.verbose)
         return session.run(view, timeout=args.timeout, part_at=args.check_part)
 
 

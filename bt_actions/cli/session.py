@@ -90,12 +90,12 @@ class Session:
         finally:
             self._output.__exit__()
 
-    def view(self, *, as_json: bool = False, verbose: bool = False) -> View:
-        """Return the view that suits standard output; `verbose` is about lines."""
+    def view(self, *, as_json: bool = False, plain: bool = False, verbose: bool = False) -> View:
+        """Return the view that suits standard output: lines if `plain`; `verbose` is about them."""
         if as_json:
             self._output.tell_gaps(_gap_object)
             return JsonView(self.report, results())
-        if sys.stdout.isatty():
+        if sys.stdout.isatty() and not plain:
             from rich.console import Console
 
             from bt_actions.cli.live import LiveView, suits

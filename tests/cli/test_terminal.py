@@ -174,9 +174,13 @@ def test_a_closed_terminal_is_a_hangup(terminal: Callable[..., Terminal], mark: 
     assert marked(mark) == []
 
 
-@pytest.mark.parametrize("name", ["dumb", "unknown"])
-def test_a_dumb_terminal_gets_lines(name: str, terminal: Callable[..., Terminal]) -> None:
-    demo = terminal(*DEMO, TERM=name)
+@pytest.mark.parametrize(
+    ("option", "name"), [((), "dumb"), ((), "unknown"), (("--plain",), "xterm-256color")]
+)
+def test_a_dumb_terminal_gets_lines_and_so_does_who_wants_it_plain(
+    option: tuple[str, ...], name: str, terminal: Callable[..., Terminal]
+) -> None:
+    demo = terminal(*DEMO, *option, TERM=name)
     assert demo.wait() == 0
     assert b"\x1b" not in demo.raw
     assert any("RUNNING  Deliver the part" in line for line in demo.lines)
