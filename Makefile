@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 COLCON := .colcon
 
 INTERFACES := $(shell find interfaces -type f -not -name '*.pyc')
-PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees -name '*.y*ml' 2>/dev/null)
+PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees launch -name '*.y*ml' -o -name '*.launch.py' 2>/dev/null)
 
 # A ROS installation or another environment in the caller's shell must not leak into these.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH

@@ -5,7 +5,7 @@ from pathlib import Path
 from setuptools import Distribution, setup
 
 SHARE = "share/bt_actions"
-TREES = sorted(map(str, Path("trees").rglob("*.y*ml")))
+SHARED = [*sorted(Path("trees").rglob("*.y*ml")), *sorted(Path("launch").glob("*.launch.py"))]
 
 # setuptools leaves data files out of an editable install, because it asks the distribution for
 # `has_data` (command/editable_wheel.py, _run_install), a name that only this line gives it.
@@ -17,6 +17,6 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/bt_actions"]),
         (SHARE, ["package.xml"]),
-        *((f"{SHARE}/{Path(tree).parent}", [tree]) for tree in TREES),
+        *((f"{SHARE}/{path.parent}", [str(path)]) for path in SHARED),
     ],
 )
