@@ -39,8 +39,9 @@ lint: dev ## ruff: rules and formatting; bandit: security
 	$(BIN)/ruff format --check .
 	$(BIN)/bandit --quiet --recursive --configfile pyproject.toml bt_actions
 
-chaos: dev ## every scenario with killed processes and cut networks; writes docs/reliability.md
+chaos: dev ## every scenario with killed processes and cut networks, and storms; writes docs/reliability.md
 	$(BIN)/python -m pytest tests/scenarios -m "" --reliability docs/reliability.md
+	$(BIN)/python -m pytest tests/serving -m chaos
 
 soak: dev ## 20,000 goals with every fault; an hour or two
 	$(BIN)/python scripts/soak.py

@@ -22,6 +22,7 @@ from rclpy.node import Node
 from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.simulation import Script, ScriptedServer, Simulation
+from bt_actions.simulation.journal import Event
 
 TOO_FAR = 100.0
 
@@ -37,12 +38,21 @@ def _nothing() -> None:
 class TellsLate(ScriptedServer):
     """Executes what it accepts, and says so many seconds later that it has accepted it.
 
-    For goals that are struck by ``drop_accept``, which loses the answer otherwise.
+    For goals that are struck by ``drop_accept``, which loses the answer otherwise. Its journal says
+    which distance was asked for, too.
     """
 
     tells_after: float | None = None
+    _asked = 0.0
+
+    def record(self, goal_id: str, event: Event, **more: object) -> None:
+        if event is Event.RECEIVED:
+            more["distance"] = self._asked
+        super().record(goal_id, event, **more)
 
     def on_request(self, kind: str, taken: Any) -> bool:
+        if kind == "goal":
+            self._asked = taken[1].goal.distance
         is_answered = super().on_request(kind, taken)
         if kind == "goal" and not is_answered and self.tells_after is not None:
             self.stepper.call_at(self.stepper.now() + self.tells_after, lambda _: self._tell(taken))

@@ -88,11 +88,15 @@ class TreeClient:
 
     def call(self, kind: type, **fields: Any) -> Any:
         """Call a service."""
-        service = self._services[kind]
-        self.until(service.service_is_ready, "the service is there")
-        future = service.call_async(kind.Request(**fields))  # type: ignore[attr-defined]
+        future = self.begin_call(kind, **fields)
         self.until(future.done, "the call is answered")
         return future.result()
+
+    def begin_call(self, kind: type, **fields: Any) -> Any:
+        """Call a service, without waiting for its answer."""
+        service = self._services[kind]
+        self.until(service.service_is_ready, "the service is there")
+        return service.call_async(kind.Request(**fields))  # type: ignore[attr-defined]
 
 
 class Sent:
