@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bt_actions.document import DocumentError, Finding, Tree, open_tree
+from bt_actions.plain_text import clean
 from bt_actions.serving.requests import Refused, Said, inputs_of
 from bt_actions.suggest import did_you_mean
 
@@ -62,7 +63,7 @@ class Catalog:
 
     Args:
         folders: where trees lie as NAME.yaml; of two of one name the first counts. Files without a
-            tree (they are for others to import) have no entry.
+            tree (they are for others to import), and with a name that no line shows, have no entry.
         python: the packages whose classes a ``python:`` node may name.
 
     Raises NotADirectoryError for a folder that is none.
@@ -123,7 +124,7 @@ class Catalog:
             except OSError:
                 continue
             for file in files:
-                if file.suffix in _SUFFIXES:
+                if file.suffix in _SUFFIXES and clean(file.stem) == file.stem:
                     found.setdefault(file.stem, file)
         return found
 

@@ -18,14 +18,18 @@ __all__ = ["MAX_BYTES", "Refused", "inputs_of"]
 
 MAX_BYTES = 256 * 1024
 """Of a goal's `inputs`, in UTF-8."""
+_LONGEST = 1000
+"""Characters of a reason: it may quote what it is about."""
 
 
 class Refused(Exception):
     """A goal is not accepted. `code` is a rule's (BT104), or a word in capitals."""
 
     def __init__(self, code: str, message: str, place: str = "") -> None:
-        super().__init__(message)
-        self.finding = Said(code, clean(message), place)
+        said = clean(message)
+        said = said if len(said) <= _LONGEST else f"{said[: _LONGEST - 1]}…"
+        super().__init__(said)
+        self.finding = Said(code, said, place)
 
 
 class Said(NamedTuple):

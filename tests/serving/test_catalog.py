@@ -57,18 +57,6 @@ def test_a_tree_is_known_by_the_name_of_its_file(catalog: Catalog, write: Write)
     ]
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["", "/", "..", "../trees/go", "go.yaml", "./go", "go\x00", "g\u043e", "x" * 9999],
-    ids=["empty", "slash", "up", "path", "file", "here", "nul", "look-alike", "long"],
-)
-def test_a_name_is_looked_up_and_never_opened(catalog: Catalog, write: Write, name: str) -> None:
-    write("go.yaml")
-    code, message = refusal(catalog, name)
-    assert code == "UNKNOWN_TREE"
-    assert len(message) < 200
-
-
 def test_a_name_that_is_nearly_one_is_answered_with_it(catalog: Catalog, write: Write) -> None:
     write("deliver.yaml")
     assert refusal(catalog, "delivr")[1].endswith("did you mean 'deliver'?")
