@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-CHECK = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "check.py"))
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+CHECK = runpy.run_path(str(BENCHMARKS / "check.py"))
 WITHIN = {"parse": 1.0, "check": 2.9, "load": 5.3, "check_large": 57.0, "times_larger": 10.0}
 
 
@@ -69,3 +70,21 @@ def test_every_job_is_measured() -> None:
 def test_the_tree_that_is_measured_has_so_many_nodes() -> None:
     written = CHECK["text_of"](1000)
     assert sum(written.count(f"- {kind}: ") for kind in ("move", "check")) == 1000
+
+
+@pytest.mark.parametrize(
+    ("tree", "slack", "code"), [(1.9, "1", 0), (2.1, "1", 1), (2.1, "1.25", 0), (2.6, "1.25", 1)]
+)
+def test_run_tree_costs_twice_as_much_as_an_action_by_hand_at_most(
+    tree: float,
+    slack: str,
+    code: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    serve = runpy.run_path(str(BENCHMARKS / "serve.py"))
+    taken = iter([(1.0, tree), (2.0, 90.0), (3.0, 3.0 * tree)] * 4)
+    monkeypatch.setitem(serve["main"].__globals__, "measure", lambda goals: next(taken))
+    monkeypatch.setattr("sys.argv", ["serve.py", "--rounds", "3", "--slack", slack])
+    assert serve["main"]() == code
+    assert ("DOES NOT HOLD" in capsys.readouterr().out) is bool(code)
