@@ -92,6 +92,8 @@ class TreeServer:
         self._turns: Turns[Goal] = Turns(Policy(policy), most)
         self._goals: dict[bytes, Goal] = {}
         self._admitted: dict[int, tuple[Any, Callable[[ServerGoalHandle], Goal]]] = {}
+        self._canceled: set[int] = set()
+        """Those of them that their clients have canceled since they were told of the acceptance."""
         self._refuses = "it is unconfigured"
         self._last: dict[str, RunOutcome] = {}
         self._underway = Underway(node.context.get_domain_id())
@@ -244,18 +246,22 @@ class TreeServer:
     def _on_accepted(self, handle: ServerGoalHandle) -> None:
         with self._lock:
             _, make = self._admitted.pop(id(handle.request))
+            canceled = id(handle.request) in self._canceled
             goal = make(handle)
             self._goals[goal.id] = goal
             begun, halted = self._turns.come(goal)
             refuses = self._refuses
         for each in halted:
             self._end(each, Ending.REPLACED)
+        if canceled:
+            self._end(goal, Ending.CANCELED)
         if refuses:  # it was admitted before
             self._end(goal, Ending.DEACTIVATED)
         self._begin(begun)
 
     def _on_request_over(self, goal: RunTree.Goal) -> None:
         with self._lock:
+            self._canceled.discard(id(goal))
             if self._admitted.pop(id(goal), None) is not None:  # its client could not be told
                 self._turns.expected -= 1
             self._answered.notify_all()
@@ -263,9 +269,13 @@ class TreeServer:
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         with self._lock:
             goal = self._goals.get(bytes(handle.goal_id.uuid))
-        if goal is None:
+            early = id(handle.request) in self._admitted
+            if early:
+                self._canceled.add(id(handle.request))
+        if goal is not None:
+            self._end(goal, Ending.CANCELED)
+        elif not early:
             return CancelResponse.REJECT
-        self._end(goal, Ending.CANCELED)
         return CancelResponse.ACCEPT
 
     async def _on_list(self, _: Any, response: ListTrees.Response) -> ListTrees.Response:

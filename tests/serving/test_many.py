@@ -17,7 +17,7 @@ from bt_actions_interfaces.srv import ControlTree, ListTrees
 
 from bt_actions.simulation import journal as journals
 from tests.serving.conftest import MOVE, Serve
-from tests.support.processes import Journal
+from tests.support.processes import Journal, Process
 from tests.support.tree_client import TreeClient
 from tests.support.waiting import until
 
@@ -143,6 +143,41 @@ def test_a_goal_can_be_canceled_as_soon_as_it_is_accepted(
         assert client.cancel(sent) == 1
         assert told(client, sent) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
     assert None not in journal.ends()
+
+
+SLOW = """
+import sys, time, rclpy
+from rclpy.executors import MultiThreadedExecutor
+from bt_actions.serving import TreeServer
+begin = TreeServer._on_accepted
+def slow(server, handle):
+    time.sleep(1.0)
+    begin(server, handle)
+TreeServer._on_accepted = slow
+rclpy.init()
+node = rclpy.create_node("bt_actions_serve", namespace=sys.argv[2])
+server = TreeServer(node, trees=sys.argv[1])
+executor = MultiThreadedExecutor(4)
+executor.add_node(node)
+print("ready: ", flush=True)
+executor.spin()
+"""
+
+
+def test_a_goal_can_be_canceled_while_its_server_is_about_to_begin_it(
+    serve: Callable[..., Journal],
+    start_program: Callable[..., Process],
+    client: TreeClient,
+    folder: Path,
+    space: str,
+) -> None:
+    journal = serve()
+    start_program("-c", SLOW, str(folder), space, short_lease=True).line("ready: ")
+    sent = client.send("move", LONG)
+    assert client.cancel(sent) == 1
+    assert told(client, sent) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
+    assert journal.count("received") == 0
+    assert client.send("empty").accepted
 
 
 def test_a_goal_that_waits_for_the_one_it_replaces_can_be_canceled(
