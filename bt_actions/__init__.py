@@ -10,6 +10,7 @@ from bt_actions.attempts import AttemptRecord
 from bt_actions.behaviours.action import ActionBehaviour, Progress
 from bt_actions.behaviours.gripper import Gripper
 from bt_actions.behaviours.move_robot import MoveRobot
+from bt_actions.behaviours.run_tree import RunTree
 from bt_actions.behaviours.variables import Var
 from bt_actions.document import load_tree
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
@@ -20,6 +21,7 @@ __all__ = [  # noqa: RUF022 - grouped by use
     "ActionBehaviour",
     "MoveRobot",
     "Gripper",
+    "RunTree",
     "Var",
     # policies
     "Timeouts",

@@ -89,12 +89,14 @@ class Goal:
         *,
         resources: frozenset[str] = frozenset(),
         busy: Busy = Busy.WAIT,
+        settles: Callable[[Any], bool] = lambda result: True,
     ) -> None:
         self.id = goal_id
         self.server = server
         self.timeouts = timeouts
         self.resources = resources or frozenset({server})
         self.busy = busy
+        self._settles = settles  # whether a result says that nothing it began still runs
         self.state = State.QUEUED
         self.outcome: Outcome | None = None
         self.end = End.NEVER_STARTED
@@ -502,7 +504,7 @@ class Goal:
     def _finished(self, now: Now, detail: Any) -> State:
         """SUCCEEDED, ABORTED or CANCELED_BY_OTHER; CANCELED if it was replaced."""
         status, self.result = detail
-        self.end = ENDS[status]
+        self.end = ENDS[status] if self._settles(self.result) else End.UNKNOWN
         if self._replaced:
             self._settle(Outcome.CANCELED, f"replaced by a newer goal; it ended as {self.end}")
         else:
@@ -516,7 +518,7 @@ class Goal:
     def _finished_while_canceling(self, now: Now, detail: Any) -> State:
         """What it was canceled for; SUCCEEDED, late, if only a deadline had passed."""
         status, self.result = detail
-        self.end = ENDS[status]
+        self.end = ENDS[status] if self._settles(self.result) else End.UNKNOWN
         if status == STATUS_SUCCEEDED and self._why not in _NEVER_DONE:
             self.late = True
             self._settle(Outcome.SUCCEEDED, f"late: {self.reason}")

@@ -58,7 +58,7 @@ What holds everywhere:
   ticking thread.
 """
 GROUPS = {
-    "Leaves": ["ActionBehaviour", "MoveRobot", "Gripper", "Var"],
+    "Leaves": ["ActionBehaviour", "MoveRobot", "Gripper", "RunTree", "Var"],
     "Policies": ["Timeouts", "Retry", "Busy"],
     "What became of a goal": ["Outcome", "End", "AttemptRecord", "Progress"],
     "Running": ["load_tree", "TreeRunner", "TreeError", "GoalReport"],

@@ -93,7 +93,8 @@ The names of nodes are taken as they stand.
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
 `abs`, `min` and `max`, `true` and `false`, and constants (`MoveRobot.Result.STATUS_FAULT`). In
 `expect`, `save` and `when` the bare name
-`result` is the result; in `until` and `save` of `wait_for_message`, `message` is the message.
+`result` is the result, and of a `run_tree` `outputs` what its tree gave; in `until` and `save` of
+`wait_for_message`, `message` is the message.
 
 In the fields of a message, and in variables that fill them (but for `now` and constants):
 

@@ -337,6 +337,20 @@ class ActionBehaviour(Behaviour):
         self._outcome = outcome
         self.feedback_message = f"{outcome}: {reason}"
 
+    # What a leaf for actions of one type may know better
+
+    def settles(self, result: Any) -> bool:
+        """Whether a result says that nothing the goal began still runs; else its end is UNKNOWN.
+
+        Called under the lock of all goals: it looks at the result, and does nothing else.
+        """
+        return True
+
+    def explain(self, outcome: Outcome, result: Any) -> str:
+        """What to add to the reason of a goal that has not succeeded, or nothing."""
+        told = outcome is Outcome.ABORTED and result is not None
+        return f"its result is: {shorten(result)}" if told else ""
+
     # Within
 
     def _require_setup(self) -> None:
@@ -356,6 +370,7 @@ class ActionBehaviour(Behaviour):
             self.busy,
             attempt=self._attempts.attempt,
             keeps_feedback=self.on_feedback is not None,
+            settles=self.settles,
         )
         return self._ticket
 
@@ -404,8 +419,8 @@ class ActionBehaviour(Behaviour):
             why = self._read_result(goal.result)
             if why:
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why
-        elif outcome is Outcome.ABORTED and goal.result is not None:
-            reason += f"; its result is: {shorten(goal.result)}"
+        elif more := self.explain(outcome, goal.result):
+            reason += f"; {more}"
         now = self._traffic.clocks.now().ros
         return AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
 

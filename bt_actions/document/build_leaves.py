@@ -13,12 +13,13 @@ from py_trees.behaviours import Failure, Running, Success
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.check import Check
 from bt_actions.behaviours.doing import Log, SetValues
+from bt_actions.behaviours.run_tree import CANCEL, RunTree, roots_of
 from bt_actions.behaviours.service import CallService
 from bt_actions.behaviours.topics import Publish, WaitForMessage
 from bt_actions.behaviours.waiting import Wait, WaitUntil
-from bt_actions.document.build_names import settings_of, text_of
+from bt_actions.document.build_names import server_of, settings_of, text_of
 from bt_actions.document.classes import ClassError, make_behaviour, refusal
-from bt_actions.document.context import Context, plain_name, table_of, written_text
+from bt_actions.document.context import Context, Root, plain_name, table_of, written_text
 from bt_actions.document.nodes import span_of
 from bt_actions.document.tree import TreeNode
 from bt_actions.document.values import Computed, computed_in
@@ -32,21 +33,41 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
     settings = settings_of(node, context.document)
     goal = settings.get("goal", {})
     dynamic = any(True for _ in computed_in(goal))
-    saved = context.saved(settings.get("save"), "result")
-    given = settings.get("resources")
-    resources = given if isinstance(given, list) else []
     return ActionBehaviour(
         node.name,
         _interface(settings["type"], "action", context),
         context.name(settings, "server"),
         context.value(goal) if dynamic else goal,
         timeout=_timeouts(tuple(table_of(settings.get("timeout")).items())),
-        retry=_retry(settings, context),
-        expect=context.condition(settings.get("expect"), "result"),
-        save={context.scope.key(name): part for name, part in saved.items()},
-        busy=text_of(settings, "busy") or "wait",
-        resources=[context.joined(settings, str(each)) for each in resources],
+        **_terms(settings, context, "result"),
     )
+
+
+def _run_tree(node: TreeNode, context: Context) -> Behaviour:
+    settings = settings_of(node, context.document)
+    timeout = {"cancel": CANCEL, **table_of(settings.get("timeout"))}
+    return RunTree(
+        node.name,
+        context.value(settings["tree"]),
+        context.value(settings.get("inputs", {})),
+        server=context.joined(settings, server_of(settings)),
+        timeout=_timeouts(tuple(timeout.items())),
+        **_terms(settings, context, roots_of),
+    )
+
+
+def _terms(settings: Mapping[str, object], context: Context, root: Root) -> dict[str, Any]:
+    """What a goal is sent and judged by, whatever it says."""
+    saved = context.saved(settings.get("save"), root)
+    given = settings.get("resources")
+    resources = given if isinstance(given, list) else []
+    return {
+        "retry": _retry(settings, context),
+        "expect": context.condition(settings.get("expect"), root),
+        "save": {context.scope.key(name): part for name, part in saved.items()},
+        "busy": text_of(settings, "busy") or "wait",
+        "resources": [context.joined(settings, str(each)) for each in resources],
+    }
 
 
 @lru_cache(maxsize=1024)
@@ -190,6 +211,7 @@ def _plain(
 LEAVES: Mapping[str, Callable[[TreeNode, Context], Behaviour]] = MappingProxyType(
     {
         "action": build_action,
+        "run_tree": _run_tree,
         "service": _service,
         "publish": _publish,
         "wait_for_message": _wait_for_message,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.workspace import merged
 
-__all__ = ["join_names", "resources_below", "settings_of", "text_of", "when_of"]
+__all__ = ["join_names", "resources_below", "server_of", "settings_of", "text_of", "when_of"]
 
 
 def text_of(values: Mapping[str, object], key: str) -> str:
@@ -37,6 +37,11 @@ def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
         own = declared.values if declared is not None else {}
         shared = document.settings[alias] = merged(document.defaults, own)
     return merged(shared, node.values)
+
+
+def server_of(settings: Mapping[str, object]) -> str:
+    """The name of an action's server; that of a server of trees where none is given."""
+    return text_of(settings, "server") or "run_tree"
 
 
 def when_of(settings: object) -> object:
@@ -71,7 +76,7 @@ def resources_below(
             if settings.get("busy") == "share":
                 continue
             given = settings.get("resources")
-            names = given if isinstance(given, list) and given else [text_of(settings, "server")]
+            names = given if isinstance(given, list) and given else [server_of(settings)]
             for name in names:
                 full = join_names(inner, text_of(settings, "namespace"), str(name))
                 found.setdefault(full, node)

@@ -6,6 +6,8 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
+from bt_actions.document.build_names import when_of
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import FLOAT, INTEGER, named
 from bt_actions.document.nodes import Mapping as YamlMapping
@@ -13,7 +15,7 @@ from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.types import TypeNameError, fits, misfits, parse_type
 from bt_actions.document.values import Computed, computed_in, constant_of, locate
-from bt_actions.ros.fields import FieldType, Listing, Message, Record
+from bt_actions.ros.fields import FieldType, Listing, Message, Record, Scalar
 from bt_actions.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
@@ -176,6 +178,21 @@ def _action(checker: Checker, node: TreeNode) -> None:
     )  # fmt: skip
 
 
+def _run_tree(checker: Checker, node: TreeNode) -> None:
+    cls = checker.interface(RUN_TREE, "action", node.key)
+    text = node.values.get("tree")
+    if text is not None:
+        checker.value(Scalar("string"), text, node.written["tree"], prose=True)
+    inputs, written = node.values.get("inputs"), node.written.get("inputs")
+    if inputs is not None and written is not None:
+        checker.value(None, inputs, written)
+        checker.finite(inputs, written)
+    roots = {"result": None if cls is None else Message(cls.Result), "outputs": None}  # type: ignore[attr-defined]
+    for condition in (node.values.get("expect"), when_of(node.values)):
+        checker.condition(condition, roots)
+    checker.save(node.values.get("save"), roots)
+
+
 def _service(checker: Checker, node: TreeNode) -> None:
     name = node.values.get("type")
     cls = checker.interface(name, "srv", node.written["type"]) if isinstance(name, str) else None
@@ -276,6 +293,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "python": _python,
         "repeat": _number_of("times", INTEGER),
         "retry": _number_of("attempts", INTEGER, 1),
+        "run_tree": _run_tree,
         "service": _service,
         "set": _set,
         "subtree": _subtree,

@@ -20,6 +20,10 @@ from bt_actions.expression import Expression
 __all__ = ["Condition", "Context", "plain_name", "table_of", "written_text"]
 
 
+Root = str | Callable[[Any], Mapping[str, object]] | None
+"""The bare name that an expression has for what it is a function of; or what gives several."""
+
+
 @dataclass(frozen=True, slots=True)
 class Context:
     """What a node is built in: its document, its variables, its namespace."""
@@ -69,13 +73,13 @@ class Context:
         """A function that computes a value as it stands in the document."""
         return lambda: resolve(written, self.read)
 
-    def condition(self, written: object, root: str | None = None) -> Callable[[Any], bool] | None:
+    def condition(self, written: object, root: Root = None) -> Callable[[Any], bool] | None:
         """A condition over a bare root as a function of it."""
         if not isinstance(written, Computed):
             return None
         return Condition(written.expression, root, self.read)
 
-    def saved(self, written: object, root: str) -> dict[str, Callable[[Any], object]]:
+    def saved(self, written: object, root: Root) -> dict[str, Callable[[Any], object]]:
         """What `save` keeps, by the variable's name, as functions of a bare root.
 
         They raise ValueError for what has no value, or does not fit its variable.
@@ -96,7 +100,7 @@ class Condition:
     """An expression as a function of its bare root; `text` says what was expected."""
 
     expression: Expression
-    root: str | None
+    root: Root
     read: Callable[[str], object]
 
     @property
@@ -106,7 +110,7 @@ class Condition:
 
     def __call__(self, given: Any) -> bool:
         """Whether it holds; raises ExpressionError."""
-        return self.expression.holds({} if self.root is None else {self.root: given}, self.read)
+        return self.expression.holds(_roots(self.root, given), self.read)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +118,7 @@ class Part:
     """What is kept of a result or a message, as a function of it; `text` says what that is."""
 
     expression: Expression
-    root: str
+    root: Root
     context: Context
     name: str
 
@@ -125,8 +129,14 @@ class Part:
 
     def __call__(self, given: Any) -> object:
         """The value as its variable wants it; raises ValueError."""
-        value = self.expression.evaluate({self.root: given}, self.context.read)
+        value = self.expression.evaluate(_roots(self.root, given), self.context.read)
         return self.context.fitting(self.name, value)
+
+
+def _roots(root: Root, given: Any) -> Mapping[str, object]:
+    if callable(root):
+        return root(given)
+    return {} if root is None else {root: given}
 
 
 def table_of(value: object) -> dict[str, Any]:

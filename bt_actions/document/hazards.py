@@ -62,7 +62,7 @@ class _Hazards:
             kind = node.kind.name if node.kind is not None else ""
             if node.alias is not None:
                 self._used.add(node.alias)
-            if node.alias is not None or kind == "action":
+            if node.is_action:
                 if not inside:
                     self._look_at_action(node)
             elif kind == "parallel":

@@ -72,6 +72,7 @@ def _keys(*keys: Key) -> Mapping[str, Key]:
 
 _RESULT = frozenset({"result"})
 _MESSAGE = frozenset({"message"})
+_RUN = frozenset({"result", "outputs"})
 _NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
 _CHILD = "child"
 _CHILDREN = "children"
@@ -333,6 +334,23 @@ def _all() -> Iterable[Kind]:
         Key("server", _SERVER, "The action's name.", required=True),
         *_DOING,
     )
+    yield _leaf(
+        "run_tree",
+        NodeName(),
+        "Has a tree run by a server of trees (`bt-actions serve`), and takes over how it ends: "
+        "where the end of a goal of that run is not known, it is not known here either.",
+        "run_tree: Fetch the part\ntree: fetch\nserver: /r1/run_tree\ninputs: {pick_at: 2.0}\n"
+        "save: {at: outputs.at}",
+        Key("tree", Text(values=True), "The tree's name at that server.", required=True),
+        Key("server", _SERVER, "The server's action.", default="run_tree"),
+        Key("inputs", Values(), "Values for the tree's inputs."),
+        Key("timeout", TIMEOUT, "As for an action, but `cancel` is 15 s where nothing is said: "
+            "the run sees its own goals to their ends first."),
+        *_POLICIES[1:],
+        Key("expect", Condition(_RUN), "What must hold of `result`, or of `outputs`."),
+        Key("save", Table(Place(_RUN)), "Names to keep parts of the outputs under."),
+        *_DOING[-2:],
+    )  # fmt: skip
     yield _leaf(
         "service",
         NodeName(),

@@ -125,7 +125,7 @@ class Table:
             named = any(isinstance(item, Mapping) for item in node.items)
             return "each name is a key here, and begins with no '-'" if named else None
         assert isinstance(node, Scalar)
-        root = next(iter(self.item.roots)) if isinstance(self.item, Place) else None
+        root = min(self.item.roots) if isinstance(self.item, Place) else None
         return as_mapping(node.text, "" if isinstance(self.item, Name) else root)
 
     def schema(self) -> Schema:

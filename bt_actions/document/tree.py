@@ -59,8 +59,10 @@ class TreeNode:
 
     @property
     def is_action(self) -> bool:
-        """Whether it sends a goal: under an action's name, or with type and server in place."""
-        return self.alias is not None or (self.kind is not None and self.kind.name == "action")
+        """Whether it sends a goal: under an action's name, with its type in place, or to a server
+        of trees."""
+        sends = self.kind is not None and self.kind.name in ("action", "run_tree")
+        return self.alias is not None or sends
 
     def walk(self) -> Iterator[TreeNode]:
         """This node and all below it, in the order of the text."""

@@ -113,7 +113,7 @@ class Verdicts:
 
     def _add_up(self, node: TreeNode, document: Document) -> float:
         kind = node.kind.name if node.kind is not None else ""
-        if node.alias is not None or kind == "action":
+        if node.is_action:
             settings = settings_of(node, document)
             return _tries(_deadline(settings, "result"), settings.get("retry"))
         if kind == "service":

@@ -6,6 +6,7 @@ from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
 from bt_actions.document.infer import common_type, infer, type_of_literal
 from bt_actions.document.nodes import Mapping, Node
 from bt_actions.document.tree import Document, TreeNode
@@ -187,14 +188,14 @@ def root_type(node: TreeNode, root: str, checker: Checker) -> FieldType | None:
     if node.kind is None or node.kind.name not in _ANSWERS:
         return None
     kind, part = _ANSWERS[node.kind.name]
-    name = node.values.get("type")
+    name = RUN_TREE if node.kind.name == "run_tree" else node.values.get("type")
     if not isinstance(name, str):
         return None
-    cls = checker.interface(name, kind, node.written["type"])
+    cls = checker.interface(name, kind, node.written.get("type", node.key))
     if cls is None:
         return None
     return Message(getattr(cls, part) if part else cls)
 
 
-_ANSWERS = {"action": ("action", "Result"), "service": ("srv", "Response"),
-            "wait_for_message": ("msg", "")}  # fmt: skip
+_ANSWERS = {"action": ("action", "Result"), "run_tree": ("action", "Result"),
+            "service": ("srv", "Response"), "wait_for_message": ("msg", "")}  # fmt: skip

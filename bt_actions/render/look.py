@@ -51,6 +51,7 @@ _WORDS = {
     "Running": "running",
     "ActionBehaviour": "action",
     "CallService": "service",
+    "RunTree": "run_tree",
     "Deadline": "timeout",
     "RetryChild": "retry",
     "SetValues": "set",

@@ -178,15 +178,20 @@ class Traffic:
         *,
         attempt: int = 1,
         keeps_feedback: bool = False,
+        settles: Callable[[Any], bool] = lambda result: True,
     ) -> Ticket:
         """Begin a goal: it queues for its resources. It is sent by `advance`.
 
-        A resource is named as an action is: what is relative is in the node's namespace.
+        A resource is named as an action is: what is relative is in the node's namespace. `settles`
+        is asked with the result, under the lock: where it says no, the goal's end is UNKNOWN.
         """
         with lock:
             now = self.clocks.now()
             held = frozenset(self._full_name(each) for each in resources)
-            goal = Goal(new_goal_id(), line.name, timeouts, now, resources=held, busy=busy)
+            goal = Goal(
+                new_goal_id(), line.name, timeouts, now,
+                resources=held, busy=busy, settles=settles,
+            )  # fmt: skip
             who = _who_begins()
             ticket = Ticket(goal, line, self, owner, owner.name, who, attempt, keeps_feedback)
             ticket.begun_at = time.monotonic()

@@ -1,0 +1,162 @@
+"""The leaf that has a tree run by a server of trees, on this machine or another one. No ROS here.
+
+What a goal goes through is ActionBehaviour's. Here stand only what is sent and how a result of
+RunTree is read; the server's half is bt_actions/serving/.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from py_trees.common import Access
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.variables import Var, read, resolve, variables_in
+from bt_actions.expression import Expression, ExpressionError
+from bt_actions.policy import Outcome, Timeouts
+
+__all__ = ["CANCEL", "TYPE", "RunTree", "roots_of"]
+
+TYPE = "bt_actions_interfaces/action/RunTree"
+CANCEL = 15.0
+"""Seconds for a run to end when it is canceled: it sees its own goals to their ends first, within
+5 s each where their trees say nothing else."""
+ROOTS = frozenset({"result", "outputs"})
+Place = str | Callable[[Any], Any]
+
+
+class RunTree(ActionBehaviour):
+    """Has a tree run by a server of trees (`bt-actions serve`), and takes over how it ends.
+
+    Where the server cannot account for every goal of the run, the end is UNKNOWN here, too,
+    whatever the status. A run that failed tells its chain of failures as the reason.
+
+    Args:
+        name: as in py_trees.
+        tree: the tree's name at the server, or a Var that holds it.
+        inputs: values of the tree's inputs by their names, with Var as in a goal, or a callable
+            that returns them. NaN, infinities, and integers beyond 64 bits make the goal an
+            invalid one.
+        server: the name of the server's action.
+        timeout: as for any action; `cancel` is 15 s where nothing else is said.
+        expect, save: as for any action, with ``outputs`` (what the tree gave its outputs, a
+            mapping) beside ``result``: ``save={"at": "outputs.at"}``.
+
+    Other keyword arguments are those of ActionBehaviour.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        tree: str | Var | Callable[[], object],
+        inputs: Mapping[str, Any] | Callable[[], object] | None = None,
+        *,
+        server: str = "run_tree",
+        timeout: Timeouts | float | None = None,
+        expect: Callable[[Any], bool] | str | None = None,
+        save: Mapping[str, Place] | None = None,
+        **kwargs: Any,
+    ) -> None:
+        def goal() -> dict[str, object]:
+            which = tree() if callable(tree) else resolve(tree)
+            values = inputs() if callable(inputs) else resolve(inputs or {})
+            return {"tree": which, "inputs": inputs_text(values), "goal_name": name}
+
+        if not isinstance(timeout, Timeouts):
+            timeout = Timeouts(result=timeout, cancel=CANCEL)
+        places = (save or {}).items()
+        super().__init__(
+            name,
+            TYPE,
+            server,
+            goal,
+            timeout=timeout,
+            expect=_Of(expect, "expect", condition=True) if isinstance(expect, str) else expect,
+            save={
+                key: _Of(place, "save") if isinstance(place, str) else place
+                for key, place in places
+            },
+            **kwargs,
+        )
+        for given in (tree, inputs):
+            for variable in variables_in(given):
+                self.blackboard.register_key(variable, Access.READ)
+
+    def settles(self, result: Any) -> bool:
+        """Whether the server accounts for every goal of the run."""
+        return bool(result.settled)
+
+    def explain(self, outcome: Outcome, result: Any) -> str:
+        """The run's chain of failures; or where the reason of a rejection is told."""
+        if outcome is Outcome.REJECTED:
+            return "its log, and its topic ~/rejections, say why"
+        return "; ".join(result.error_msg.splitlines()) if result is not None else ""
+
+    def _read_result(self, result: Any) -> str:
+        if not result.settled:
+            return f"the run left goals whose end is not known: {result.error_msg}"
+        try:
+            return super()._read_result(result)
+        except _NoOutputs as error:
+            return str(error)
+
+
+class _Of:
+    """An expression over `result` and `outputs`, as a function of the result."""
+
+    def __init__(self, text: str, what: str, *, condition: bool = False) -> None:
+        try:
+            expression = Expression(text, roots=ROOTS)
+        except ExpressionError as error:
+            raise ValueError(f"{what}: {error}") from error
+        self.text = text
+        self._compute = expression.holds if condition else expression.evaluate
+
+    def __call__(self, result: Any) -> Any:
+        return self._compute(roots_of(result), read)
+
+
+class _NoOutputs(ValueError):
+    """A server sent outputs that are no mapping as JSON."""
+
+
+def roots_of(result: Any) -> dict[str, object]:
+    """What expressions over a result may name. Raises ValueError for outputs that are none."""
+    try:
+        outputs = json.loads(result.outputs or "{}")
+    except (ValueError, RecursionError) as error:
+        raise _NoOutputs(f"the server's outputs are no JSON: {error}") from None
+    if not isinstance(outputs, dict):
+        raise _NoOutputs("the server's outputs are no mapping")
+    return {"result": result, "outputs": outputs}
+
+
+def inputs_text(values: object) -> str:
+    """Inputs as RunTree has them. Raises ValueError for what cannot be sent, and says where."""
+    from bt_actions.ros.messages import to_plain
+
+    if not isinstance(values, Mapping):
+        raise ValueError(f"inputs are a mapping of names to values, not {values!r:.40}")
+    plain = to_plain(values)
+    for path, value in _scalars(plain, "inputs"):
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{path} is {value}, which cannot be sent")
+        if isinstance(value, int) and not -(2**63) <= value < 2**64:
+            raise ValueError(f"{path} does not fit 64 bits")
+        if not isinstance(value, str | int | float | None):
+            raise ValueError(f"{path} is a {type(value).__name__}, which cannot be sent")
+    return json.dumps(plain, ensure_ascii=False)
+
+
+def _scalars(value: object, path: str) -> Iterator[tuple[str, object]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _scalars(inner, f"{path}.{key}")
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from _scalars(inner, f"{path}[{index}]")
+    else:
+        yield path, value
