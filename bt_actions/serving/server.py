@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Literal
 
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
@@ -24,6 +24,7 @@ from rclpy.node import Node
 from bt_actions.document.find import tree_folder
 from bt_actions.plain_text import clean, in_words
 from bt_actions.ros.log import log
+from bt_actions.ros.rosout import Rosout
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.diagnostics import Diagnostics, Standing
 from bt_actions.serving.goal import FASTEST, Goal
@@ -121,6 +122,7 @@ class TreeServer:
             )
         ]
         steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._rosout = Rosout(node)
         self._timer = node.create_timer(
             FASTEST, self._tell, callback_group=group, clock=steady, autostart=False
         )
@@ -154,6 +156,7 @@ class TreeServer:
         for service in self._services:
             self.node.destroy_service(service)
         self._action.destroy()
+        self._rosout.close()
         self._rejections.close()
         self._worker.shutdown(wait=False, cancel_futures=True)
 
@@ -337,7 +340,7 @@ class TreeServer:
             with contextlib.suppress(RCLError):  # a cancel comes at this moment
                 if not goal.handle.is_cancel_requested:
                     goal.handle.execute()
-            log.info(f"{goal.tree}: begins")
+            self._tell_all("info", f"{goal.tree}: begins")
             goal.run.start()
 
     def _end(self, goal: Goal, ending: Ending) -> None:
@@ -355,7 +358,7 @@ class TreeServer:
     def _ended(self, goal: Goal, outcome: RunOutcome) -> None:
         """A run is over: have its goal answered, and let the next one begin."""
         said = f": {outcome.message}" if outcome.message else ""
-        (log.info if outcome.as_wanted else log.error)(f"{goal.tree}: ends{said}")
+        self._tell_all("info" if outcome.as_wanted else "error", f"{goal.tree}: ends{said}")
         self._last[goal.tree] = outcome
         if outcome.settled:
             self._underway.ends(goal.id)
@@ -369,6 +372,11 @@ class TreeServer:
             self._answered.notify_all()
             begun = self._turns.leave(goal)
         self._begin(begun)
+
+    def _tell_all(self, level: Literal["info", "error"], text: str) -> None:
+        """Log it, and say it on /rosout, where the log's lines do not come."""
+        getattr(log, level)(text)
+        getattr(self._rosout, level)(text)
 
     def _answer(self, goal: Goal, outcome: RunOutcome) -> None:
         handle, canceled = goal.handle, outcome.code == Code.CANCELED

@@ -12,6 +12,8 @@ from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport, TreeInfo
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
+from rcl_interfaces.msg import Log
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from tests.serving.conftest import MOVE, Serve
 from tests.support.processes import Journal, Process
@@ -52,6 +54,20 @@ def test_a_tree_runs_to_its_end_and_tells_what_it_did(
     assert (action.path, action.server, action.attempts) == ("Move / Go", name, 1)
     assert (action.outcome, action.end) == (ActionReport.SUCCEEDED, ActionReport.END_SUCCEEDED)
     assert action.place.startswith(str(folder / "move.yaml"))
+
+
+def test_a_run_is_told_on_rosout(serve_trees: Serve, client: TreeClient, space: str) -> None:
+    heard: list[Log] = []
+    latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    client.node.create_subscription(Log, "/rosout", heard.append, latched)
+    serve_trees()
+    name = f"{space[1:]}.bt_actions_serve"
+
+    def told() -> list[str]:
+        return [each.msg for each in heard if each.name == name]
+
+    client.result(client.send("empty"))
+    client.until(lambda: told()[-2:] == ["empty: begins", "empty: ends"], "it is told")
 
 
 def test_feedback_names_what_runs_and_counts_what_has_ended(

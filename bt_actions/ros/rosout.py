@@ -1,0 +1,64 @@
+"""What is said of runs on `/rosout`, in the name of their node; nothing of it is printed.
+
+rclpy's own loggers would print it as well, and hold up the process where nobody reads (log.py).
+"""
+
+from __future__ import annotations
+
+import contextlib
+
+from rcl_interfaces.msg import Log
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from bt_actions.plain_text import clean_lines
+
+__all__ = ["Rosout"]
+
+INFO, ERROR = 20, 40
+LINGER = 0.5
+"""Seconds, at most, for the last line to be acknowledged by those who listen."""
+
+
+class Rosout:
+    """Publishes on `/rosout` for one node, on any thread; never raises."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._name = node.get_logger().name
+        self._publisher = node.create_publisher(
+            Log,
+            "/rosout",
+            QoSProfile(  # rosout's own
+                depth=1000,
+                reliability=ReliabilityPolicy.RELIABLE,
+                durability=DurabilityPolicy.TRANSIENT_LOCAL,
+                lifespan=Duration(seconds=10),
+            ),
+        )
+
+    def info(self, text: str) -> None:
+        """Say something worth knowing."""
+        self._say(INFO, text)
+
+    def error(self, text: str) -> None:
+        """Say something that needs attention."""
+        self._say(ERROR, text)
+
+    def _say(self, level: int, text: str) -> None:
+        with contextlib.suppress(Exception):  # its node is gone, say: the log has it as well
+            stamp = self._node.get_clock().now().to_msg()
+            said = clean_lines(text)
+            self._publisher.publish(Log(stamp=stamp, level=level, name=self._name, msg=said))
+
+    def flush(self) -> None:
+        """Wait until those in sight have what was said, but not for long."""
+        with contextlib.suppress(Exception):
+            self._publisher.wait_for_all_acked(Duration(seconds=LINGER))
+
+    def close(self) -> None:
+        """Flush, and be gone; before the node is."""
+        self.flush()
+        with contextlib.suppress(Exception):
+            self._node.destroy_publisher(self._publisher)
