@@ -25,6 +25,7 @@ __all__ = [
     "convert",
     "inputs_of",
     "parse_input",
+    "parse_text",
     "refuse_infinite",
 ]
 
@@ -99,16 +100,22 @@ def parse_input(text: str, type_name: str) -> object:
         return convert(text, type_name)
     if names_file(text):
         return convert(read_data(Path(text[1:]), pipes=True), type_name)
+    value = parse_text(text)
+    if value is None and isinstance(kind, Message):
+        value = {}
+    return convert(value, type_name)
+
+
+def parse_text(text: str) -> object:
+    """What a text says in YAML, as plain data. Raises ValueError with a readable text."""
     source = Source("value", text)
     node = compose(source)
     if source.findings:
         raise ValueError(f"{text!r}: {source.findings[0].message}")
     value = _plain(node) if node is not None else None
-    if value is None and isinstance(kind, Message):
-        value = {}
     refuse_large(value)
     refuse_infinite(value)
-    return convert(value, type_name)
+    return value
 
 
 def refuse_infinite(value: object) -> None:

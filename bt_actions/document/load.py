@@ -33,6 +33,7 @@ __all__ = [
     "Tree",
     "check_file",
     "check_source",
+    "given_inputs",
     "load_tree",
     "open_tree",
     "tree_inputs",
@@ -178,6 +179,15 @@ def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
     """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
     _, document = _open(path, types=False)
     return inputs_of(document)
+
+
+def given_inputs(root: Behaviour) -> dict[str, tuple[TreeInput, object]]:
+    """The inputs of a loaded tree that was not run yet, with the values that it was given."""
+    loaded = getattr(root, LOADED, None)
+    if not isinstance(loaded, Loaded):
+        return {}
+    declared = inputs_of(loaded.document)
+    return {name: (each, loaded.scope.read(name)) for name, each in declared.items()}
 
 
 def tree_name(root: Behaviour) -> str:

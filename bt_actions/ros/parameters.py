@@ -1,4 +1,5 @@
-"""The ROS parameters that `--ros-args` give to a node, before there is one.
+"""A run's inputs as ROS parameters: those that `--ros-args` give before there is a node, and those
+that the node then shows.
 
 rcl reads the words: whatever it takes, finds in a file for this node, or refuses is its own to say.
 """
@@ -8,14 +9,19 @@ from __future__ import annotations
 import ast
 import os
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from bt_actions.ros import participant
+from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Scalar, describe
+from bt_actions.ros.messages import to_plain
 
-__all__ = ["parameters_in"]
+__all__ = ["declare_input", "parameters_in"]
 
 _OF_EVERY_NODE = frozenset({"use_sim_time", "start_type_description_service"})
 
@@ -56,3 +62,79 @@ def parameters_in(words: Sequence[str], namespace: str = "", name: str = "") -> 
         for name, parameter in found.items()
         if name not in _OF_EVERY_NODE and not name.startswith("qos_overrides.")
     }
+
+
+def declare_input(node: Node, name: str, kind: FieldType, value: object, description: str) -> bool:
+    """Show the value of an input as a read-only parameter of the node; of a message, one a field.
+
+    Arrays of messages, and integers beyond int64, are texts, in YAML. False where the node has a
+    parameter of that name already: then nothing is shown.
+    """
+    shown = list(_shown(name, kind, to_plain(value)))
+    if any(node.has_parameter(each) for each, *_ in shown):
+        return False
+    for each, its_kind, its_type, its_value in shown:
+        node.declare_parameter(each, its_type, ignore_override=True)
+        node.set_parameters([Parameter(each, its_type, its_value)])  # so a list may be empty
+        node.set_descriptor(each, _descriptor(its_kind, its_type, description))
+    return True
+
+
+_Shown = tuple[str, FieldType, Parameter.Type, Any]
+
+
+def _shown(name: str, kind: FieldType, value: Any) -> Iterator[_Shown]:
+    """The parameters that an input is: names, types as a tree and as ROS has them, values."""
+    if isinstance(kind, Message):
+        for field, its_kind in describe(kind.cls).items():
+            yield from _shown(f"{name}.{field}", its_kind, value[field])
+        return
+    its_type = _type(kind, value)
+    if its_type is Parameter.Type.STRING and not isinstance(value, str):
+        value = _as_yaml(value)
+    yield name, kind, its_type, value
+
+
+def _type(kind: FieldType, value: Any) -> Parameter.Type:
+    if isinstance(kind, Listing) and isinstance(kind.item, Scalar):
+        single = _type(kind.item, 0)
+        if all(_type(kind.item, item) is single for item in value):
+            return Parameter.Type[f"{single.name}_ARRAY"]
+    if not isinstance(kind, Scalar):
+        return Parameter.Type.STRING
+    if kind.name in FLOATS:
+        return Parameter.Type.DOUBLE
+    if kind.name in INTEGERS:
+        return Parameter.Type.INTEGER if value <= _MOST else Parameter.Type.STRING
+    return Parameter.Type.BOOL if kind.name == "bool" else Parameter.Type.STRING
+
+
+def _as_yaml(value: object) -> str:
+    import yaml
+
+    text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=float("inf"))
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
+def _descriptor(kind: FieldType, its_type: Parameter.Type, description: str) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        type=its_type.value,
+        description=description,
+        additional_constraints=f"{kind}; fixed while the tree runs",
+        read_only=True,
+    )
+    item = kind.item if isinstance(kind, Listing) else kind
+    if isinstance(item, Scalar) and its_type is not Parameter.Type.STRING:
+        if item.name in INTEGERS:
+            least, most = INTEGERS[item.name]
+            descriptor.integer_range = [IntegerRange(from_value=least, to_value=min(most, _MOST))]
+        elif item.name == "float32":
+            limit = FLOATS[item.name]
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=-limit, to_value=limit)
+            ]
+    return descriptor
+
+
+_MOST = INTEGERS["int64"][1]
+"""The greatest integer that a parameter holds."""

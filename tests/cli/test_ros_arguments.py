@@ -24,6 +24,13 @@ inputs:
   at: geometry_msgs/msg/Point
 root: {check: $far > 0.0 and $many > 0 and len($names) > 0 and $on and $at.x > 0.0}
 """
+FIELDS = """\
+tree: t
+inputs:
+  at: {type: geometry_msgs/msg/Pose, default: {position: {x: 1.0}, orientation: {w: 0.5}}}
+  area: geometry_msgs/msg/Polygon
+root: {check: $at.position.x > 0.0 and len($area.points) > 0}
+"""
 FILE = """\
 /**:
   ros__parameters:
@@ -59,6 +66,20 @@ def test_parameters_become_what_the_inputs_are(tree: Path) -> None:
     assert isinstance(inputs["far"], float)
     assert (inputs["on"], inputs["at"].x) == (True, 1.5)
     assert load_tree(tree, inputs).name
+
+
+def test_a_field_of_an_input_is_a_parameter_and_the_others_are_those_of_the_default(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text(FIELDS)
+    given = {"at.position.y": 2, "area.points": "[{x: 1.5}]"}
+    inputs: dict[str, Any] = as_inputs(given, tree_inputs(path), "t")
+    assert (inputs["at"].position.x, inputs["at"].position.y) == (1.0, 2.0)
+    assert inputs["at"].orientation.w == 0.5
+    assert [point.x for point in inputs["area"].points] == [1.5]
+    with pytest.raises(BadInput, match=r"the parameter 'on\.y' is no input of the tree 't'"):
+        as_inputs({"on.y": 2}, tree_inputs(path), "t")
 
 
 @pytest.mark.parametrize(
