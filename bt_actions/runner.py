@@ -81,6 +81,8 @@ class TreeRunner:
         executor: "multi" (the default), "single", or an executor; one without nodes is spun here.
         heartbeat: seconds after which the tree is ticked though nothing has happened.
         namespace: of the node that is made here.
+        name: of that node; one that no other has where it is left out.
+        context: for that node; it is shut down with it.
 
     Use it as a context manager, or call `shutdown` in the end. Not reentrant, but may run again:
     the tree is set up once. It works in a callback of anybody else's executor.
@@ -94,6 +96,8 @@ class TreeRunner:
         executor: Any = None,
         heartbeat: float = 0.1,
         namespace: str = "",
+        name: str = "",
+        context: Any = None,
     ) -> None:
         from bt_actions.ros.spinning import Spinner
 
@@ -127,7 +131,9 @@ class TreeRunner:
         self._pid = os.getpid()
         self._tickets: set[Ticket] = set()
         self._patience = Patience(_warn)  # on its behalf the ticks of ours begin goals
-        self._spinner = Spinner(node, executor, namespace=namespace, died=self._spin_died)
+        self._spinner = Spinner(
+            node, executor, name=name, namespace=namespace, context=context, died=self._spin_died
+        )
         self._visitor = ChangeVisitor(self._set_up_rest, self._spinner.taken_away)
         self._traffic = _traffic_of(self._spinner.node)
         self._traffic.observe(self._note)

@@ -159,6 +159,15 @@ def namespace(text: str) -> str:
     return f"/{name}" if name else ""
 
 
+def node_name(text: str) -> str:
+    """Read the name of a node."""
+    if not re.fullmatch(r"[A-Za-z_]\w{0,99}", text, flags=re.ASCII):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no name of a node: letters, digits and _, at most 100, no digit first"
+        )
+    return text
+
+
 HIGHEST_DOMAIN = 232
 
 

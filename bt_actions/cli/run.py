@@ -16,8 +16,11 @@ from bt_actions.cli.common import (
     load,
     metres,
     namespace,
+    no_ros,
+    node_name,
     seconds,
     speed,
+    starting_ros,
 )
 from bt_actions.cli.results import keep_results_apart
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
     from bt_actions.cli.parser import Subparsers
+    from bt_actions.ros.naming import Outlook
     from bt_actions.simulation.faults import Fault
 
 _EPILOG = """\
@@ -71,6 +75,12 @@ def add_parser(subparsers: Subparsers) -> None:
         type=namespace,
         default="",
         help="namespace of the node, and thereby of every relative action name",
+    )
+    parser.add_argument(
+        "--name",
+        metavar="NAME",
+        type=node_name,
+        help="name of the node; bt_actions_ and the tree's name where not given",
     )
     parser.add_argument(
         "--timeout",
@@ -141,18 +151,40 @@ def run(args: argparse.Namespace) -> int:
     given = parameters(args.ros_args, args.namespace)
     root = load(args.tree, args.set, python=args.python, parameters=given)
 
-    from bt_actions.cli.session import Session, SimulationWish
+    outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name
+    try:
+        from bt_actions.cli.session import Session, SimulationWish
+        from bt_actions.document import tree_name
+        from bt_actions.ros.naming import node_name as node_name_of
 
-    if args.cleanup_first and not args.sim:  # which is private
-        code = _clean_up(_actions(root), args.namespace)
-        if code is not Exit.SUCCESS:
-            return code
+        if args.cleanup_first and not args.sim:  # which is private
+            code = _clean_up(_actions(root), args.namespace)
+            if code is not Exit.SUCCESS:
+                outlook.close()
+                return code
+    except BaseException:
+        outlook.close()
+        raise
     wish = SimulationWish(args.speed or 1.0, faults, args.seed) if args.sim else None
     with Session(
-        root, executor=args.executor, namespace=args.namespace, simulation=wish
+        root,
+        executor=args.executor,
+        namespace=args.namespace,
+        simulation=wish,
+        name=args.name or node_name_of(tree_name(root)),
+        outlook=outlook,
     ) as session:
         view = session.view(as_json=args.json, plain=args.plain, verbose=args.verbose)
         return session.run(view, timeout=args.timeout, part_at=args.check_part)
+
+
+def _outlook() -> Outlook:
+    try:
+        from bt_actions.ros.naming import Outlook
+    except ImportError as error:
+        raise no_ros(error) from error
+    with starting_ros():
+        return Outlook()
 
 
 def _actions(root: Behaviour) -> set[str]:

@@ -21,6 +21,7 @@ from bt_actions.cli.common import BadInput, Exit, no_ros, note, starting_ros
 from bt_actions.cli.drive import Drive, Ended, leave
 from bt_actions.cli.patient_file import gap_text
 from bt_actions.cli.patient_output import PatientOutput
+from bt_actions.cli.presence import Presence
 from bt_actions.cli.results import results
 from bt_actions.cli.signals import Signals
 from bt_actions.cli.simulated import Wanted, remark, wanted
@@ -30,6 +31,7 @@ from bt_actions.run_report import Report
 
 if TYPE_CHECKING:
     from bt_actions.events import Event
+    from bt_actions.ros.naming import Outlook
     from bt_actions.runner import GoalReport, TreeRunner
     from bt_actions.simulation.faults import Fault
     from bt_actions.simulation.world import Part
@@ -57,8 +59,12 @@ class Session:
         executor: str = "multi",
         namespace: str = "",
         simulation: SimulationWish | None = None,
+        name: str = "",
+        outlook: Outlook | None = None,
     ) -> None:
-        """Raises BadInput when ROS is not there or cannot start, or a fault fits no server."""
+        """`outlook` is where the node is made, called `name`; it is the session's to close.
+
+        Raises BadInput when ROS is not there or cannot start, or a fault fits no server."""
         try:
             import bt_actions.ros.spinning  # noqa: F401 - the runner imports it late
         except ImportError as error:
@@ -67,7 +73,18 @@ class Session:
 
         self.report = Report(root)
         with starting_ros():
-            self._runner = Runner(root, executor=executor, namespace=namespace)
+            self._runner = Runner(
+                root,
+                executor=executor,
+                namespace=namespace,
+                name=name,
+                context=outlook and outlook.context,
+            )
+        if outlook is not None:
+            outlook.hand_over()
+        self._error: BaseException | None = None
+        self._presence = Presence(self._runner, root)
+        self._runner.on_close(lambda: self._presence.close(error=self._error))
         self._output = PatientOutput()
         self._simulator = None
         if simulation is not None:
@@ -123,6 +140,7 @@ class Session:
                 ended = drive.run()
                 code = drive.finish(self._close(ended, part_at))
                 if ended.abandoned:
+                    self._presence.close(left=True)
                     leave(code)
                 signals.settle(code)
         finally:
@@ -153,6 +171,9 @@ class Session:
         """Run the tree, drain its goals, and close servers, node and context."""
         try:
             return self._runner.run()
+        except BaseException as error:
+            self._error = error
+            raise
         finally:
             self._runner.shutdown()
 

@@ -29,6 +29,7 @@ from rclpy.task import Task
 from bt_actions.ros import participant
 from bt_actions.ros.executor import OnceExecutor
 from bt_actions.ros.log import log
+from bt_actions.ros.naming import named_node
 from bt_actions.ros.traffic import Traffic
 
 THREADS = 2
@@ -50,7 +51,8 @@ class Spinner:
     - An executor that holds no node yet, or none: spun here, on a thread of its own.
     - An executor that holds nodes already is somebody's, who spins it; it is never spun here.
 
-    `executor` may be ``"multi"`` (the default) or ``"single"``. `died` is called on the spin
+    `executor` may be ``"multi"`` (the default) or ``"single"``. `context`, for a node that is made
+    here, is shut down here as well. `died` is called on the spin
     thread when it ends by an error.
     """
 
@@ -61,6 +63,7 @@ class Spinner:
         *,
         name: str = "",
         namespace: str = "",
+        context: Context | None = None,
         died: Callable[[BaseException], None] = lambda error: None,
     ) -> None:
         self._died = died
@@ -82,13 +85,16 @@ class Spinner:
                 raise ValueError(f"node {name} is in another executor than the one given")
             given = node.executor
         self.spins = given is None or not given.get_nodes()
-        context = node.context if node is not None else given.context if given else None
+        if context is not None:
+            self._context = context
+        else:
+            context = node.context if node is not None else given.context if given else None
         if context is None:
             context = self._context = Context()
             context.init()
         unique = name or f"bt_actions_{os.getpid()}_{next(_number)}"
         try:
-            self.node = node or Node(unique, context=context, namespace=namespace)
+            self.node = node or named_node(unique, context, namespace)
         except Exception:
             if self._context is not None:
                 self._context.shutdown()

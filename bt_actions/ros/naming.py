@@ -1,0 +1,90 @@
+"""The name of a run's node: made valid, and not one that another node is seen to have already.
+
+A node cannot be renamed, and what a participant sees of the graph comes bit by bit. So the context
+is opened before its node is needed, and what it has seen by then counts; nobody waits for more.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import unicodedata
+
+from rclpy.context import Context
+from rclpy.node import Node
+
+from bt_actions.ros import participant
+from bt_actions.ros.log import log
+
+__all__ = ["LONGEST", "Outlook", "named_node", "node_name"]
+
+LONGEST = 100
+"""Characters of a node's name, which the names of its services begin with."""
+
+
+def node_name(tree: str) -> str:
+    """`bt_actions_` and the name of a tree, as a node may be called.
+
+    Letters with marks lose them; others become ``u`` and their code point, as in ``u90e8``.
+    """
+    plain = unicodedata.normalize("NFKD", tree)
+    letters = (_letter(char) for char in plain if not unicodedata.combining(char))
+    return f"bt_actions_{''.join(letters)}"[:LONGEST]
+
+
+def _letter(char: str) -> str:
+    if re.match(r"\w", char, re.ASCII):
+        return char
+    return f"u{ord(char):x}" if char.isalnum() else "_"
+
+
+class Outlook:
+    """A context of our own that looks at the graph before it has the node that it is for."""
+
+    def __init__(self) -> None:
+        """Raises what rclpy raises where ROS cannot start."""
+        self.context = Context()
+        self.context.init()
+        try:
+            self._node = Node(
+                f"bt_actions_{os.getpid()}_outlook",
+                context=self.context,
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+        except BaseException:
+            self.context.try_shutdown()
+            raise
+
+    def hand_over(self) -> None:
+        """Leave the context to the node that was made in it meanwhile."""
+        self._node.destroy_node()
+
+    def close(self) -> None:
+        """Take it away, where it was not handed over."""
+        participant.close(self._node, self.context)
+
+
+def named_node(name: str, context: Context, namespace: str) -> Node:
+    """A new node; its name has a number behind it where another node is seen to have it already.
+
+    One that was given by ``__node:=`` stands as it is. There is a warning in both cases.
+    """
+    wanted = name
+    node = Node(name, context=context, namespace=namespace)
+    for number in itertools.count(2):
+        mine = node.get_name(), node.get_namespace()
+        if node.get_node_names_and_namespaces().count(mine) < 2:
+            break
+        taken = f"another node is called {node.get_fully_qualified_name()}"
+        if mine[0] != name:
+            log.warning(f"{taken}, too, as __node:= has it: others may reach one or the other")
+            break
+        node.destroy_node()
+        ending = f"_{number}"
+        name = wanted[: LONGEST - len(ending)] + ending
+        node = Node(name, context=context, namespace=namespace)
+        log.warning(f"{taken}: this one is {node.get_fully_qualified_name()}; --name gives another")
+    return node
