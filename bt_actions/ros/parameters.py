@@ -17,6 +17,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from bt_actions.plain_text import as_json
 from bt_actions.ros import participant
 from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Scalar, describe
 from bt_actions.ros.messages import to_plain
@@ -91,7 +92,7 @@ def _shown(name: str, kind: FieldType, value: Any) -> Iterator[_Shown]:
         return
     its_type = _type(kind, value)
     if its_type is Parameter.Type.STRING and not isinstance(value, str):
-        value = _as_yaml(value)
+        value = as_json(value)  # which is YAML, and quick for many points
     yield name, kind, its_type, value
 
 
@@ -107,13 +108,6 @@ def _type(kind: FieldType, value: Any) -> Parameter.Type:
     if kind.name in INTEGERS:
         return Parameter.Type.INTEGER if value <= _MOST else Parameter.Type.STRING
     return Parameter.Type.BOOL if kind.name == "bool" else Parameter.Type.STRING
-
-
-def _as_yaml(value: object) -> str:
-    import yaml
-
-    text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=float("inf"))
-    return text.removesuffix("\n").removesuffix("\n...")
 
 
 def _descriptor(kind: FieldType, its_type: Parameter.Type, description: str) -> ParameterDescriptor:

@@ -170,7 +170,7 @@ def test_inputs_are_parameters_that_nobody_can_change(
         "at.x": 1.5,
         "at.y": 3.0,
         "at.z": 0.0,
-        "area.points": "[{x: 2.0, y: 0.0, z: 0.0}]",
+        "area.points": '[{"x": 2.0, "y": 0.0, "z": 0.0}]',
     }
     assert isinstance(shown["distance"], float)
     assert any("the input 'use_sim_time' is shown as no parameter" in line for line in run.errors)
