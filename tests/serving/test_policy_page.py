@@ -15,6 +15,7 @@ from tests.support.tree_client import TreeClient
 
 PAGE = (Path(__file__).parents[2] / "docs" / "security.md").read_text()
 NODE = "bt_actions_serve"
+OURS = ("bt_actions_interfaces", "lifecycle_msgs", "diagnostic_msgs")
 ACTION = ("services send_goal", "services cancel_goal", "services get_result",
           "topics feedback", "topics status")  # fmt: skip
 
@@ -58,7 +59,7 @@ def test_the_policy_names_what_is_offered(
     server.remove(calls)  # the robot's
     client.until(lambda: named(server) <= offered(client, space).keys(), "all that is named")
     there = offered(client, space)
-    ours = {each for each, kind in there.items() if kind.startswith("bt_actions_interfaces")}
+    ours = {each for each, kind in there.items() if kind.startswith(OURS)}
     assert ours <= named(server)
     for each in clients:
         assert named(each) <= there.keys()
