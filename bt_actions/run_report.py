@@ -339,20 +339,16 @@ def place_of(node: Behaviour) -> str:
 
 def table(report: Report, width: int | None = None) -> list[str]:
     """Return the table of actions as lines; names are cut so that lines fit into `width`."""
-    rows = report.rows
-    if not rows:
-        return []
-    head = ("action", "server", "attempts", "outcome", "duration")
     body = [
-        (
-            row.name,
-            row.server,
-            row.tries,
-            row.verdict,
-            f"{report.seconds(row):.2f} s",
-        )
-        for row in rows
+        (row.name, row.server, row.tries, row.verdict, f"{report.seconds(row):.2f} s")
+        for row in report.rows
     ]
+    return columns(body, width) if body else []
+
+
+def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
+    """Return name, server, tries, verdict and duration of actions as lines, under a head."""
+    head = ("action", "server", "attempts", "outcome", "duration")
     widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
     if width is not None:
         for column in (1, 0):  # the server first: it is often a long name

@@ -41,6 +41,8 @@ class RunTree(ActionBehaviour):
             that returns them. NaN, infinities, and integers beyond 64 bits make the goal an
             invalid one.
         server: the name of the server's action.
+        goal_name: what the server calls the goal where it rejects it; the leaf's name where not
+            given.
         timeout: as for any action; `cancel` is 15 s where nothing else is said.
         expect, save: as for any action, with ``outputs`` (what the tree gave its outputs, a
             mapping) beside ``result``: ``save={"at": "outputs.at"}``.
@@ -55,6 +57,7 @@ class RunTree(ActionBehaviour):
         inputs: Mapping[str, Any] | Callable[[], object] | None = None,
         *,
         server: str = "run_tree",
+        goal_name: str = "",
         timeout: Timeouts | float | None = None,
         expect: Callable[[Any], bool] | str | None = None,
         save: Mapping[str, Place] | None = None,
@@ -63,7 +66,7 @@ class RunTree(ActionBehaviour):
         def goal() -> dict[str, object]:
             which = tree() if callable(tree) else resolve(tree)
             values = inputs() if callable(inputs) else resolve(inputs or {})
-            return {"tree": which, "inputs": inputs_text(values), "goal_name": name}
+            return {"tree": which, "inputs": inputs_text(values), "goal_name": goal_name or name}
 
         if not isinstance(timeout, Timeouts):
             timeout = Timeouts(result=timeout, cancel=CANCEL)

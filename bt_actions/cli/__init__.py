@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from bt_actions.cli import (
+    call,
     check,
     cleanup,
     completion,
@@ -36,6 +37,7 @@ COMMANDS: dict[str, ModuleType] = {
     "run": run,
     "send": send,
     "serve": serve,
+    "call": call,
     "sim": sim,
     "cleanup": cleanup,
     "check": check,

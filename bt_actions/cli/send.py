@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
     from bt_actions.cli.words import Closing
     from bt_actions.events import Event
-    from bt_actions.run_report import Report
+    from bt_actions.run_report import Report, Row
 
 _EPILOG = """\
 examples:
@@ -139,10 +139,8 @@ class GoalView:
 
     def frame(self) -> None:
         """Show the latest feedback."""
-        from bt_actions.cli.words import feedback_text
-
         for row in self._report.live if self._feedback else ():
-            text = feedback_text(row)
+            text = self.feedback_text(row)
             if text and text != self._last_feedback:
                 self._last_feedback = text
                 self._show_feedback(text)
@@ -153,12 +151,11 @@ class GoalView:
 
     def finish(self, closing: Closing) -> None:
         """Write the result and the outcome."""
-        from bt_actions.cli.words import CLEAN_UP, goal_text, result_lines, stood_still
-        from bt_actions.policy import End, Outcome
+        from bt_actions.cli.words import CLEAN_UP, goal_text, stood_still
+        from bt_actions.policy import Outcome
 
-        if self._leaf.end in (End.SUCCEEDED, End.ABORTED):  # only these have a result of their own
-            for line in result_lines(self._leaf.result):
-                self._line(line)
+        for line in self.result_lines():
+            self._line(line)
         for row in self._report.rows:
             if closing.cause and row.outcome is Outcome.CANCELED:
                 row.reason = closing.cause  # here is no tree that could have interrupted it
@@ -171,6 +168,21 @@ class GoalView:
             self._line(CLEAN_UP)
         for line in self._report.unaccounted:
             self._line(f"not accounted for: {line}")
+
+    def feedback_text(self, row: Row) -> str:
+        """Return the latest feedback on one line."""
+        from bt_actions.cli.words import feedback_text
+
+        return feedback_text(row)
+
+    def result_lines(self) -> list[str]:
+        """Return what the goal's result says."""
+        from bt_actions.cli.words import result_lines
+        from bt_actions.policy import End
+
+        if self._leaf.end not in (End.SUCCEEDED, End.ABORTED):
+            return []  # only these have a result of their own
+        return result_lines(self._leaf.result)
 
     def close(self) -> None:
         """Leave the line that feedback was drawn on."""

@@ -12,7 +12,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from bt_actions.simulation.faults import Fault
     from bt_actions.simulation.world import Part
 
+Json = TypeVar("Json", bound=JsonView)
 PART_TOLERANCE = 0.05
 """How far from --check-part the part may lie, in metres: the size of a simulated station."""
 
@@ -110,8 +111,7 @@ class Session:
     def view(self, *, as_json: bool = False, plain: bool = False, verbose: bool = False) -> View:
         """Return the view that suits standard output: lines if `plain`; `verbose` is about them."""
         if as_json:
-            self._output.tell_gaps(_gap_object)
-            return JsonView(self.report, results())
+            return self.json_view(JsonView)
         if sys.stdout.isatty() and not plain:
             from rich.console import Console
 
@@ -121,6 +121,11 @@ class Session:
             if suits(console):
                 return LiveView(self.report, console)
         return LineView(self.report, sys.stdout, verbose=verbose)
+
+    def json_view(self, kind: type[Json]) -> Json:
+        """Return a view for programs, which are told of lines that they were too slow for."""
+        self._output.tell_gaps(_gap_object)
+        return kind(self.report, results())
 
     def run(
         self,

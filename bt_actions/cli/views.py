@@ -257,45 +257,46 @@ class JsonView:
 
     def finish(self, closing: Closing) -> None:
         """Write the last object."""
+        self._write(self._finished(closing))
+
+    def _finished(self, closing: Closing) -> dict[str, object]:
         from bt_actions.ros.messages import to_plain
 
         report = self._report
-        self._write(
-            {
-                "event": "finished",
-                "status": report.status.value,
-                "exit_code": int(closing.exit_code),
-                "cause": closing.cause or None,
-                "error": closing.error or None,
-                "duration": round(report.now - report.started, 3),
-                "outputs": {name: to_plain(value) for name, value in outputs_of(report).items()},
-                "actions": [self._action(row) for row in report.rows],
-                "failures": [
-                    {
-                        "id": self._id(culprit.node),
-                        "path": list(culprit.path),
-                        "attempts": culprit.row.attempt if culprit.row else 0,
-                        "outcome": culprit.row.outcome if culprit.row else None,
-                        "reason": (culprit.row.reason if culprit.row else "") or culprit.message,
-                        "place": culprit.place or None,
-                    }
-                    for culprit in report.culprits()
-                ],
-                "warnings": [
-                    {
-                        "id": self._id(warned.node),
-                        "path": list(warned.path),
-                        "message": warned.message,
-                        "place": warned.place or None,
-                    }
-                    for warned in report.warnings
-                ],
-                "unaccounted": report.unaccounted,
-                "servers_gone": report.servers_gone,
-                "world": closing.verdict or None,
-                "complaint": closing.complaint or None,
-            }
-        )
+        return {
+            "event": "finished",
+            "status": report.status.value,
+            "exit_code": int(closing.exit_code),
+            "cause": closing.cause or None,
+            "error": closing.error or None,
+            "duration": round(report.now - report.started, 3),
+            "outputs": {name: to_plain(value) for name, value in outputs_of(report).items()},
+            "actions": [self._action(row) for row in report.rows],
+            "failures": [
+                {
+                    "id": self._id(culprit.node),
+                    "path": list(culprit.path),
+                    "attempts": culprit.row.attempt if culprit.row else 0,
+                    "outcome": culprit.row.outcome if culprit.row else None,
+                    "reason": (culprit.row.reason if culprit.row else "") or culprit.message,
+                    "place": culprit.place or None,
+                }
+                for culprit in report.culprits()
+            ],
+            "warnings": [
+                {
+                    "id": self._id(warned.node),
+                    "path": list(warned.path),
+                    "message": warned.message,
+                    "place": warned.place or None,
+                }
+                for warned in report.warnings
+            ],
+            "unaccounted": report.unaccounted,
+            "servers_gone": report.servers_gone,
+            "world": closing.verdict or None,
+            "complaint": closing.complaint or None,
+        }
 
     def close(self) -> None:
         """Nothing to give back."""
