@@ -40,10 +40,10 @@ root:
   children:
 """
 ROBOT = """\
-    - action: Move {robot}
-      type: bt_actions_interfaces/action/RunTree
+    - run_tree: Move {robot}
+      tree: move
       server: {robot}/run_tree
-      goal: {{tree: move, inputs: "{{distance: {distance}}}"}}
+      inputs: {{distance: {distance}}}
       timeout: {{server: 20 s, accept: 10 s, result: 60 s, {deadlines}}}
 """
 
