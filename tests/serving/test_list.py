@@ -1,0 +1,51 @@
+"""`bt-actions list`: the trees of a server in another process."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from bt_actions_interfaces.msg import TreeInfo, TreeInput
+
+from bt_actions.cli.list_trees import text_of, tree_data
+from tests.serving.conftest import MAIN, Serve
+from tests.support.processes import Process
+
+
+def test_trees_are_listed_with_inputs_and_what_is_wrong_with_them(
+    serve_trees: Serve, start_program: Callable[..., Process], space: str
+) -> None:
+    serve_trees()
+    process = start_program("-c", MAIN, "list", "--namespace", space, short_lease=True)
+    assert process.wait(30.0) == 0, process
+    assert process.lines[0] == f"{space}/bt_actions_serve"
+    at = process.lines.index("  move  Move, and say where it ended.")
+    assert process.lines[at + 1] == "    distance: float64 [m]"
+    at = process.lines.index("  broken")
+    assert process.lines[at + 1].startswith("    INVALID: ")
+    assert "broken.yaml:2:" in process.lines[at + 1]
+
+    process = start_program("-c", MAIN, "list", "--namespace", space, "--json", short_lease=True)
+    assert process.wait(30.0) == 0, process
+    (trees,) = json.loads(process.lines[0]).values()
+    assert {each["name"]: each["state"] for each in trees} == {
+        "broken": "INVALID", "empty": "OK", "move": "OK",
+    }  # fmt: skip
+
+
+def test_where_no_server_is_in_sight_it_says_what_to_look_for(
+    start_program: Callable[..., Process], space: str
+) -> None:
+    process = start_program("-c", MAIN, "list", "--namespace", space, short_lease=True)
+    assert process.wait(30.0) == 1, process
+    assert "is `bt-actions serve` running" in "\n".join(process.errors)
+
+
+def test_what_a_server_says_cannot_command_the_terminal() -> None:
+    hostile = "\x1b[2J\nx"
+    tree = TreeInfo(
+        name=hostile, description=hostile, inputs=[TreeInput(name=hostile, default_json=hostile)]
+    )
+    text = "".join(text_of({"/s": [tree_data(tree)]}))
+    assert "\x1b" not in text
+    assert "\n" not in text
