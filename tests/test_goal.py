@@ -455,6 +455,18 @@ def test_a_goal_that_ended_before_its_acceptance_was_heard_of_is_asked_for_its_r
 # Rule 5: terminate, and what is drained
 
 
+@pytest.mark.parametrize("canceled", [False, True])
+@pytest.mark.parametrize("result", [SUCCEEDED, ABORTED, CANCELED])
+def test_what_a_result_says_goes_on_makes_the_end_unknown(
+    canceled: bool, result: tuple[int, str]
+) -> None:
+    life = executing(settles=lambda result: False)
+    if canceled:
+        life.on(Event.INTERRUPTED)
+    life.on(Event.RESULT, result)
+    assert (life.goal.state, life.goal.end) == (State.DONE, End.UNKNOWN)
+
+
 def test_interrupted_while_executing_it_is_canceled_whatever_it_ended_with() -> None:
     for result, end in ((SUCCEEDED, End.SUCCEEDED), (ABORTED, End.ABORTED)):
         life = executing()
