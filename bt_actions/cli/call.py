@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from bt_actions.cli.common import BadInput, Exit, namespace, note, seconds
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.send import GoalView
-from bt_actions.cli.values import goal_fields
+from bt_actions.cli.values import goal_fields, nested
 from bt_actions.cli.views import JsonView, QuietView
 from bt_actions.plain_text import clean
 
@@ -33,8 +33,9 @@ examples:
   bt-actions call patrol --server /r2/run_tree --json
 
 `bt-actions list` shows which trees there are. Ctrl-C cancels the run and waits for its end. Exit
-codes are those of `run`: 2 where the server knows no such tree or refuses its inputs, 1 where it is
-busy, 3 where it does not account for every goal of the run.
+codes are those of `run`: 2 where the server knows no such tree or refuses its inputs, 3 where it
+does not account for every goal of the run, and 1 also where it is busy, is not in sight within 5 s,
+or goes away meanwhile: then the next `serve` there cancels what it left.
 """
 _NOT_NOW = ("BUSY", "INACTIVE")
 """Codes of rejections that say nothing against the tree or its inputs."""
@@ -71,7 +72,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "-q", "--quiet", action="store_true", help="show only what went wrong; the exit code tells"
     )
-    add_ros_args(parser)
+    add_ros_args(parser, "; parameters (-p NAME:=VALUE) give inputs their values as of `run`")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -81,9 +82,9 @@ def run(args: argparse.Namespace) -> int:
 
         keep_results_apart()
     goal_name = f"bt-actions call {uuid.uuid4().hex[:12]}"
-    leaf = _leaf(args.tree, args.server, goal_fields(args.set), goal_name)
+    inputs = nested(parameters(args.ros_args, args.namespace)) | goal_fields(args.set)
+    leaf = _leaf(args.tree, args.server, inputs, goal_name)
     rejection = Rejected(leaf, goal_name)
-    parameters(args.ros_args, args.namespace)
 
     from bt_actions.cli.session import Session
 

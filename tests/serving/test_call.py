@@ -19,7 +19,7 @@ def call(start_program: Callable[..., Process], space: str) -> Call:
     """Start `bt-actions call` for the server in the test's namespace."""
 
     def start(*words: str) -> Process:
-        return start_program("-c", MAIN, "call", *words, "--namespace", space, short_lease=True)
+        return start_program("-c", MAIN, "call", "--namespace", space, *words, short_lease=True)
 
     return start
 
@@ -29,11 +29,11 @@ def test_a_call_is_told_as_a_run_is(
 ) -> None:
     serve("2:abort=0.1")
     serve_trees()
-    process = call("move", "--set", "distance=0.5")
+    process = call("move", "--set", "distance=2.5")
     assert process.wait(60.0) == 0, process
     table = next(at for at, line in enumerate(process.lines) if line.startswith("action "))
     assert process.lines[table + 1].split()[:4] == ["Go", name, "1", "SUCCEEDED"]
-    assert process.lines[table + 2] == "at: 0.5"
+    assert process.lines[table + 2] == "at: 2.5"
     assert any(line.startswith("  Move / Go: executing") for line in process.lines[:table])
 
     process = call("move", "--set", "distance=0.5", "--json")
@@ -49,6 +49,7 @@ def test_a_call_is_told_as_a_run_is(
     [
         (["mov"], "UNKNOWN_TREE: there is no tree 'mov' here; did you mean 'move'?"),
         (["move", "--json"], "INPUTS: "),
+        (["move", "--ros-args", "-p", "distnce:=1.0"], "did you mean 'distance'?"),
     ],
 )
 def test_what_the_server_refuses_is_bad_input_and_it_says_why(
