@@ -42,9 +42,10 @@ ENDS = {
 
 
 class Surroundings:
-    """What the examples meet: three robots, a light to switch, a door that tells it is open."""
+    """What the examples meet: three robots, a light, a door that tells it is open, other trees."""
 
     def __init__(self, context: Any) -> None:
+        from bt_actions_interfaces.action import RunTree
         from geometry_msgs.msg import Polygon, PoseStamped
         from rclpy.node import Node
         from sensor_msgs.msg import BatteryState
@@ -53,11 +54,15 @@ class Surroundings:
         from trajectory_msgs.msg import JointTrajectory
 
         from bt_actions.ros.topics import qos_profile
-        from bt_actions.simulation import Simulation
+        from bt_actions.simulation import Script, ScriptedServer, Simulation
 
         self.node = Node("examples", context=context, namespace=f"/examples{id(self)}")
         robots = ("", "cell/left", "cell/right")
         self.robots = Simulation(self.node, namespaces=robots, speed=30.0)
+        answer = RunTree.Result(settled=True, outputs='{"at": 2.0}')
+        self.trees = ScriptedServer(
+            self.node, RunTree, "/r1/run_tree", Script(result=lambda _: answer)
+        )
         self.heard: dict[str, list[Any]] = defaultdict(list)
         self.node.create_service(SetBool, "light", self._switch)
         for name, kind, qos in (
@@ -95,6 +100,7 @@ class Surroundings:
         return status
 
     def close(self) -> None:
+        self.trees.close()
         self.robots.close()
         self.node.destroy_node()
 

@@ -100,11 +100,13 @@ def blackboard(monkeypatch: pytest.MonkeyPatch) -> Watched:
 
 @pytest.fixture
 def graph(node: Any, name: str, serve: Callable[..., Any]) -> Iterator[dict[str, str]]:
-    """An action, a service and a topic with something on it: which name a key wants."""
+    """Actions, a service and a topic with something on it: which name a key wants."""
+    from bt_actions_interfaces.action import RunTree
     from std_msgs.msg import Bool
     from std_srvs.srv import SetBool
 
     from bt_actions.ros.topics import qos_profile
+    from bt_actions.simulation import Script, ScriptedServer
 
     serve()
     service = node.create_service(
@@ -112,7 +114,17 @@ def graph(node: Any, name: str, serve: Callable[..., Any]) -> Iterator[dict[str,
     )
     publisher = node.create_publisher(Bool, f"{name}/door", qos_profile("latched"))
     publisher.publish(Bool(data=True))
-    yield {"action": name, "service": f"{name}/switch", "wait_for_message": f"{name}/door"}
+    answer = RunTree.Result(settled=True, outputs='{"at": 2}')
+    trees = ScriptedServer(
+        node, RunTree, f"{name}/run_tree", Script(duration=0.0, result=lambda _: answer)
+    )
+    yield {
+        "action": name,
+        "run_tree": f"{name}/run_tree",
+        "service": f"{name}/switch",
+        "wait_for_message": f"{name}/door",
+    }
+    trees.close()
     node.destroy_service(service)
     node.destroy_publisher(publisher)
 
