@@ -96,7 +96,9 @@ class Goal:
         self.timeouts = timeouts
         self.resources = resources or frozenset({server})
         self.busy = busy
-        self._settles = settles  # whether a result says that nothing it began still runs
+        self._settles = (
+            settles  # whether a result, None: a lost one, says that nothing it began still runs
+        )
         self.state = State.QUEUED
         self.outcome: Outcome | None = None
         self.end = End.NEVER_STARTED
@@ -601,9 +603,11 @@ class Goal:
 
     def _finished_by_status(self) -> State:
         if self._seen_status is not None:
-            self.end = ENDS[self._seen_status]
+            self.end = ended = ENDS[self._seen_status]
+            if ended is End.ABORTED and not self._settles(None):
+                self.end = End.UNKNOWN  # only its result could have told what goes on below it
             if self.outcome is None:
-                self.reason += f"; it ended as {self.end}, and its result was lost"
+                self.reason += f"; it ended as {ended}, and its result was lost"
         self._settle_as_planned()
         return State.DONE
 

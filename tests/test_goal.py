@@ -1018,6 +1018,19 @@ def test_where_the_result_is_lost_the_status_topic_says_how_it_ended() -> None:
     life.ended(Outcome.SERVER_LOST, End.ABORTED)
 
 
+@pytest.mark.parametrize(
+    ("status", "end"), [(STATUS_ABORTED, End.UNKNOWN), (STATUS_CANCELED, End.CANCELED)]
+)
+def test_where_a_lost_result_alone_could_have_said_that_nothing_goes_on_an_abort_does_not(
+    status: int, end: End
+) -> None:
+    life = executing(Timeouts(result=None), settles=lambda result: result is not None)
+    life.on(Event.STATUS, status)
+    for _ in range(RESULT_QUESTIONS + 1):
+        life.pass_time(ASK_AGAIN)
+    assert (life.goal.state, life.goal.end) == (State.DONE, end)
+
+
 def test_a_goal_that_has_ended_is_not_stalled_because_it_is_silent() -> None:
     life = executing(Timeouts(result=30.0, feedback=2.0))
     life.on(Event.STATUS, STATUS_SUCCEEDED)

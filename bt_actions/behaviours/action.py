@@ -342,7 +342,8 @@ class ActionBehaviour(Behaviour):
     def settles(self, result: Any) -> bool:
         """Whether a result says that nothing the goal began still runs; else its end is UNKNOWN.
 
-        Called under the lock of all goals: it looks at the result, and does nothing else.
+        Asked with None where the goal was aborted, and its result was lost. Called under the lock
+        of all goals: it looks at the result, and does nothing else.
         """
         return True
 

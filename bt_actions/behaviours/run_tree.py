@@ -90,7 +90,7 @@ class RunTree(ActionBehaviour):
 
     def settles(self, result: Any) -> bool:
         """Whether the server accounts for every goal of the run."""
-        return bool(result.settled)
+        return result is not None and bool(result.settled)
 
     def explain(self, outcome: Outcome, result: Any) -> str:
         """The run's chain of failures; or where the reason of a rejection is told."""

@@ -97,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it, or the executor dies."""
     options = _options(args, parameters(args.ros_args, args.namespace, name=NAME))
     try:
+        from bt_actions.cli.drive import leave
         from bt_actions.cli.signals import SAME_WISH, Signals
         from bt_actions.ros.spinning import Spinner
     except ImportError as error:
@@ -131,6 +132,10 @@ def run(args: argparse.Namespace) -> int:
         finally:
             if server is not None:
                 _close(server, signals, time.monotonic() + SAME_WISH)
+                if server.stuck:
+                    for each in (*server.unaccounted, *server.stuck):
+                        note(f"bt-actions serve: may still be running: {each}")
+                    leave(Exit.UNKNOWN)
             spinner.stop(lambda: None)
         for each in server.unaccounted:
             note(f"bt-actions serve: may still be running: {each}")

@@ -17,14 +17,13 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from bt_actions.ros import participant
+from bt_actions.ros.topics import DISCOVERS
 from bt_actions.serving.rejections import REJECTIONS
 
 __all__ = ["trees_in_sight", "why_rejected"]
 
 PATIENCE = 5.0
 """Seconds for a server to come in sight, and for one to answer."""
-OTHERS = 1.0
-"""Seconds from the start in which all servers of the network are taken to come in sight."""
 Spin = Callable[[], None]
 
 
@@ -83,10 +82,10 @@ def trees_in_sight(namespace: str = "") -> dict[str, list[TreeInfo] | None]:
                     futures[service] = client, client.call_async(ListTrees.Request())
             return all(future is not None and future.done() for _, future in futures.values())
 
-        while (now := time.monotonic() - begun) < PATIENCE + (OTHERS if futures else 0.0):
-            if now < OTHERS or not futures:
+        while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if futures else 0.0):
+            if now < DISCOVERS or not futures:
                 look()
-            if ask() and futures and now >= OTHERS:
+            if ask() and futures and now >= DISCOVERS:
                 break
             spin()
     return {

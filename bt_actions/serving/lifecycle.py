@@ -19,7 +19,7 @@ from rclpy.node import Node
 
 from bt_actions.plain_text import in_words
 from bt_actions.ros.log import log
-from bt_actions.serving.wire import off_the_executor
+from bt_actions.serving.wire import OffTheExecutor
 
 __all__ = ["Lifecycle"]
 
@@ -32,9 +32,13 @@ class Lifecycle:
     """
 
     def __init__(
-        self, node: Node, steps: Mapping[str, Callable[[], None]], group: CallbackGroup
+        self,
+        node: Node,
+        steps: Mapping[str, Callable[[], None]],
+        group: CallbackGroup,
+        off: OffTheExecutor,
     ) -> None:
-        self._node, self._steps = node, steps
+        self._node, self._steps, self._off = node, steps, off
         self._changes = threading.Lock()
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
@@ -78,9 +82,12 @@ class Lifecycle:
             self._changes.release()
         return how == "success"
 
-    def close(self) -> None:
-        """Be gone, when a change that is under way is over; none follows."""
+    def stop(self) -> None:
+        """Return when a change that is under way is over; none follows."""
         self._changes.acquire()
+
+    def close(self) -> None:
+        """Be gone, after `stop`."""
         for service in self._services:
             self._node.destroy_service(service)
         self._node.destroy_publisher(self._events)
@@ -106,8 +113,7 @@ class Lifecycle:
         self, request: ChangeState.Request, response: ChangeState.Response
     ) -> ChangeState.Response:
         wanted = request.transition.label or int(request.transition.id)
-        response.success = await off_the_executor(
-            self._node.executor,
+        response.success = await self._off(
             lambda work: threading.Thread(target=work, name="bt_actions-change").start(),
             lambda: self.change(wanted),
         )

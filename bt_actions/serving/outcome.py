@@ -7,10 +7,8 @@ they mean.
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bt_actions.plain_text import as_json
 from bt_actions.policy import End, Outcome
 from bt_actions.run_report import Report, Row
 
@@ -98,12 +96,12 @@ def outcome_of(
     succeeded: bool,
     ending: Ending | None = None,
     error: BaseException | None = None,
-    outputs: Mapping[str, object] | None = None,
+    outputs: str = "{}",
     unaccounted: list[str] | None = None,
 ) -> RunOutcome:
     """Put a run that is over into words and numbers.
 
-    `unaccounted` has a line for each goal whose end is not known.
+    `outputs` is JSON; `unaccounted` has a line for each goal whose end is not known.
     """
     code: int = Code.NONE
     lines = []
@@ -122,7 +120,7 @@ def outcome_of(
     return RunOutcome(
         int(code),
         "\n".join(lines)[:_MOST_TEXT],
-        as_json(dict(outputs or {})),
+        outputs,
         tuple(left),
         tuple(_action(report, row) for row in report.rows),
     )

@@ -17,6 +17,8 @@ from rclpy.expand_topic_name import expand_topic_name
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import Event, NodeChanged
+from bt_actions.plain_text import as_json
+from bt_actions.ros.messages import to_plain
 from bt_actions.run_report import Report
 from bt_actions.runner import TreeRunner
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
@@ -148,16 +150,20 @@ class Run:
             with self._lock:
                 self._runner = None
             runner.shutdown()
-        succeeded = status is Status.SUCCESS
-        from bt_actions.ros.messages import to_plain
-
-        outputs = {name: to_plain(value) for name, value in tree_outputs(root).items()}
+        outputs = "{}"
+        if status is Status.SUCCESS:
+            try:
+                outputs = as_json(
+                    {name: to_plain(each) for name, each in tree_outputs(root).items()}
+                )
+            except Exception as raised:  # noqa: BLE001 - a python: node may write anything
+                status, error = Status.INVALID, raised
         return outcome_of(
             report,
-            succeeded=succeeded,
+            succeeded=status is Status.SUCCESS,
             ending=None if status is Status.FAILURE else self.ending,
             error=error,
-            outputs=outputs if succeeded else None,
+            outputs=outputs,
             unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
         )
 

@@ -36,7 +36,7 @@ from bt_actions.serving.requests import Refused
 from bt_actions.serving.run import Run
 from bt_actions.serving.turns import Policy, Turns
 from bt_actions.serving.underway import Underway
-from bt_actions.serving.wire import RunTreeServer, off_the_executor
+from bt_actions.serving.wire import OffTheExecutor, RunTreeServer
 
 __all__ = ["TreeServer"]
 
@@ -90,6 +90,10 @@ class TreeServer:
         self._answered = threading.Condition(self._lock)
         self.unaccounted: list[str] = []
         """A line for each goal of a tree whose end is not known."""
+        self.stuck: list[str] = []
+        """A line for each run that was left, as it did not end after `abandon`."""
+        self._abandoned = threading.Event()
+        self._off_the_executor = OffTheExecutor(node)
         self._turns: Turns[Goal] = Turns(Policy(policy), most)
         self._goals: dict[bytes, Goal] = {}
         self._admitted: dict[int, tuple[Any, Callable[[ServerGoalHandle], Goal]]] = {}
@@ -136,7 +140,7 @@ class TreeServer:
                 "cleaningup": self._forget,
                 "shuttingdown": self._finalize,
             }
-            self.lifecycle = Lifecycle(node, steps, group)
+            self.lifecycle = Lifecycle(node, steps, group, self._off_the_executor)
         else:
             self._configure()
             self._activate()
@@ -148,10 +152,13 @@ class TreeServer:
         thread of the node's executor.
         """
         if self.lifecycle is not None:
-            self.lifecycle.close()
+            self.lifecycle.stop()
         self.halt(Ending.DEACTIVATED)
+        self._off_the_executor.wait(_LAST_WORDS)
         self._action.flush(_LAST_WORDS)
         self._diagnostics.close()
+        if self.lifecycle is not None:
+            self.lifecycle.close()
         self.node.destroy_timer(self._timer)
         for service in self._services:
             self.node.destroy_service(service)
@@ -167,15 +174,21 @@ class TreeServer:
             # What was admitted before comes now, if anybody spins the node, and ends as it comes.
             self._answered.wait_for(lambda: not self._admitted, _LAST_WORDS)
             goals = list(self._goals.values())
+        for goal in goals:  # first of all, so that none begins as another ends
+            goal.run.end(ending)
         for goal in goals:
             self._end(goal, ending)
         for goal in goals:
-            goal.run.join()
+            while not goal.run.join(FASTEST):
+                if self._abandoned.is_set() and not goal.run.join(_LAST_WORDS):
+                    self.stuck.append(f"{goal.tree}: a behaviour does not return from its tick")
+                    break
         with self._answered:
             self._answered.wait_for(lambda: not self._goals, _LAST_WORDS)
 
     def abandon(self) -> None:
         """Have `halt` and `close` wait for no goal any more; `unaccounted` tells which are left."""
+        self._abandoned.set()
         for goal in list(self._goals.values()):
             goal.run.end(Ending.DEACTIVATED, abandon=True)
 
@@ -326,9 +339,7 @@ class TreeServer:
 
     async def _off(self, work: Callable[..., Any], *arguments: Any) -> Any:
         """Do something that takes its time on a thread that is not the executor's."""
-        return await off_the_executor(
-            self.node.executor, self._worker.submit, lambda: work(*arguments)
-        )
+        return await self._off_the_executor(self._worker.submit, lambda: work(*arguments))
 
     # Runs
 

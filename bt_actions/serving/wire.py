@@ -13,9 +13,10 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.action.server import ActionServer, ServerGoalHandle
+from rclpy.node import Node
 from rclpy.task import Future
 
-__all__ = ["RunTreeServer", "off_the_executor"]
+__all__ = ["OffTheExecutor", "RunTreeServer"]
 
 _SENT = 0.25
 """Seconds in which an executor that is spun sends a result, once that is set."""
@@ -79,10 +80,36 @@ class RunTreeServer(ActionServer):  # type: ignore[misc]
             self.request_is_over(request_header_and_message[1].goal)
 
 
-async def off_the_executor(
+class OffTheExecutor:
+    """What callbacks await that is done on other threads; who closes waits until it is answered."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._awaited = 0
+        self._fewer = threading.Condition()
+
+    async def __call__(
+        self, submit: Callable[[Callable[[], None]], Any], work: Callable[[], Any]
+    ) -> Any:
+        """Await what `work` returns or raises; `submit` has it done on another thread."""
+        with self._fewer:
+            self._awaited += 1
+        try:
+            return await _off_the_executor(self._node.executor, submit, work)
+        finally:
+            with self._fewer:
+                self._awaited -= 1
+                self._fewer.notify_all()
+
+    def wait(self, patience: float) -> None:
+        """Wait until nothing is awaited any more, for so many seconds at most."""
+        with self._fewer:
+            self._fewer.wait_for(lambda: not self._awaited, patience)
+
+
+async def _off_the_executor(
     executor: Any, submit: Callable[[Callable[[], None]], Any], work: Callable[[], Any]
 ) -> Any:
-    """Await what `work` returns or raises; `submit` has it done on another thread."""
     future, taken = Future(executor=executor), threading.Event()
 
     def do() -> None:

@@ -17,7 +17,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from tests.serving.conftest import MOVE, Serve
 from tests.support.processes import Journal, Process
-from tests.support.tree_client import TreeClient
+from tests.support.tree_client import PATIENCE, TreeClient
+from tests.support.waiting import until
 
 R = RunTree.Result
 LONG = "{distance: 20.0}"
@@ -348,6 +349,59 @@ def test_a_signal_drains_all_goals_and_answers_before_the_process_ends(
         assert result.settled
     assert server.wait() == 0
     assert journal.ends() == ["canceled"]
+
+
+def test_a_tick_that_does_not_return_does_not_hold_the_process_at_the_second_signal(
+    serve_trees: Serve, client: TreeClient, folder: Path
+) -> None:
+    hangs = "tree: hangs\nroot: {python: tests.support.trees.Hangs}\n"
+    (folder / "hangs.yaml").write_text(hangs)
+    server = serve_trees("--python", "tests")
+    sent = client.send("hangs")
+    client.until(lambda: sent.feedback, "it runs")
+    until(
+        lambda: server.popen.poll() is not None,
+        PATIENCE,
+        meanwhile=lambda: server.send(signal.SIGINT),  # those within a moment count once
+    )
+    assert server.wait() == 3
+    assert "hangs: a behaviour does not return from its tick" in server.errors[-1]
+
+
+ASKED_LAST = """
+import rclpy, sys, threading, time
+from rclpy.executors import MultiThreadedExecutor
+from bt_actions.serving import TreeServer
+rclpy.init()
+node = rclpy.create_node("bt_actions_serve", namespace=sys.argv[2])
+executor = MultiThreadedExecutor()
+executor.add_node(node)
+server = TreeServer(node, trees=sys.argv[1], managed=True)
+threading.Thread(target=executor.spin, daemon=True).start()
+begun, goes_on = threading.Event(), threading.Event()
+entries = server.catalog.entries
+def slow():
+    begun.set()
+    goes_on.wait(10.0)
+    return entries()
+server.catalog.entries = slow
+print("ready: ", flush=True)
+begun.wait()
+threading.Thread(target=lambda: (time.sleep(0.5), goes_on.set())).start()
+server.close()
+spun = threading.Event()
+executor.create_task(spun.set)
+print("spun" if spun.wait(5.0) else "died", flush=True)
+"""
+
+
+def test_who_asks_as_the_server_closes_is_answered_and_the_executor_lives(
+    start_program: Callable[..., Process], client: TreeClient, folder: Path, space: str
+) -> None:
+    server = start_program("-c", ASKED_LAST, str(folder), space, short_lease=True)
+    server.line("ready: ")
+    assert client.call(ListTrees).trees is not None
+    assert server.line() == "spun"
 
 
 OWN_NODE = """

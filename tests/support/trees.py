@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -91,4 +92,12 @@ class LeavesLate(Behaviour):
         self.ticks += 1
         if self.ticks == 3:
             raise SystemExit(1)
+        return Status.RUNNING
+
+
+class Hangs(Behaviour):
+    """Does not return from its tick."""
+
+    def update(self) -> Status:
+        threading.Event().wait()
         return Status.RUNNING
