@@ -86,5 +86,6 @@ def named_node(name: str, context: Context, namespace: str) -> Node:
         ending = f"_{number}"
         name = wanted[: LONGEST - len(ending)] + ending
         node = Node(name, context=context, namespace=namespace)
-        log.warning(f"{taken}: this one is {node.get_fully_qualified_name()}; --name gives another")
+        ours = node.get_fully_qualified_name()
+        log.warning(f"{taken}: this one is {ours}; --ros-args -r __node:=NAME gives another")
     return node

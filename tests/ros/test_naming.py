@@ -42,7 +42,8 @@ def test_a_name_that_is_seen_already_gets_a_number_and_a_warning(
     free = named_node("deliver", outlook.context, "/free")
     assert free.get_name() == "deliver"
     assert said == [
-        f"another node is called /taken/{taken}: this one is /taken/{mine}; --name gives another"
+        f"another node is called /taken/{taken}: this one is /taken/{mine}; "
+        "--ros-args -r __node:=NAME gives another"
         for taken, mine in (("deliver", "deliver_2"), ("deliver_2", "deliver_3"))
     ]
     free.destroy_node()
