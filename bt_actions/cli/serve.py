@@ -131,12 +131,12 @@ def run(args: argparse.Namespace) -> int:
                 pass
         finally:
             if server is not None:
-                _close(server, signals, time.monotonic() + SAME_WISH)
+                _drain(server, signals, time.monotonic() + SAME_WISH)
                 if server.stuck:
                     for each in (*server.unaccounted, *server.stuck):
                         note(f"bt-actions serve: may still be running: {each}")
                     leave(Exit.UNKNOWN)
-            spinner.stop(lambda: None)
+            spinner.stop(server.close if server is not None else lambda: None)
         for each in server.unaccounted:
             note(f"bt-actions serve: may still be running: {each}")
         if errors:
@@ -147,19 +147,19 @@ def run(args: argparse.Namespace) -> int:
     return code
 
 
-def _close(server: TreeServer, signals: Signals, not_before: float) -> None:
+def _drain(server: TreeServer, signals: Signals, not_before: float) -> None:
     """Drain all; one more signal ends the wait, but not one before that moment."""
-    closed = threading.Event()
+    drained = threading.Event()
 
-    def close() -> None:
+    def drain() -> None:
         try:
-            server.close()
+            server.drain()
         finally:
-            closed.set()
+            drained.set()
             signals.poke()
 
-    threading.Thread(target=close, name="bt_actions-close").start()
-    while not closed.is_set():
+    threading.Thread(target=drain, name="bt_actions-drain").start()
+    while not drained.is_set():
         if signals.wait(None)[0] and time.monotonic() > not_before:
             server.abandon()
 

@@ -124,11 +124,13 @@ def run(args: argparse.Namespace) -> int:
                 caught.extend(signals.wait(None)[0])
         finally:
             spinner.stop(simulation.close if simulation else lambda: None)
-    if errors:
-        note(f"bt-actions sim: the executor died: {raised(errors[0])}")
-        return Exit.FAILURE
-    say(simulation.describe())
-    return Exit.SUCCESS
+        if errors:
+            note(f"bt-actions sim: the executor died: {raised(errors[0])}")
+        else:
+            say(simulation.describe())
+        code = Exit.FAILURE if errors else Exit.SUCCESS
+        signals.settle(code)
+    return code
 
 
 def say(text: str) -> None:

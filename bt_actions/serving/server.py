@@ -93,6 +93,7 @@ class TreeServer:
         self.stuck: list[str] = []
         """A line for each run that was left, as it did not end after `abandon`."""
         self._abandoned = threading.Event()
+        self._is_drained = False
         self._off_the_executor = OffTheExecutor(node)
         self._turns: Turns[Goal] = Turns(Policy(policy), most)
         self._goals: dict[bytes, Goal] = {}
@@ -145,17 +146,27 @@ class TreeServer:
             self._configure()
             self._activate()
 
-    def close(self) -> None:
-        """Accept nothing more, end all runs, answer their goals, and be gone.
+    def drain(self) -> None:
+        """Accept nothing more for good, end all runs, and answer their goals.
 
-        Returns when every goal of the trees has ended, or its `timeout.cancel` has passed. Not on a
-        thread of the node's executor.
+        Returns when every goal of the trees has ended, or its `timeout.cancel` has passed. While
+        the node is spun, and not on a thread of its executor.
         """
         if self.lifecycle is not None:
             self.lifecycle.stop()
         self.halt(Ending.DEACTIVATED)
         self._off_the_executor.wait(_LAST_WORDS)
         self._action.flush(_LAST_WORDS)
+        self._is_drained = True
+
+    def close(self) -> None:
+        """Drain, where that has not been done, and be gone.
+
+        Who can, drains, stops the executor, and closes then: rclpy's executors may end with an
+        error where what they wait for is destroyed.
+        """
+        if not self._is_drained:
+            self.drain()
         self._diagnostics.close()
         if self.lifecycle is not None:
             self.lifecycle.close()

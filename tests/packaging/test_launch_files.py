@@ -89,9 +89,8 @@ def test_what_they_start_is_ready_and_ends_at_the_ctrl_c_of_launch(
     for process in processes:
         process.send(signal.SIGINT)
         process.send(signal.SIGINT)
-    # 1 was seen twice, of a server on a loaded machine. Why is not known: what it says is shown.
     ends = [process.wait() for process in processes]
-    assert set(ends) <= {0, 1}, [str(each) for each in processes]
+    assert ends == [0, 0, 0], "\n".join(map(str, processes))
 
 
 def test_the_stand_in_refuses_what_launch_does_not_know(tmp_path: Path) -> None:
