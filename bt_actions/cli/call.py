@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
         keep_results_apart()
     goal_name = f"bt-actions call {uuid.uuid4().hex[:12]}"
-    inputs = nested(parameters(args.ros_args, args.namespace)) | goal_fields(args.set)
+    inputs = nested(parameters(args.ros_args, args.namespace)) | goal_fields(args.set, "--set")
     leaf = _leaf(args.tree, args.server, inputs, goal_name)
     rejection = Rejected(leaf, goal_name)
 

@@ -11,15 +11,15 @@ from collections.abc import Iterable
 from bt_actions.cli.common import BadInput, split
 
 
-def goal_fields(words: Iterable[str]) -> dict[str, object]:
+def goal_fields(words: Iterable[str], what: str = "field") -> dict[str, object]:
     """Read `field=value` words, dotted names as nested fields; of two for one name the last counts.
 
-    Raises BadInput that names the word.
+    Raises BadInput that names the word, which is called `what`.
     """
     values: dict[str, object] = {}
     for word in words:
-        name, text = split(word, "field")
-        values[name] = value(text, f"field {word!r}")
+        name, text = split(word, what)
+        values[name] = value(text, f"{what} {word!r}")
     return nested(values)
 
 

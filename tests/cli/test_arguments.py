@@ -64,6 +64,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["send", "a", "MoveRobot", "distance=far"], "distance"),
         (["send", "a", "MoveRobot", "distance=1e400"], "1e400 does not fit a float64"),
         (["send", "a", "MoveRobot", "distance=[-1e400]"], "-1e400 does not fit a float64"),
+        (["call", "a", "--set", "distance"], "--set 'distance': expected name=value"),
         (["send", "a", "MoveRobot", "distance"], "field 'distance': expected name=value"),
         (["completion", "tcsh"], "invalid choice: 'tcsh'"),
         (["--nonsense"], "--nonsense"),
