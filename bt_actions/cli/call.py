@@ -12,7 +12,7 @@ import uuid
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.cli.common import BadInput, Exit, namespace, note, seconds
+from bt_actions.cli.common import BadInput, Exit, add_set, namespace, note, seconds
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.send import GoalView
 from bt_actions.cli.values import goal_fields, nested
@@ -50,13 +50,7 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("tree", metavar="TREE", help="name of the tree at the server")
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="give an input of the tree a value; repeatable",
-    )
+    add_set(parser)
     parser.add_argument(
         "--server", metavar="NAME", default="run_tree", help="its action; run_tree if not given"
     )

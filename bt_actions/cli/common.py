@@ -192,6 +192,17 @@ def starting_ros() -> Iterator[None]:
         raise BadInput(f"ROS 2 cannot start: {str(error).splitlines()[0]}") from error
 
 
+def add_set(parser: argparse.ArgumentParser) -> None:
+    """Add the option of every command that gives inputs of a tree their values."""
+    parser.add_argument(
+        "--set",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="give an input of the tree a value; repeatable",
+    )
+
+
 def add_no_python(parser: argparse.ArgumentParser) -> None:
     """Add the option of every command that reads a tree with its `python:` nodes."""
     parser.add_argument(

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.common import BadInput, Exit, add_no_python, load, write
+from bt_actions.cli.common import BadInput, Exit, add_no_python, add_set, load, write
 from bt_actions.cli.results import keep_results_apart, results
 
 if TYPE_CHECKING:
@@ -54,13 +54,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help="show so many levels below the root and say how many nodes are left out; "
         "an .html file has all and starts folded to it",
     )
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="give an input of the tree a value; repeatable",
-    )
+    add_set(parser)
     add_no_python(parser)
 
 

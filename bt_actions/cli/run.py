@@ -13,6 +13,7 @@ from bt_actions.cli.common import (
     BadInput,
     Exit,
     add_no_python,
+    add_set,
     load,
     metres,
     namespace,
@@ -56,13 +57,7 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("tree", metavar="TREE", help="path of a tree, or name of an installed one")
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="give an input of the tree a value; repeatable",
-    )
+    add_set(parser)
     parser.add_argument(
         "--executor",
         choices=("multi", "single"),
