@@ -1,6 +1,6 @@
 """A behaviour-tree task orchestrator for ROS 2 actions. These names are the public ones."""
 
-from bt_actions.streams import open_closed_streams as _open_closed_streams
+from bt_actions.utilities.streams import open_closed_streams as _open_closed_streams
 
 _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout's encoding
 

@@ -13,8 +13,8 @@ from typing import Any
 
 from bt_actions.goal import Goal
 from bt_actions.goal_terms import Now
-from bt_actions.plain_text import in_words
 from bt_actions.policy import RETRYABLE, End, Outcome, Retry
+from bt_actions.utilities.plain_text import in_words
 
 
 @dataclass(slots=True)

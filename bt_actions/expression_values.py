@@ -14,8 +14,8 @@ from dataclasses import fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from bt_actions.plain_text import in_words
-from bt_actions.shorten import shorten
+from bt_actions.utilities.plain_text import in_words
+from bt_actions.utilities.shorten import shorten
 
 MAX_BITS = 256
 MAX_ITEMS = 10_000

@@ -19,9 +19,9 @@ from py_trees.composites import Selector
 
 from bt_actions import document
 from bt_actions.behaviours.gate import Gate
-from bt_actions.plain_text import clean
 from bt_actions.policy import End, Outcome
 from bt_actions.ticking import path_of
+from bt_actions.utilities.plain_text import clean
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

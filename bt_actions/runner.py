@@ -27,7 +27,6 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
-from bt_actions.plain_text import raised
 from bt_actions.policy import End, Outcome
 from bt_actions.ticking import (
     ChangeVisitor,
@@ -39,6 +38,7 @@ from bt_actions.ticking import (
     root_of,
     tick_once,
 )
+from bt_actions.utilities.plain_text import raised
 
 if TYPE_CHECKING:
     from bt_actions.ros.shared import Change, Ticket

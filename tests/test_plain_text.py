@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.behaviours.variables import MissingVariable
-from bt_actions.plain_text import in_words
+from bt_actions.utilities.plain_text import in_words
 
 
 class Mute(Exception):

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_actions.shorten import shorten, shorten_fields
+from bt_actions.utilities.shorten import shorten, shorten_fields
 
 
 class Point:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.whole_file import replace_file
+from bt_actions.utilities.whole_file import replace_file
 
 
 def test_a_file_is_replaced_with_its_permissions_and_a_link_still_leads_to_it(

@@ -23,8 +23,8 @@ from bt_actions.behaviours.variables import key, resolve, variables_in, write
 from bt_actions.expression import Expression, ExpressionError
 from bt_actions.goal_terms import Event
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.shorten import shorten, shorten_fields
 from bt_actions.ticking import root_of
+from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:
     from bt_actions.ros.shared import Ticket

@@ -11,7 +11,7 @@ from typing import Any
 
 from bt_actions.behaviours.variables import read
 from bt_actions.expression import Expression, ExpressionError
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean
 
 
 def condition_of(

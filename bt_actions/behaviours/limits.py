@@ -117,6 +117,6 @@ def drained(node: Behaviour) -> bool:
 
 def seconds(value: object) -> float:
     """A duration that was computed. Raises ValueError."""
-    from bt_actions.units import parse_duration
+    from bt_actions.utilities.units import parse_duration
 
     return parse_duration(value)

@@ -13,7 +13,7 @@ from py_trees.common import Status
 from py_trees.ports import PortInformation, PortsMixin
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.units import parse_duration
+from bt_actions.utilities.units import parse_duration
 
 __all__ = ["GripperWithPorts", "MoveRobotWithPorts"]
 

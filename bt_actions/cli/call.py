@@ -17,7 +17,7 @@ from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.send import GoalView
 from bt_actions.cli.values import goal_fields, nested
 from bt_actions.cli.views import JsonView, QuietView
-from bt_actions.plain_text import clean
+from bt_actions.utilities.plain_text import clean
 
 if TYPE_CHECKING:
     from bt_actions.behaviours.run_tree import RunTree

@@ -24,7 +24,7 @@ from bt_actions.cli.common import (
 )
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.signals import SAME_WISH, settle
-from bt_actions.suggest import listing
+from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, findings_text, note, write
-from bt_actions.whole_file import replace_file
+from bt_actions.utilities.whole_file import replace_file
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bt_actions.cli.common import Exit, namespace, no_ros, note, starting_ros
 from bt_actions.cli.results import keep_results_apart, results
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
-from bt_actions.plain_text import as_json, clean
+from bt_actions.utilities.plain_text import as_json, clean
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers

@@ -15,8 +15,8 @@ from bt_actions.cli.common import note
 from bt_actions.cli.words import brief
 from bt_actions.document import given_inputs, place_of, tree_name
 from bt_actions.events import Event, TreeStarted
-from bt_actions.plain_text import clean, in_words
 from bt_actions.run_report import Report, summary
+from bt_actions.utilities.plain_text import clean, in_words
 
 if TYPE_CHECKING:
     from bt_actions.runner import TreeRunner

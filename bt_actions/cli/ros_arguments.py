@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.common import BadInput, no_ros
-from bt_actions.suggest import listing
+from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
     from bt_actions.document import TreeInput

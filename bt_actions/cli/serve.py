@@ -25,8 +25,8 @@ from bt_actions.cli.common import (
 )
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.sim import say
-from bt_actions.plain_text import raised
-from bt_actions.suggest import did_you_mean, listing
+from bt_actions.utilities.plain_text import raised
+from bt_actions.utilities.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
     from rclpy.node import Node

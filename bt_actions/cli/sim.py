@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from bt_actions.cli.common import BadInput, Exit, namespace, note, seconds, speed, starting_ros
 from bt_actions.cli.ros_arguments import add_ros_args, parameters
-from bt_actions.plain_text import raised
+from bt_actions.utilities.plain_text import raised
 
 if TYPE_CHECKING:
     from rclpy.node import Node

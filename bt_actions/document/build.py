@@ -32,7 +32,7 @@ from bt_actions.document.scope import Scope
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.values import computed_in
 from bt_actions.document.writes import writes_of
-from bt_actions.shorten import shorten
+from bt_actions.utilities.shorten import shorten
 
 __all__ = ["BUILDERS", "build"]
 

@@ -34,7 +34,7 @@ from bt_actions.document.values import (
 from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
 from bt_actions.expression import ExpressionError
 from bt_actions.ros.fields import Either, FieldType, Message
-from bt_actions.suggest import closest, listing
+from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
     from bt_actions.document.classes import Python

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
 
-from bt_actions.plain_text import raised
-from bt_actions.suggest import did_you_mean, listing
+from bt_actions.utilities.plain_text import raised
+from bt_actions.utilities.suggest import did_you_mean, listing
 
 __all__ = [
     "ClassError",

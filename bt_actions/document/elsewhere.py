@@ -10,7 +10,7 @@ import re
 from collections.abc import Container
 from collections.abc import Mapping as MappingType
 
-from bt_actions.suggest import folded
+from bt_actions.utilities.suggest import folded
 
 __all__ = ["as_mapping", "key_here", "kind_here", "notation_here", "package_here", "type_here"]
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = ["TreeNotFoundError", "find_tree", "installed_trees", "tree_folder", "tree_folders"]
 

@@ -13,7 +13,7 @@ from bt_actions.document.comments import Comment, comments_of, scalars_of
 from bt_actions.document.findings import Severity, Span
 from bt_actions.document.rules import RULES
 from bt_actions.document.source import Source
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = ["apply_ignores", "is_ignore"]
 

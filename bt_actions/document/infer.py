@@ -24,7 +24,7 @@ from bt_actions.ros.fields import (
     describe,
 )
 from bt_actions.ros.interfaces import short_name
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = ["BOOL", "FLOAT", "INTEGER", "TEXT", "common_type", "infer", "named", "type_of_literal"]
 

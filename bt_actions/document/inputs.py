@@ -16,7 +16,7 @@ from bt_actions.document.tree import Declared, Document
 from bt_actions.document.types import parse_type
 from bt_actions.document.values import names_file, read_data, resolve
 from bt_actions.ros.fields import Message, Scalar
-from bt_actions.suggest import did_you_mean, listing
+from bt_actions.utilities.suggest import did_you_mean, listing
 
 __all__ = [
     "InputError",

@@ -20,7 +20,7 @@ from bt_actions.document.source import Source
 from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.unread import Doubts
 from bt_actions.document.values import BAD
-from bt_actions.suggest import closest, did_you_mean, folded, listing
+from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
 __all__ = ["read_document", "read_root"]
 

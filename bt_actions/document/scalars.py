@@ -22,8 +22,8 @@ from bt_actions.document.shape import (
 )
 from bt_actions.document.source import Source, spoken
 from bt_actions.document.values import BAD, Computed, read_expression, read_value
-from bt_actions.suggest import did_you_mean
-from bt_actions.units import DURATION_UNITS, parse_duration
+from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.units import DURATION_UNITS, parse_duration
 
 __all__ = [
     "Choice", "Condition", "Duration", "Flag", "Name", "NodeName", "Place", "Quantity", "Text",

@@ -15,7 +15,7 @@ from bt_actions.document.scalars import Choice, Name, Place
 from bt_actions.document.shape import Schema, Shape, is_computed, read_computed, wrong_form
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD, read_value
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = [
     "AnyValue", "Key", "ListOf", "ListValue", "OneOf", "Record", "Table", "Values", "keys_schema",

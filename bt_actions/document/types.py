@@ -19,7 +19,7 @@ from bt_actions.ros.fields import (
     Record,
     Scalar,
 )
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from bt_actions.ros.interfaces import Kind

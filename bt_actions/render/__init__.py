@@ -14,7 +14,6 @@ from pathlib import Path
 from py_trees.behaviour import Behaviour
 
 from bt_actions.document.findings import PLACE
-from bt_actions.plain_text import clean
 from bt_actions.render.graphviz import RenderError, draw
 from bt_actions.render.look import (
     DOWN_UP_TO,
@@ -28,7 +27,8 @@ from bt_actions.render.look import (
     rows,
 )
 from bt_actions.render.outline import text
-from bt_actions.whole_file import replace_file
+from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.whole_file import replace_file
 
 __all__ = [
     "DOWN_UP_TO",

@@ -17,7 +17,7 @@ from py_trees.composites import Composite, Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
 from bt_actions.behaviours.parallel import Parallel as OwnParallel
-from bt_actions.plain_text import clean
+from bt_actions.utilities.plain_text import clean
 
 __all__ = [
     "DOWN_UP_TO",

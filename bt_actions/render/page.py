@@ -24,12 +24,12 @@ from pathlib import Path
 from py_trees.behaviour import Behaviour
 
 from bt_actions.document.findings import PLACE
-from bt_actions.plain_text import clean
 from bt_actions.render.card import Table, describe, interface_of, tables
 from bt_actions.render.graphviz import RenderError
 from bt_actions.render.look import Row, action_of, direction_of, kind, label, look, rows
 from bt_actions.render.outline import text
 from bt_actions.render.written import Written, own_text
+from bt_actions.utilities.plain_text import clean
 
 __all__ = ["MOST_NODES", "OPEN_UP_TO", "page"]
 

@@ -35,9 +35,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.hearing import Hearing
-from bt_actions.plain_text import raised
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
+from bt_actions.utilities.plain_text import raised
 
 TAKE_AT_MOST = 200
 """Messages of one kind taken at a time, so that a flood of feedback starves nobody."""

@@ -12,12 +12,12 @@ import threading
 import time
 from typing import Protocol
 
-from bt_actions.plain_text import raised
 from bt_actions.ros.collector import Collector
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 from bt_actions.ros.suspended import Suspended
 from bt_actions.standstill import Standstill
+from bt_actions.utilities.plain_text import raised
 
 AT_LEAST_EVERY = 0.2
 """Seconds; a clock that is not the steady one may run faster than the alarm can know."""

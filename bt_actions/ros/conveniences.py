@@ -14,8 +14,8 @@ from functools import lru_cache
 
 from bt_actions.ros.fields import constants
 from bt_actions.ros.interfaces import Kind, UnknownInterface, installed, interface, short_name
-from bt_actions.suggest import did_you_mean
-from bt_actions.units import parse_angle, parse_duration
+from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.units import parse_angle, parse_duration
 
 __all__ = ["ANGLES", "UnknownClass", "constant", "duration_of", "quaternion_of", "time_of"]
 

@@ -13,7 +13,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from bt_actions.suggest import did_you_mean, listing
+from bt_actions.utilities.suggest import did_you_mean, listing
 
 __all__ = ["Ends", "elsewhere", "without_service", "without_topic"]
 

@@ -23,7 +23,6 @@ from bt_actions.goal_terms import (
     Now,
     State,
 )
-from bt_actions.plain_text import raised
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
@@ -37,8 +36,9 @@ from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, ledg
 from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.standstill import ANSWERS_TAKE_IN_ALL
-from bt_actions.suggest import did_you_mean, listing
 from bt_actions.testimony import Told
+from bt_actions.utilities.plain_text import raised
+from bt_actions.utilities.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
     from bt_actions.goal import Goal

@@ -24,7 +24,7 @@ from typing import Any
 import rclpy.logging
 from rclpy.logging import LoggingSeverity
 
-from bt_actions.plain_text import clean_lines
+from bt_actions.utilities.plain_text import clean_lines
 
 MOST = 1000
 """Lines that wait to be written; of a reader that has stopped, newer ones are only counted.

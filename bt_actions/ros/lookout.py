@@ -24,12 +24,12 @@ from typing import Protocol
 from rclpy.context import Context
 from rclpy.node import Node
 
-from bt_actions.plain_text import raised
 from bt_actions.ros import participant
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.graph import servers
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
+from bt_actions.utilities.plain_text import raised
 
 FIRST_AFTER = 1.5
 """Seconds out of sight until the first look; a server that was restarted is seen before."""

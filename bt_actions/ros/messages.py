@@ -33,8 +33,8 @@ from bt_actions.ros.interfaces import (
     interface_name,
     short_name,
 )
-from bt_actions.shorten import shorten
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = [
     "MessageError",

@@ -17,10 +17,10 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from bt_actions.plain_text import as_json
 from bt_actions.ros import participant
 from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Scalar, describe
 from bt_actions.ros.messages import to_plain
+from bt_actions.utilities.plain_text import as_json
 
 __all__ = ["declare_input", "parameters_in"]
 

@@ -12,7 +12,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from bt_actions.plain_text import clean_lines
+from bt_actions.utilities.plain_text import clean_lines
 
 __all__ = ["Rosout"]
 

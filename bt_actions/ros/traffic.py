@@ -27,7 +27,6 @@ from rclpy.node import Node
 from bt_actions.goal import Goal
 from bt_actions.goal_ids import new_goal_id
 from bt_actions.goal_terms import Event, State
-from bt_actions.plain_text import in_words, raised
 from bt_actions.policy import Busy, End, Timeouts
 from bt_actions.resources import Answer
 from bt_actions.ros import alarm, shared
@@ -48,6 +47,7 @@ from bt_actions.ros.shared import (
 )
 from bt_actions.ros.signals import ended_by_signals, insists
 from bt_actions.server import Server
+from bt_actions.utilities.plain_text import in_words, raised
 
 IN_FLIGHT = 8
 """Goal requests of this process under way at a server; its queue holds 10, and drops what is over

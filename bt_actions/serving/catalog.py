@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bt_actions.document import DocumentError, Finding, Tree, open_tree
-from bt_actions.plain_text import clean
 from bt_actions.serving.requests import Refused, Said, inputs_of
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = ["Catalog", "Entry", "State"]
 

@@ -17,9 +17,9 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
-from bt_actions.plain_text import in_words
 from bt_actions.ros.log import log
 from bt_actions.serving.wire import OffTheExecutor
+from bt_actions.utilities.plain_text import in_words
 
 __all__ = ["Lifecycle"]
 

@@ -9,11 +9,11 @@ from bt_actions_interfaces.msg import ActionReport, Finding, RunningLeaf, TreeIn
 from builtin_interfaces.msg import Duration
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions.plain_text import as_json
 from bt_actions.serving.catalog import Entry
 from bt_actions.serving.outcome import ActionOutcome, RunOutcome
 from bt_actions.serving.requests import Said
 from bt_actions.serving.run import Leaf
+from bt_actions.utilities.plain_text import as_json
 
 __all__ = ["feedback", "finding", "info", "result"]
 

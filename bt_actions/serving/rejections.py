@@ -7,9 +7,9 @@ from bt_actions_interfaces.msg import Rejection
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from bt_actions.plain_text import clean
 from bt_actions.ros.log import log
 from bt_actions.serving.requests import Refused
+from bt_actions.utilities.plain_text import clean
 
 __all__ = ["ECHO", "Rejections"]
 

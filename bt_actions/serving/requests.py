@@ -12,7 +12,7 @@ from bt_actions.document import DocumentError, source_of
 from bt_actions.document.bounds import refuse_large
 from bt_actions.document.nodes import Mapping as YamlMapping
 from bt_actions.document.nodes import compose, data_of
-from bt_actions.plain_text import clean
+from bt_actions.utilities.plain_text import clean
 
 __all__ = ["MAX_BYTES", "Refused", "inputs_of"]
 

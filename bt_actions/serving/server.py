@@ -22,7 +22,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from bt_actions.document.find import tree_folder
-from bt_actions.plain_text import clean, in_words
 from bt_actions.ros.log import log
 from bt_actions.ros.rosout import Rosout
 from bt_actions.serving.catalog import Catalog
@@ -37,6 +36,7 @@ from bt_actions.serving.run import Run
 from bt_actions.serving.turns import Policy, Turns
 from bt_actions.serving.underway import Underway
 from bt_actions.serving.wire import OffTheExecutor, RunTreeServer
+from bt_actions.utilities.plain_text import clean, in_words
 
 __all__ = ["TreeServer"]
 

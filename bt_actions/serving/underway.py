@@ -16,7 +16,7 @@ from pathlib import Path
 from bt_actions.goal_ids import author_of, new_goal_id
 from bt_actions.ledger import directory
 from bt_actions.ros.log import log
-from bt_actions.whole_file import replace_file
+from bt_actions.utilities.whole_file import replace_file
 
 __all__ = ["Underway", "left_underway"]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bt_actions.simulation.faults import Fault, FaultError, FaultKind, Value
-from bt_actions.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean
 
 
 class GoalFaults:

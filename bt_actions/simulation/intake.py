@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from bt_actions.plain_text import raised
 from bt_actions.simulation.fault_plan import FaultPlan, GoalFaults
 from bt_actions.simulation.faults import FaultKind
 from bt_actions.simulation.journal import Event
+from bt_actions.utilities.plain_text import raised
 
 
 class Fate(Enum):

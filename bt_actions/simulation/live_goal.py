@@ -7,10 +7,10 @@ from typing import Any, Protocol
 from action_msgs.msg import GoalStatus
 from rclpy.action.server import RCLError, ServerGoalHandle
 
-from bt_actions.plain_text import raised
 from bt_actions.simulation.execution import CancelAnswer, Execution, Finish, Happened
 from bt_actions.simulation.goal_meaning import GoalMeaning
 from bt_actions.simulation.journal import Event
+from bt_actions.utilities.plain_text import raised
 
 _EVENTS = {
     GoalStatus.STATUS_SUCCEEDED: Event.SUCCEEDED,

@@ -16,7 +16,6 @@ from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
-from bt_actions.plain_text import raised
 from bt_actions.simulation.execution import Execution, Motion
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault, FaultKind
@@ -27,6 +26,7 @@ from bt_actions.simulation.live_goal import LiveGoal
 from bt_actions.simulation.result_faults import ResultFaults
 from bt_actions.simulation.stepper import Stepper
 from bt_actions.simulation.wire import InterceptedActionServer, Taken
+from bt_actions.utilities.plain_text import raised
 
 RESULT_TIMEOUT = 5.0
 """How long a finished goal is remembered, s. rclpy's own 15 minutes make each new goal slower."""

@@ -15,7 +15,6 @@ from typing import Self
 
 from rclpy.node import Node
 
-from bt_actions.plain_text import raised
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault
 from bt_actions.simulation.journal import Journal
@@ -23,6 +22,7 @@ from bt_actions.simulation.robot_cell import RobotCell
 from bt_actions.simulation.server import RESULT_TIMEOUT, SimulatedServer
 from bt_actions.simulation.stepper import Stepper
 from bt_actions.simulation.world import World, WorldEvent
+from bt_actions.utilities.plain_text import raised
 
 BATTERY_PERIOD = 1.0
 """The battery's charge is published that often, wall seconds."""

@@ -22,7 +22,7 @@ from rclpy.clock_type import ClockType
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from bt_actions.plain_text import raised
+from bt_actions.utilities.plain_text import raised
 
 CATCH_UP = 0.25
 """Wall seconds a late timer makes up for. A process that was stopped for longer does not make its

@@ -19,7 +19,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.task import Future
 from rclpy.waitable import NumberOfEntities
 
-from bt_actions.plain_text import raised
+from bt_actions.utilities.plain_text import raised
 
 Taken = tuple[Any, Any]
 """A request as rclpy takes it: its header, and the message."""

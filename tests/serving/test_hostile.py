@@ -11,9 +11,9 @@ import pytest
 from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.srv import ControlTree
 
-from bt_actions.plain_text import clean
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.requests import MAX_BYTES, Refused
+from bt_actions.utilities.plain_text import clean
 from tests.serving.conftest import Serve
 from tests.support.tree_client import TreeClient
 

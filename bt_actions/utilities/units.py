@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from bt_actions.shorten import shorten
+from bt_actions.utilities.shorten import shorten
 
 __all__ = ["DURATION_UNITS", "parse_angle", "parse_duration"]
 
