@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_actions.expression import MAX_LENGTH, Expression, ExpressionError
+from bt_actions.expressions.expression import MAX_LENGTH, Expression, ExpressionError
 
 RESULT = SimpleNamespace(
     stalled=True,

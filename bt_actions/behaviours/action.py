@@ -20,7 +20,7 @@ from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.behaviours.conditions import condition_of, function_of, unknown_field
 from bt_actions.behaviours.node import node_in
 from bt_actions.behaviours.variables import key, resolve, variables_in, write
-from bt_actions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.goal_terms import Event
 from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.ticking import root_of

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression, ExpressionError
 
 __all__ = ["Check"]
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bt_actions.behaviours.variables import read
-from bt_actions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.utilities.suggest import did_you_mean
 
 

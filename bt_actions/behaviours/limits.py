@@ -11,7 +11,7 @@ from py_trees.common import Status
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.gate import Gate
-from bt_actions.expression import ExpressionError
+from bt_actions.expressions.expression import ExpressionError
 
 __all__ = ["Deadline", "While"]
 

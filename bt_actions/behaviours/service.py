@@ -12,7 +12,7 @@ from py_trees.common import Status
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.conditions import condition_of
 from bt_actions.behaviours.node import node_in
-from bt_actions.expression import ExpressionError
+from bt_actions.expressions.expression import ExpressionError
 from bt_actions.policy import Retry
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.node import node_in
-from bt_actions.expression import ExpressionError
+from bt_actions.expressions.expression import ExpressionError
 
 if TYPE_CHECKING:
     from bt_actions.ros.topics import Latest, Speaker

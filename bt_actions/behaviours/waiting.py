@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.limits import seconds
-from bt_actions.expression import ExpressionError
+from bt_actions.expressions.expression import ExpressionError
 
 __all__ = ["Wait", "WaitUntil"]
 

@@ -32,7 +32,7 @@ from bt_actions.document.values import (
     names_file,
 )
 from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
-from bt_actions.expression import ExpressionError
+from bt_actions.expressions.expression import ExpressionError
 from bt_actions.ros.fields import Either, FieldType, Message
 from bt_actions.utilities.suggest import closest, listing
 

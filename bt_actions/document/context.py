@@ -15,7 +15,7 @@ from bt_actions.document.nodes import Scalar
 from bt_actions.document.scope import Scope
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.values import Computed, resolve
-from bt_actions.expression import Expression
+from bt_actions.expressions.expression import Expression
 
 __all__ = ["Condition", "Context", "plain_name", "table_of", "written_text"]
 

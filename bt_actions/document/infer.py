@@ -8,8 +8,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping, Sequence
 
-from bt_actions.expression import Expression
-from bt_actions.expression_values import BINARY, LENGTHS, bounded, number, reason
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.values import BINARY, LENGTHS, bounded, number, reason
 from bt_actions.ros.conveniences import UnknownClass
 from bt_actions.ros.fields import (
     FLOATS,

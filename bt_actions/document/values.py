@@ -31,9 +31,9 @@ from bt_actions.document.nodes import (
     span_of,
 )
 from bt_actions.document.source import SUFFIXES, Source, read_source
-from bt_actions.expression import Expression, ExpressionError
-from bt_actions.expression_values import MAX_ITEMS as MAX_TEXT
-from bt_actions.expression_values import numbers_only
+from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.values import MAX_ITEMS as MAX_TEXT
+from bt_actions.expressions.values import numbers_only
 
 __all__ = [
     "BAD",

@@ -12,7 +12,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
-from bt_actions.expression_values import scalar
+from bt_actions.expressions.values import scalar
 from bt_actions.ros.interfaces import short_name
 
 __all__ = [

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from bt_actions.expression_values import numbers_only, plain, scalar
+from bt_actions.expressions.values import numbers_only, plain, scalar
 from bt_actions.ros.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
 from bt_actions.ros.fields import (
     FLOATS,

@@ -10,7 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.document import check_source, source_of
-from bt_actions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression, ExpressionError
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]

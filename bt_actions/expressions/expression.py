@@ -12,8 +12,8 @@ import ast
 import re
 from collections.abc import Callable, Iterable, Mapping
 
-from bt_actions.expression_text import ExpressionError, foreign_in, translate
-from bt_actions.expression_values import (
+from bt_actions.expressions.text import ExpressionError, foreign_in, translate
+from bt_actions.expressions.values import (
     BINARY,
     COMPARE,
     FUNCTIONS,

@@ -1,0 +1,1 @@
+"""The expressions of `{...}`: reading them, and what they come to."""
