@@ -219,7 +219,7 @@ class ActionBehaviour(Behaviour):
         installed.
         """
         node = node_in(kwargs, self)
-        from bt_actions.ros.messages import interface
+        from bt_actions.messages.conversion import interface
         from bt_actions.ros.traffic import Traffic
 
         if isinstance(self.action_type, str):
@@ -385,7 +385,7 @@ class ActionBehaviour(Behaviour):
         return bool(history) and history[-1].goal is ticket.goal
 
     def _make_message(self) -> Any:
-        from bt_actions.ros.messages import fill
+        from bt_actions.messages.conversion import fill
 
         assert self._traffic is not None
         assert not isinstance(self.action_type, str)
@@ -396,7 +396,7 @@ class ActionBehaviour(Behaviour):
 
     def _check_fields(self) -> None:
         """Find before anything moves what would be found when a goal is sent, or has ended."""
-        from bt_actions.ros.messages import MessageError, fill
+        from bt_actions.messages.conversion import MessageError, fill
 
         action: Any = self.action_type
         if isinstance(self.goal, Mapping) and not variables_in(self.goal):

@@ -139,7 +139,7 @@ def roots_of(result: Any) -> dict[str, object]:
 
 def inputs_text(values: object) -> str:
     """Inputs as RunTree has them. Raises ValueError for what cannot be sent, and says where."""
-    from bt_actions.ros.messages import to_plain
+    from bt_actions.messages.conversion import to_plain
 
     if not isinstance(values, Mapping):
         raise ValueError(f"inputs are a mapping of names to values, not {values!r:.40}")

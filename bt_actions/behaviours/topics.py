@@ -25,7 +25,7 @@ LOOKS = 0.05
 def _class(message_type: type | str) -> type:
     if isinstance(message_type, type):
         return message_type
-    from bt_actions.ros.interfaces import interface
+    from bt_actions.messages.interfaces import interface
 
     return interface(message_type, "msg")
 
@@ -267,7 +267,7 @@ class Publish(Behaviour):
             self._countdown.start(self._timeout)
 
     def update(self) -> Status:
-        from bt_actions.ros.messages import fill
+        from bt_actions.messages.conversion import fill
 
         assert self._speaker is not None, "not set up"
         topic, listeners = self._speaker.topic, self._speaker.listeners

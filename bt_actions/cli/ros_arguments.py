@@ -104,7 +104,7 @@ def _read(value: object, kind: str) -> object:
     """Read the texts within a message that stand for arrays of messages, as `run` shows them."""
     from bt_actions.document.inputs import parse_text
     from bt_actions.document.types import parse_type
-    from bt_actions.ros.fields import Listing, Message, describe
+    from bt_actions.messages.fields import Listing, Message, describe
 
     def read(inner: object, field: object) -> object:
         if isinstance(inner, dict) and isinstance(field, Message):

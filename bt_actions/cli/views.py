@@ -260,7 +260,7 @@ class JsonView:
         self._write(self._finished(closing))
 
     def _finished(self, closing: Closing) -> dict[str, object]:
-        from bt_actions.ros.messages import to_plain
+        from bt_actions.messages.conversion import to_plain
 
         report = self._report
         return {

@@ -176,7 +176,7 @@ def result_lines(result: object) -> list[str]:
         return []
     import yaml
 
-    from bt_actions.ros.messages import to_plain
+    from bt_actions.messages.conversion import to_plain
 
     text = yaml.safe_dump(_short(to_plain(result)), sort_keys=False, allow_unicode=True)
     lines = []
@@ -199,7 +199,7 @@ def _short(data: object) -> object:
 
 def _constant(message: object, field: str, value: int) -> str:
     """The constant FIELD_X of the message's type that has `value`, as X; else the number."""
-    from bt_actions.ros.fields import constants
+    from bt_actions.messages.fields import constants
 
     start = f"{field.upper()}_"
     message_type: type = type(message)

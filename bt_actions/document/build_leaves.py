@@ -94,7 +94,7 @@ def _plain_retry(fields: tuple[tuple[str, Any], ...]) -> Retry:
 def _interface(name: object, kind: str, context: Context) -> Any:
     if not context.types:
         return name
-    from bt_actions.ros.interfaces import interface
+    from bt_actions.messages.interfaces import interface
 
     return interface(str(name), kind)  # type: ignore[arg-type]
 

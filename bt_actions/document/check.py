@@ -33,7 +33,7 @@ from bt_actions.document.values import (
 )
 from bt_actions.document.writes import Write, infer_variables, items_inside, writes_of
 from bt_actions.expressions.expression import ExpressionError
-from bt_actions.ros.fields import Either, FieldType, Message
+from bt_actions.messages.fields import Either, FieldType, Message
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ class Checker:
                 self.expression(computed, {})
             return
 
-        from bt_actions.ros.messages import examine
+        from bt_actions.messages.conversion import examine
 
         def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):

@@ -19,7 +19,7 @@ from bt_actions.document.tree import Declared, TreeNode
 from bt_actions.document.values import BAD, Computed, Interpolated, locate
 from bt_actions.document.workspace import merged
 from bt_actions.document.writes import root_type
-from bt_actions.ros.fields import FieldType, Message
+from bt_actions.messages.fields import FieldType, Message
 
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker
@@ -113,7 +113,7 @@ def _check_together(checker: Checker, node: TreeNode, declared: Declared) -> Non
     if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):
         return
 
-    from bt_actions.ros.messages import Problem, examine
+    from bt_actions.messages.conversion import Problem, examine
 
     def problems(goal: object) -> list[Problem]:
         return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]

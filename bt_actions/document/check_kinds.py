@@ -15,7 +15,7 @@ from bt_actions.document.nodes import Node, span_of
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.types import TypeNameError, fits, misfits, parse_type
 from bt_actions.document.values import Computed, computed_in, constant_of, locate
-from bt_actions.ros.fields import FieldType, Listing, Message, Record, Scalar
+from bt_actions.messages.fields import FieldType, Listing, Message, Record, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:

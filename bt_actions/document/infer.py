@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.values import BINARY, LENGTHS, bounded, number, reason
-from bt_actions.ros.conveniences import UnknownClass
-from bt_actions.ros.fields import (
+from bt_actions.messages.conveniences import UnknownClass
+from bt_actions.messages.fields import (
     FLOATS,
     INTEGERS,
     Either,
@@ -23,7 +23,7 @@ from bt_actions.ros.fields import (
     constants,
     describe,
 )
-from bt_actions.ros.interfaces import short_name
+from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = ["BOOL", "FLOAT", "INTEGER", "TEXT", "common_type", "infer", "named", "type_of_literal"]

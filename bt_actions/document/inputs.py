@@ -15,7 +15,7 @@ from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.tree import Declared, Document
 from bt_actions.document.types import parse_type
 from bt_actions.document.values import names_file, read_data, resolve
-from bt_actions.ros.fields import Message, Scalar
+from bt_actions.messages.fields import Message, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 __all__ = [
@@ -84,7 +84,7 @@ def convert(value: object, type_name: str, *, types: bool = True) -> object:
     kind = parse_type(type_name, types=types)
     if kind is None:
         return value
-    from bt_actions.ros.messages import fill_value
+    from bt_actions.messages.conversion import fill_value
 
     return fill_value(kind, value)
 

@@ -9,7 +9,7 @@ import re
 from typing import TYPE_CHECKING
 
 from bt_actions.document.elsewhere import type_here
-from bt_actions.ros.fields import (
+from bt_actions.messages.fields import (
     FLOATS,
     INTEGERS,
     Either,
@@ -22,7 +22,7 @@ from bt_actions.ros.fields import (
 from bt_actions.utilities.suggest import did_you_mean
 
 if TYPE_CHECKING:
-    from bt_actions.ros.interfaces import Kind
+    from bt_actions.messages.interfaces import Kind
 
 __all__ = ["PLAIN_TYPES", "TypeNameError", "fits", "interface_of", "misfits", "parse_type"]
 
@@ -82,7 +82,7 @@ def _instead(text: str) -> str:
 
 def interface_of(name: str, kind: Kind) -> type:
     """The class of an interface. Raises TypeNameError."""
-    from bt_actions.ros.interfaces import UnknownInterface, interface
+    from bt_actions.messages.interfaces import UnknownInterface, interface
 
     try:
         return interface(name, kind)
@@ -126,7 +126,7 @@ def _fits_size(given: Listing, wanted: Listing) -> bool:
 
 def _fills(given: FieldType, cls: type) -> bool:
     """Whether a value can stand where a message is needed; of a mapping, `misfits` says more."""
-    from bt_actions.ros.interfaces import interface_name
+    from bt_actions.messages.interfaces import interface_name
 
     if isinstance(given, Message):
         return given.cls is cls
@@ -147,7 +147,7 @@ def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
     if not isinstance(given, Record) or not isinstance(wanted, Message):
         return []
 
-    from bt_actions.ros.messages import dotted, examine
+    from bt_actions.messages.conversion import dotted, examine
 
     found: list[str] = []
 
@@ -169,7 +169,7 @@ def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
 
 def _alone(given: Record) -> list[dict[str, FieldType | None]]:
     """A mapping as what can stand beside each other: of several, one may have angles."""
-    from bt_actions.ros.conveniences import ANGLES
+    from bt_actions.messages.conveniences import ANGLES
 
     items = dict(given.items)
     if not given.sometimes or not any(name in ANGLES for name in items):

@@ -278,7 +278,9 @@ def _expression(text: str, roots: frozenset[str]) -> Expression:
 
 
 def _named_constant(name: str) -> object:
-    from bt_actions.ros.conveniences import constant  # here, so that reading a tree needs no ROS
+    from bt_actions.messages.conveniences import (
+        constant,  # here, so that reading a tree needs no ROS
+    )
 
     return constant(name, None)
 
@@ -346,7 +348,7 @@ def resolve(value: object, variable: Lookup) -> object:
 def _as_text(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
-    from bt_actions.ros.messages import to_plain  # here, so that reading a tree needs no ROS
+    from bt_actions.messages.conversion import to_plain  # here, so that reading a tree needs no ROS
 
     try:
         refuse_large(value, items=MAX_TEXT, characters=MAX_TEXT)  # an item takes a character

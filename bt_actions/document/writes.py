@@ -12,7 +12,7 @@ from bt_actions.document.nodes import Mapping, Node
 from bt_actions.document.tree import Document, TreeNode
 from bt_actions.document.types import TypeNameError, parse_type
 from bt_actions.document.values import Computed, Interpolated
-from bt_actions.ros.fields import FieldType, Listing, Message, Scalar
+from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
 
 if TYPE_CHECKING:
     from bt_actions.document.check import Checker

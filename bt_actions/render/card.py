@@ -87,8 +87,8 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
 
 def describe(interface: type | str, kind: Kind) -> Iterator[Table]:
     """The messages of an interface with their fields and constants, or why they cannot be told."""
-    from bt_actions.ros import fields as ros_fields
-    from bt_actions.ros import interfaces
+    from bt_actions.messages import fields as ros_fields
+    from bt_actions.messages import interfaces
 
     try:
         found = interfaces.interface(interface, kind) if isinstance(interface, str) else interface
@@ -153,7 +153,7 @@ def _ports(document: Document) -> Iterator[Table]:
 
 
 def _fields(message: type, depth: int) -> Iterator[Line]:
-    from bt_actions.ros import fields as ros_fields
+    from bt_actions.messages import fields as ros_fields
 
     for name, kind in ros_fields.describe(message).items():
         if name == "structure_needs_at_least_one_member":  # what rosidl puts into an empty one

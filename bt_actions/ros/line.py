@@ -23,12 +23,12 @@ from bt_actions.goal_terms import (
     Now,
     State,
 )
+from bt_actions.messages.interfaces import interface_name
 from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.in_sight import elsewhere
-from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.log import log
 from bt_actions.ros.past import Past
 from bt_actions.ros.predecessors import Predecessors

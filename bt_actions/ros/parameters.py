@@ -17,9 +17,17 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from bt_actions.messages.conversion import to_plain
+from bt_actions.messages.fields import (
+    FLOATS,
+    INTEGERS,
+    FieldType,
+    Listing,
+    Message,
+    Scalar,
+    describe,
+)
 from bt_actions.ros import participant
-from bt_actions.ros.fields import FLOATS, INTEGERS, FieldType, Listing, Message, Scalar, describe
-from bt_actions.ros.messages import to_plain
 from bt_actions.utilities.plain_text import as_json
 
 __all__ = ["declare_input", "parameters_in"]

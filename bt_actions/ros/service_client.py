@@ -10,9 +10,9 @@ from typing import Any
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
+from bt_actions.messages.conversion import fill
+from bt_actions.messages.interfaces import interface, interface_name
 from bt_actions.ros.in_sight import without_service
-from bt_actions.ros.interfaces import interface, interface_name
-from bt_actions.ros.messages import fill
 from bt_actions.ros.topics import wake
 
 __all__ = ["ServiceClient"]

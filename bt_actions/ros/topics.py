@@ -22,9 +22,9 @@ from rclpy.qos import (
     qos_profile_services_default,
 )
 
+from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.closable import closable
 from bt_actions.ros.in_sight import without_topic
-from bt_actions.ros.interfaces import interface_name
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
 

@@ -17,7 +17,7 @@ from rclpy.expand_topic_name import expand_topic_name
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import Event, NodeChanged
-from bt_actions.ros.messages import to_plain
+from bt_actions.messages.conversion import to_plain
 from bt_actions.run_report import Report
 from bt_actions.runner import TreeRunner
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of

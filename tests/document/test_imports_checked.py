@@ -11,7 +11,7 @@ import pytest
 import std_msgs.msg
 
 from bt_actions.document import check_file
-from bt_actions.ros import messages
+from bt_actions.messages import conversion as messages
 
 MOVE = "{{type: robot_control_interfaces/action/MoveRobot, server: m, timeout: 3 s, {}}}"
 MAIN = """\

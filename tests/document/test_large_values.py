@@ -17,8 +17,8 @@ from test_msgs.action import Fibonacci
 
 from bt_actions.document import tree_outputs
 from bt_actions.document.load import LOADED
-from bt_actions.ros.fields import Listing, Scalar
-from bt_actions.ros.messages import MessageError, fill, fill_value
+from bt_actions.messages.conversion import MessageError, fill, fill_value
+from bt_actions.messages.fields import Listing, Scalar
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import BatteryState
 from test_msgs.action import Fibonacci, NestedMessage
 
-from bt_actions.ros import fields
-from bt_actions.ros.interfaces import UnknownInterface, find_action, interface
-from bt_actions.ros.messages import MessageError, examine, fill, to_plain
+from bt_actions.messages import fields
+from bt_actions.messages.conversion import MessageError, examine, fill, to_plain
+from bt_actions.messages.interfaces import UnknownInterface, find_action, interface
 
 
 def test_fields_that_are_not_named_keep_their_defaults() -> None:

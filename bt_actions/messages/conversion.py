@@ -16,8 +16,8 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from bt_actions.expressions.values import numbers_only, plain, scalar
-from bt_actions.ros.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
-from bt_actions.ros.fields import (
+from bt_actions.messages.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
+from bt_actions.messages.fields import (
     FLOATS,
     INTEGERS,
     FieldType,
@@ -26,7 +26,7 @@ from bt_actions.ros.fields import (
     Scalar,
     describe,
 )
-from bt_actions.ros.interfaces import (
+from bt_actions.messages.interfaces import (
     UnknownInterface,
     find_action,
     interface,

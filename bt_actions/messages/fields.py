@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from bt_actions.expressions.values import scalar
-from bt_actions.ros.interfaces import short_name
+from bt_actions.messages.interfaces import short_name
 
 __all__ = [
     "FLOATS",

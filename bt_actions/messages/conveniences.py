@@ -12,8 +12,8 @@ import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from bt_actions.ros.fields import constants
-from bt_actions.ros.interfaces import Kind, UnknownInterface, installed, interface, short_name
+from bt_actions.messages.fields import constants
+from bt_actions.messages.interfaces import Kind, UnknownInterface, installed, interface, short_name
 from bt_actions.utilities.suggest import did_you_mean
 from bt_actions.utilities.units import parse_angle, parse_duration
 

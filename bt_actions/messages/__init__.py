@@ -1,0 +1,1 @@
+"""ROS messages from plain data and back. No node is needed."""
