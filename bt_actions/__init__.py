@@ -6,14 +6,14 @@ _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout
 
 # ruff: noqa: E402 - see above
 import bt_actions.behaviours.ports as _ports  # noqa: F401 - makes the tags of XML trees known
-from bt_actions.attempts import AttemptRecord
 from bt_actions.behaviours.action import ActionBehaviour, Progress
 from bt_actions.behaviours.gripper import Gripper
 from bt_actions.behaviours.move_robot import MoveRobot
 from bt_actions.behaviours.run_tree import RunTree
 from bt_actions.behaviours.variables import Var
 from bt_actions.document import load_tree
-from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.goals.attempts import AttemptRecord
+from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.runner import GoalReport, TreeError, TreeRunner
 
 __all__ = [  # noqa: RUF022 - grouped by use

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 
 if TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour

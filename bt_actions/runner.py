@@ -27,7 +27,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.ticking import (
     ChangeVisitor,
     Misbehaviour,

@@ -16,15 +16,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import (
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End
+from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
     ENDS,
     STATUS_EXECUTING,
     STATUS_SUCCEEDED,
     Event,
 )
-from bt_actions.policy import End
 from bt_actions.server import GID, Server, ServerWatch
 
 Told = list[tuple[Event, Any]]

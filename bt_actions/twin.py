@@ -11,9 +11,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
-from bt_actions.policy import End
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End
+from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
 from bt_actions.server import GID, ServerWatch
 from bt_actions.testimony import Testimony, Told
 

@@ -1,4 +1,4 @@
-"""Writes docs/goal.md from the transition table in bt_actions/goal.py.
+"""Writes docs/goal.md from the transition table in bt_actions/goals/goal.py.
 
 `python scripts/goal_doc.py` writes it; with `--check` it exits 1, and says so, when what is there
 is stale.
@@ -10,16 +10,16 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-from bt_actions.goal import TABLE, Row
-from bt_actions.goal_terms import Command, Event, State
-from bt_actions.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Outcome
+from bt_actions.goals.goal import TABLE, Row
+from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Outcome
+from bt_actions.goals.terms import Command, Event, State
 
 PATH = Path(__file__).resolve().parent.parent / "docs" / "goal.md"
 
 HEAD = """\
 # The life of a goal
 
-<!-- Made by scripts/goal_doc.py from TABLE in bt_actions/goal.py. Do not edit. -->
+<!-- Made by scripts/goal_doc.py from TABLE in bt_actions/goals/goal.py. Do not edit. -->
 
 One goal on one action server, from wish to end. What happens is told to `Goal.on` as an event, or
 found out by `Goal.poll` when a deadline has passed; what to do comes back as commands. Every pair

@@ -34,7 +34,7 @@ from bt_actions.document.rules import RULES
 from bt_actions.document.scalars import Text
 from bt_actions.document.shape import Shape
 from bt_actions.document.shapes import Key, Record
-from bt_actions.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Busy
+from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Busy
 from bt_actions.utilities.units import DURATION_UNITS
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from bt_actions.attempts import AttemptRecord, Attempts
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import Now
-from bt_actions.policy import RETRYABLE, End, Outcome, Retry, Timeouts
+from bt_actions.goals.attempts import AttemptRecord, Attempts
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import RETRYABLE, End, Outcome, Retry, Timeouts
+from bt_actions.goals.terms import Now
 
 START = Now(100.0, 1000.0)
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-import bt_actions.deadlines
-import bt_actions.goal
-from bt_actions.deadlines import HELD_AT_MOST
-from bt_actions.goal import (
+import bt_actions.goals.deadlines
+import bt_actions.goals.goal
+from bt_actions.goals.deadlines import HELD_AT_MOST
+from bt_actions.goals.goal import (
     ASK_AGAIN,
     ASK_IN_ANY_CASE,
     ASK_LESS,
@@ -26,7 +26,8 @@ from bt_actions.goal import (
     UNHEARD,
     Goal,
 )
-from bt_actions.goal_terms import (
+from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
+from bt_actions.goals.terms import (
     CANCEL_ACCEPTED,
     CANCEL_REJECTED,
     CANCEL_TERMINATED,
@@ -40,7 +41,6 @@ from bt_actions.goal_terms import (
     Now,
     State,
 )
-from bt_actions.policy import Busy, End, Outcome, Timeouts
 
 LIMITS = Timeouts(queue=10.0, server=5.0, accept=3.0, result=30.0, feedback=2.0, cancel=4.0)
 SEND, ASK, CANCEL, RELEASE = Command.SEND, Command.ASK_RESULT, Command.CANCEL, Command.RELEASE
@@ -155,7 +155,7 @@ def test_the_table_says_where_each_event_may_lead(make: Any, event: Event) -> No
     assert life.goal.state in TABLE[before, event].to
 
 
-@pytest.mark.parametrize("module", [bt_actions.goal, bt_actions.deadlines])
+@pytest.mark.parametrize("module", [bt_actions.goals.goal, bt_actions.goals.deadlines])
 def test_the_machine_knows_no_ros_no_thread_and_no_clock(module: ModuleType) -> None:
     tree = ast.parse(inspect.getsource(module))
     imported = {
@@ -174,9 +174,9 @@ def test_the_machine_knows_no_ros_no_thread_and_no_clock(module: ModuleType) -> 
         "collections.abc",
         "dataclasses",
         "typing",
-        "bt_actions.deadlines",
-        "bt_actions.goal_terms",
-        "bt_actions.policy",
+        "bt_actions.goals.deadlines",
+        "bt_actions.goals.terms",
+        "bt_actions.goals.policy",
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import runpy
 from pathlib import Path
 
-from bt_actions.goal_terms import Event, State
+from bt_actions.goals.terms import Event, State
 
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "goal_doc.py"))

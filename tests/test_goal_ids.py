@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.goal_ids import MACHINE, _name_of_machine, author_of, new_goal_id
+from bt_actions.goals.ids import MACHINE, _name_of_machine, author_of, new_goal_id
 
 MAKE = (
-    "from bt_actions.goal_ids import new_goal_id; print(new_goal_id().hex(), flush=True); input()"
+    "from bt_actions.goals.ids import new_goal_id; print(new_goal_id().hex(), flush=True); input()"
 )
 
 
@@ -61,7 +61,7 @@ def test_a_process_that_cannot_be_looked_at_counts_as_alive(
     author = author_of(new_goal_id())
     assert author is not None
     monkeypatch.setattr(Path, "read_text", refused)
-    monkeypatch.setattr("bt_actions.goal_ids._machine", lambda: b"any")
+    monkeypatch.setattr("bt_actions.goals.ids._machine", lambda: b"any")
     assert author.alive
     assert not replace(author, pid=2**22 + 1).alive, "no such process"
 
@@ -78,14 +78,14 @@ def test_an_id_from_another_machine_counts_as_alive() -> None:
 def test_a_name_of_its_own_makes_a_container_the_same_machine_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda _: "of the first start")
-    monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
+    monkeypatch.setattr("bt_actions.goals.ids._name_of_machine", lambda _: "of the first start")
+    monkeypatch.setattr("bt_actions.goals.ids._made_by", None)
     unnamed = new_goal_id()
     monkeypatch.setenv(MACHINE, "arm 1")
-    monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
+    monkeypatch.setattr("bt_actions.goals.ids._made_by", None)
     named = new_goal_id()
-    monkeypatch.setattr("bt_actions.goal_ids._name_of_machine", lambda _: "of the second")
-    monkeypatch.setattr("bt_actions.goal_ids._made_by", None)
+    monkeypatch.setattr("bt_actions.goals.ids._name_of_machine", lambda _: "of the second")
+    monkeypatch.setattr("bt_actions.goals.ids._made_by", None)
     assert [author_of(each).here for each in (unnamed, named)] == [False, True]  # type: ignore[union-attr]
     monkeypatch.setenv(MACHINE, "arm 2")
     assert not author_of(named).here  # type: ignore[union-attr]

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions import ledger as module
-from bt_actions.goal_ids import new_goal_id
+from bt_actions.goals.ids import new_goal_id
 from bt_actions.ledger import (
     KEPT_FOR,
     LENGTH,
@@ -31,7 +31,7 @@ from bt_actions.ledger import (
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
 LEAVES = """
 import os, sys
-from bt_actions.goal_ids import new_goal_id
+from bt_actions.goals.ids import new_goal_id
 from bt_actions.ledger import Ledger
 ledger, ids = Ledger(print), [new_goal_id() for _ in range(4)]
 for number, goal_id in enumerate(ids):

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from bt_actions.policy import (
+from bt_actions.goals.policy import (
     RETRIED_BY_DEFAULT,
     RETRIED_IF_NAMED,
     RETRYABLE,

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.attempts import AttemptRecord
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import Now
-from bt_actions.policy import End, Outcome, Timeouts
+from bt_actions.goals.attempts import AttemptRecord
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End, Outcome, Timeouts
+from bt_actions.goals.terms import Now
 from tests.support.reliability import (
     Record,
     family,

@@ -9,8 +9,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from bt_actions.policy import Busy
-from bt_actions.resources import Answer, Resources
+from bt_actions.goals.policy import Busy
+from bt_actions.goals.resources import Answer, Resources
 
 BASE, ARM, BOTH = frozenset({"base"}), frozenset({"arm"}), frozenset({"base", "arm"})
 

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from bt_actions import testimony
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import Event, Now, State
-from bt_actions.policy import End, Timeouts
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End, Timeouts
+from bt_actions.goals.terms import Event, Now, State
 from bt_actions.server import SETTLED_AFTER, SLOWEST_START, ServerWatch
 from bt_actions.twin import TwinTestimony
 

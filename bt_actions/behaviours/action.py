@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Access, Status
 
-from bt_actions.attempts import AttemptRecord, Attempts
 from bt_actions.behaviours.conditions import condition_of, function_of, unknown_field
 from bt_actions.behaviours.node import node_in
 from bt_actions.behaviours.variables import key, resolve, variables_in, write
 from bt_actions.expressions.expression import Expression, ExpressionError
-from bt_actions.goal_terms import Event
-from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.goals.attempts import AttemptRecord, Attempts
+from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.goals.terms import Event
 from bt_actions.ticking import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 

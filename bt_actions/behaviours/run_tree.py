@@ -16,7 +16,7 @@ from py_trees.common import Access
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.variables import Var, read, resolve, variables_in
 from bt_actions.expressions.expression import Expression, ExpressionError
-from bt_actions.policy import Outcome, Timeouts
+from bt_actions.goals.policy import Outcome, Timeouts
 
 __all__ = ["CANCEL", "TYPE", "RunTree", "roots_of"]
 

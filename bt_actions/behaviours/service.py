@@ -13,7 +13,7 @@ from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.conditions import condition_of
 from bt_actions.behaviours.node import node_in
 from bt_actions.expressions.expression import ExpressionError
-from bt_actions.policy import Retry
+from bt_actions.goals.policy import Retry
 
 if TYPE_CHECKING:
     from bt_actions.ros.service_client import ServiceClient

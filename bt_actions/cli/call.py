@@ -120,7 +120,7 @@ class Rejected:
     @property
     def happened(self) -> bool:
         """Whether it did."""
-        from bt_actions.policy import Outcome
+        from bt_actions.goals.policy import Outcome
 
         return self._leaf.outcome is Outcome.REJECTED
 

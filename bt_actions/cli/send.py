@@ -152,7 +152,7 @@ class GoalView:
     def finish(self, closing: Closing) -> None:
         """Write the result and the outcome."""
         from bt_actions.cli.words import CLEAN_UP, goal_text, stood_still
-        from bt_actions.policy import Outcome
+        from bt_actions.goals.policy import Outcome
 
         for line in self.result_lines():
             self._line(line)
@@ -178,7 +178,7 @@ class GoalView:
     def result_lines(self) -> list[str]:
         """Return what the goal's result says."""
         from bt_actions.cli.words import result_lines
-        from bt_actions.policy import End
+        from bt_actions.goals.policy import End
 
         if self._leaf.end not in (End.SUCCEEDED, End.ABORTED):
             return []  # only these have a result of their own

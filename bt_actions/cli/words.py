@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from py_trees.common import Status
 
 from bt_actions.cli.common import Exit
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.run_report import Report, Row, summary, table
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import shorten

@@ -23,7 +23,7 @@ from bt_actions.document.context import Context, Root, plain_name, table_of, wri
 from bt_actions.document.nodes import span_of
 from bt_actions.document.tree import TreeNode
 from bt_actions.document.values import Computed, computed_in
-from bt_actions.policy import Retry, Timeouts
+from bt_actions.goals.policy import Retry, Timeouts
 
 __all__ = ["LEAVES", "build_action"]
 

@@ -36,7 +36,7 @@ from bt_actions.document.shapes import (
     Table,
     Values,
 )
-from bt_actions.policy import RETRYABLE, Busy
+from bt_actions.goals.policy import RETRYABLE, Busy
 
 __all__ = ["ACTION_KEYS", "ALIAS", "KINDS", "LIBRARY_KEYS", "TOP_KEYS", "Group", "Kind"]
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from py_trees.behaviour import Behaviour
 
 from bt_actions.behaviours.variables import Var
-from bt_actions.policy import Retry, Timeouts
+from bt_actions.goals.policy import Retry, Timeouts
 from bt_actions.render.look import action_of
 
 if TYPE_CHECKING:

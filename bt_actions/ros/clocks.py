@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from bt_actions.goal_terms import Now
+from bt_actions.goals.terms import Now
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 

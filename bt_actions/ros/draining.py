@@ -9,8 +9,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 
-from bt_actions.goal import ASK_AGAIN
-from bt_actions.goal_terms import Event, State
+from bt_actions.goals.goal import ASK_AGAIN
+from bt_actions.goals.terms import Event, State
 from bt_actions.ros import alarm
 from bt_actions.ros.shared import Ticket, changed, lock
 from bt_actions.standstill import AT_MOST

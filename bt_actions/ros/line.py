@@ -14,8 +14,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.deadlines import HELD_AT_MOST
-from bt_actions.goal_terms import (
+from bt_actions.goals.deadlines import HELD_AT_MOST
+from bt_actions.goals.policy import Busy, End, Outcome
+from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
     STATUS_SUCCEEDED,
     Command,
@@ -24,7 +25,6 @@ from bt_actions.goal_terms import (
     State,
 )
 from bt_actions.messages.interfaces import interface_name
-from bt_actions.policy import Busy, End, Outcome
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
@@ -41,7 +41,7 @@ from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
-    from bt_actions.goal import Goal
+    from bt_actions.goals.goal import Goal
     from bt_actions.ros.traffic import Traffic
 
 LOOK_WHILE_WAITING = 0.05

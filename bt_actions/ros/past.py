@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goal_terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
+from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.shared import Ticket

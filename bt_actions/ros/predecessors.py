@@ -6,7 +6,7 @@ of them: `bt-actions cleanup`, or `run --cleanup-first`, does (cleanup.py), when
 
 from __future__ import annotations
 
-from bt_actions.goal_ids import Author, author_of
+from bt_actions.goals.ids import Author, author_of
 from bt_actions.ros.log import log
 
 TOLD_AT_MOST = 10

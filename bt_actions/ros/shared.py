@@ -12,11 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import State
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.resources import Resources
+from bt_actions.goals.terms import State
 from bt_actions.ledger import Ledger
-from bt_actions.policy import End, Outcome
-from bt_actions.resources import Resources
 from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.log import log
 from bt_actions.standstill import Leniency

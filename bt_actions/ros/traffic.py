@@ -24,11 +24,11 @@ from typing import Any
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
-from bt_actions.goal import Goal
-from bt_actions.goal_ids import new_goal_id
-from bt_actions.goal_terms import Event, State
-from bt_actions.policy import Busy, End, Timeouts
-from bt_actions.resources import Answer
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.ids import new_goal_id
+from bt_actions.goals.policy import Busy, End, Timeouts
+from bt_actions.goals.resources import Answer
+from bt_actions.goals.terms import Event, State
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks

@@ -14,7 +14,7 @@ import time
 import uuid
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goal_terms import Event, State
+from bt_actions.goals.terms import Event, State
 from bt_actions.hearing import NEVER, TWICE, Hearing
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient

@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.run_report import Report, Row
 
 __all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]

@@ -14,7 +14,7 @@ import pytest
 from bt_actions.cli import main
 from bt_actions.cli.cleanup import _Stop, sweep
 from bt_actions.cli.signals import SAME_WISH
-from bt_actions.policy import End
+from bt_actions.goals.policy import End
 from bt_actions.ros import cleanup as module
 from bt_actions.ros.cleanup import LeftBehind, Swept
 from tests.cli.conftest import Start

@@ -20,7 +20,7 @@ from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import LineView
 from bt_actions.cli.words import Closing
 from bt_actions.events import Event
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.run_report import Report
 from bt_actions.runner import GoalReport
 from tests.cli.fakes import FakeAction, FakeRunner, Story

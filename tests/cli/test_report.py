@@ -20,7 +20,7 @@ from bt_actions.cli.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import PLACE
 from bt_actions.events import Event, NodeChanged, TreeFinished
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.run_report import Report, Row, summary, table
 from bt_actions.ticking import ChangeVisitor, path_of
 from tests.cli.fakes import FakeAction, Story

@@ -26,7 +26,7 @@ from bt_actions.cli.words import Closing, fields_text, last_words, result_lines
 from bt_actions.document import load_tree
 from bt_actions.document.findings import LOADED
 from bt_actions.events import Event, TreeFinished
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.run_report import Report
 from tests.cli.fakes import FakeAction, FakeProgress, Story
 

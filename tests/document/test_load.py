@@ -27,7 +27,7 @@ from bt_actions.document import (
 )
 from bt_actions.document.build import BUILDERS
 from bt_actions.document.model import KINDS
-from bt_actions.policy import Retry, Timeouts
+from bt_actions.goals.policy import Retry, Timeouts
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable
 
-from bt_actions.goal_terms import STATUS_CANCELED, STATUS_SUCCEEDED
+from bt_actions.goals.terms import STATUS_CANCELED, STATUS_SUCCEEDED
 from tests.machine.histories import ACTIONS, History, Play
 from tests.machine.judge import Judge
 from tests.machine.world import CANCELING, NODES, UNANSWERED, Job, Mood

@@ -11,8 +11,8 @@ import random
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from bt_actions.goal_terms import STATUS_CANCELED, STATUS_SUCCEEDED
-from bt_actions.policy import RETRYABLE, Busy, Retry, Timeouts
+from bt_actions.goals.policy import RETRYABLE, Busy, Retry, Timeouts
+from bt_actions.goals.terms import STATUS_CANCELED, STATUS_SUCCEEDED
 from tests.machine.judge import Judge, Violation
 from tests.machine.parts import LeafPlan
 from tests.machine.production import Caller

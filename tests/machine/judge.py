@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goal import PATIENCE, Goal
-from bt_actions.goal_terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
-from bt_actions.policy import Busy, End, Outcome
+from bt_actions.goals.goal import PATIENCE, Goal
+from bt_actions.goals.policy import Busy, End, Outcome
+from bt_actions.goals.terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
 from tests.machine.parts import Before, Leaf, Ledger, Ticket
 
 if TYPE_CHECKING:
-    from bt_actions.attempts import AttemptRecord
+    from bt_actions.goals.attempts import AttemptRecord
     from tests.machine.production import Caller
     from tests.machine.world import Job, ModelServer
 

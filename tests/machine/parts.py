@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from bt_actions.attempts import Attempts
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import State
-from bt_actions.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.goals.attempts import Attempts
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.goals.terms import State
 from bt_actions.testimony import Testimony
 
 if TYPE_CHECKING:

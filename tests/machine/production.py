@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
-from bt_actions.attempts import AttemptRecord, Attempts
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import Command, Event, Now, State
+from bt_actions.goals.attempts import AttemptRecord, Attempts
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.resources import Resources
+from bt_actions.goals.terms import Command, Event, Now, State
 from bt_actions.hearing import Hearing
-from bt_actions.policy import End, Outcome
-from bt_actions.resources import Resources
 from bt_actions.ros import alarm, line, past, shared, traffic, way
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line

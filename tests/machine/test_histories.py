@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from bt_actions.goal import TABLE, Goal
-from bt_actions.goal_terms import Event, State
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.goal import TABLE, Goal
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.terms import Event, State
 from tests.machine.conftest import THOROUGH
 from tests.machine.histories import broken, first_broken, play, random_history, shrink, tell
 
@@ -65,7 +65,7 @@ def test_a_seed_tells_the_same_history_each_time() -> None:
 def test_a_broken_history_shrinks_to_one_that_is_still_broken(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("bt_actions.goal.Goal._release", lambda self: None)
+    monkeypatch.setattr("bt_actions.goals.goal.Goal._release", lambda self: None)
     seed = first_broken(range(100))
     assert seed is not None
     found = random_history(seed)

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from bt_actions.attempts import AttemptRecord, Attempts
-from bt_actions.deadlines import Deadlines
-from bt_actions.goal import TABLE, Goal, Row
-from bt_actions.goal_terms import Command, Event, State
-from bt_actions.policy import Busy, End, Outcome
-from bt_actions.resources import Answer, Resources
+from bt_actions.goals.attempts import AttemptRecord, Attempts
+from bt_actions.goals.deadlines import Deadlines
+from bt_actions.goals.goal import TABLE, Goal, Row
+from bt_actions.goals.policy import Busy, End, Outcome
+from bt_actions.goals.resources import Answer, Resources
+from bt_actions.goals.terms import Command, Event, State
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Domain, Ticket
 from bt_actions.ros.traffic import Traffic

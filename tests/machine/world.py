@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol
 
-from bt_actions.goal_terms import (
+from bt_actions.goals.terms import (
     CANCEL_ACCEPTED,
     CANCEL_REJECTED,
     CANCEL_TERMINATED,

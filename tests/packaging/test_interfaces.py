@@ -11,7 +11,7 @@ from bt_actions_interfaces.msg import ActionReport
 from bt_actions_interfaces.srv import ControlTree
 from robot_control_interfaces.action import Gripper, MoveRobot
 
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 
 INTERFACES = Path(__file__).resolve().parents[2] / "interfaces"
 PACKAGES = ["bt_actions_interfaces", "robot_control_interfaces"]

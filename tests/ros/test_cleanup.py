@@ -14,7 +14,7 @@ from rclpy.context import Context
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions import MoveRobot
-from bt_actions.policy import End
+from bt_actions.goals.policy import End
 from bt_actions.roll_call import RollCall
 from bt_actions.ros import action_view
 from bt_actions.ros import cleanup as module
@@ -27,7 +27,7 @@ SEND = (
     "from rclpy.action import ActionClient;"
     "from robot_control_interfaces.action import MoveRobot;"
     "from unique_identifier_msgs.msg import UUID;"
-    "from bt_actions.goal_ids import new_goal_id;"
+    "from bt_actions.goals.ids import new_goal_id;"
     "rclpy.init(); node = rclpy.create_node('sender');"
     "client = ActionClient(node, MoveRobot, sys.argv[1]); client.wait_for_server();"
     "goal_id = UUID(uuid=list(new_goal_id()));"

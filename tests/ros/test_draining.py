@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import Now, State
-from bt_actions.policy import End, Outcome, Timeouts
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End, Outcome, Timeouts
+from bt_actions.goals.terms import Now, State
 from bt_actions.ros import draining
 from bt_actions.ros.shared import Ticket
 

@@ -9,7 +9,7 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import End, MoveRobot, Outcome
-from bt_actions.goal_terms import Now, State
+from bt_actions.goals.terms import Now, State
 from bt_actions.ros.draining import drain
 from bt_actions.ros.shared import lock
 from tests.support.processes import Host

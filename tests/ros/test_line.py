@@ -17,9 +17,10 @@ from typing import Any
 import pytest
 
 from bt_actions import End, Outcome
-from bt_actions.deadlines import HELD_AT_MOST
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import (
+from bt_actions.goals.deadlines import HELD_AT_MOST
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import Busy, Timeouts
+from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
     STATUS_ABORTED,
     STATUS_SUCCEEDED,
@@ -27,7 +28,6 @@ from bt_actions.goal_terms import (
     Now,
     State,
 )
-from bt_actions.policy import Busy, Timeouts
 from bt_actions.ros import alarm, shared, traffic
 from bt_actions.ros import line as module
 from bt_actions.ros.cancels import Cancels

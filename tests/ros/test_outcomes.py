@@ -31,8 +31,8 @@ from bt_actions import (
 )
 from bt_actions.behaviours.variables import read, write
 from bt_actions.events import GoalChanged
-from bt_actions.goal_terms import Event
-from bt_actions.policy import Busy
+from bt_actions.goals.policy import Busy
+from bt_actions.goals.terms import Event
 from bt_actions.ros import traffic
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic
@@ -581,7 +581,7 @@ class TestDeadlines:
     def test_a_request_that_was_denied_for_long_is_accounted_for(
         self, serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("bt_actions.goal.DENIED_FOR_GOOD", 2.0)  # not 30 s
+        monkeypatch.setattr("bt_actions.goals.goal.DENIED_FOR_GOOD", 2.0)  # not 30 s
         serve("1:drop_goal")
         retry = Retry(2, outcomes={Outcome.ACCEPT_TIMEOUT})
         leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(accept=0.5), retry=retry)
@@ -655,7 +655,7 @@ class TestDeadlines:
     def test_a_result_that_is_never_given_ends_as_the_status_topic_says(
         self, serve: Any, name: str, run: Run, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("bt_actions.goal.RESULT_QUESTIONS", 2)
+        monkeypatch.setattr("bt_actions.goals.goal.RESULT_QUESTIONS", 2)
         serve("1:drop_result")
         leaf = run(MoveRobot("m", 0.1, action_name=name))
         assert stood(leaf) == (Outcome.SERVER_LOST, End.SUCCEEDED)

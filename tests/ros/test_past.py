@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from action_msgs.msg import GoalStatus
 
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import Event, Now
-from bt_actions.policy import Timeouts
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import Timeouts
+from bt_actions.goals.terms import Event, Now
 from bt_actions.ros import line as line_module
 from bt_actions.ros import past as module
 from bt_actions.ros import shared

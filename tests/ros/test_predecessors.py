@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.goal_ids import Author, new_goal_id
+from bt_actions.goals.ids import Author, new_goal_id
 from bt_actions.ros import predecessors as module
 from bt_actions.ros.predecessors import TOLD_AT_MOST, Predecessors
 

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from bt_actions import MoveRobot, TreeRunner
-from bt_actions.goal_terms import Event
-from bt_actions.policy import End
+from bt_actions.goals.policy import End
+from bt_actions.goals.terms import Event
 from bt_actions.ros import line as module
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import Traffic

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from bt_actions.goal_ids import Author
+from bt_actions.goals.ids import Author
+from bt_actions.goals.policy import End
 from bt_actions.ledger import Sent
-from bt_actions.policy import End
 from bt_actions.roll_call import RollCall
 from bt_actions.ros import cleanup as module
 from bt_actions.ros import unanswered as module_of_unanswered
@@ -24,7 +24,7 @@ import sys, rclpy
 from rclpy.action import ActionClient
 from robot_control_interfaces.action import MoveRobot
 from unique_identifier_msgs.msg import UUID
-from bt_actions.goal_ids import new_goal_id
+from bt_actions.goals.ids import new_goal_id
 from bt_actions.ledger import Ledger
 from bt_actions.ros.graph import servers
 action, domain, distance, known, lost = sys.argv[1:]

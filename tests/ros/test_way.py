@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from bt_actions.goal_terms import Event, State
+from bt_actions.goals.terms import Event, State
 from bt_actions.hearing import DOUBT_LASTS, MUTE_AFTER, NEVER, Hearing
 from bt_actions.ros import alarm
 from bt_actions.ros import way as module

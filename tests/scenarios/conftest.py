@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bt_actions.attempts import Attempts
+from bt_actions.goals.attempts import Attempts
 from tests.support.processes import Host, Journal, Process
 from tests.support.reliability import (
     ON_A_BUSY_MACHINE,

@@ -19,8 +19,8 @@ from py_trees.common import Status
 from py_trees.composites import Selector
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
-from bt_actions.attempts import AttemptRecord
-from bt_actions.goal import State
+from bt_actions.goals.attempts import AttemptRecord
+from bt_actions.goals.goal import State
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Change, lock
 from bt_actions.ros.traffic import Traffic

@@ -6,7 +6,7 @@ import pytest
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport, TreeInfo
 
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.serving.catalog import State
 from bt_actions.serving.outcome import ENDS, OUTCOMES, Code
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
-from bt_actions.attempts import AttemptRecord
+from bt_actions.goals.attempts import AttemptRecord
 from bt_actions.simulation import journal
 from tests.support.processes import Journal
 

@@ -11,7 +11,7 @@ from collections.abc import Hashable
 from enum import Enum
 from typing import Generic, TypeVar
 
-from bt_actions.policy import Busy
+from bt_actions.goals.policy import Busy
 
 Holder = TypeVar("Holder", bound=Hashable)
 

@@ -19,8 +19,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bt_actions.deadlines import HELD_AT_MOST, Deadlines
-from bt_actions.goal_terms import (
+from bt_actions.goals.deadlines import HELD_AT_MOST, Deadlines
+from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
+from bt_actions.goals.terms import (
     CANCEL_ACCEPTED,
     CANCEL_REJECTED,
     CANCEL_UNKNOWN_GOAL,
@@ -34,7 +35,6 @@ from bt_actions.goal_terms import (
     Now,
     State,
 )
-from bt_actions.policy import Busy, End, Outcome, Timeouts
 
 ASK_AGAIN = 1.0
 """Seconds between two questions to a server that owes an answer."""

@@ -7,7 +7,7 @@ of its own, and does not know what a deadline means (goal.py).
 
 from __future__ import annotations
 
-from bt_actions.goal_terms import ON_ROS_CLOCK, Event, Now
+from bt_actions.goals.terms import ON_ROS_CLOCK, Event, Now
 
 HELD_AT_MOST = 30.0
 """Seconds for which a deadline is held, one time after the other, until it takes effect."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from bt_actions.policy import End, Outcome
+from bt_actions.goals.policy import End, Outcome
 
 
 class Now(NamedTuple):

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bt_actions.goal import Goal
-from bt_actions.goal_terms import Now
-from bt_actions.policy import RETRYABLE, End, Outcome, Retry
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import RETRYABLE, End, Outcome, Retry
+from bt_actions.goals.terms import Now
 from bt_actions.utilities.plain_text import in_words
 
 
