@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.hearing import (
+from bt_actions.servers.reachability import (
     AT_ONCE,
     DOUBT_LASTS,
     MUTE_AFTER,

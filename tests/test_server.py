@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.server import (
+from bt_actions.servers.presence import (
     LEASE,
     NOT_READY_FOR,
     PROBE_EVERY,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.standstill import (
+from bt_actions.servers.stalls import (
     ANSWERS_TAKE,
     AT_MOST,
     BACK_IN_SIGHT,

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from bt_actions import testimony
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Timeouts
 from bt_actions.goals.terms import Event, Now
-from bt_actions.server import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
+from bt_actions.servers import replies as testimony
+from bt_actions.servers.presence import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER = b"one", b"other"
 BOTH = frozenset({ONE, OTHER})

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from bt_actions import testimony
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Timeouts
 from bt_actions.goals.terms import Event, Now, State
-from bt_actions.server import SETTLED_AFTER, SLOWEST_START, ServerWatch
-from bt_actions.twin import TwinTestimony
+from bt_actions.servers import replies as testimony
+from bt_actions.servers.duplicates import TwinTestimony
+from bt_actions.servers.presence import SETTLED_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER, THIRD, NEW = b"one", b"other", b"third", b"new"
 AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3

@@ -34,9 +34,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions.hearing import Hearing
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
+from bt_actions.servers.reachability import Hearing
 from bt_actions.utilities.plain_text import raised
 
 TAKE_AT_MOST = 200

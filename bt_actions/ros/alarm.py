@@ -16,7 +16,7 @@ from bt_actions.ros.collector import Collector
 from bt_actions.ros.log import log
 from bt_actions.ros.shared import lock
 from bt_actions.ros.suspended import Suspended
-from bt_actions.standstill import Standstill
+from bt_actions.servers.stalls import Standstill
 from bt_actions.utilities.plain_text import raised
 
 AT_LEAST_EVERY = 0.2

@@ -33,7 +33,7 @@ from bt_actions.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
 from bt_actions.ros import participant
 from bt_actions.ros.action_view import STATUS, ActionView
 from bt_actions.ros.unanswered import Unanswered
-from bt_actions.standstill import AT_MOST, STOOD_STILL, Standstill
+from bt_actions.servers.stalls import AT_MOST, STOOD_STILL, Standstill
 
 TURN = 0.05
 """Seconds between two looks for what has come in;"""

@@ -13,7 +13,7 @@ from bt_actions.goals.goal import ASK_AGAIN
 from bt_actions.goals.terms import Event, State
 from bt_actions.ros import alarm
 from bt_actions.ros.shared import Ticket, changed, lock
-from bt_actions.standstill import AT_MOST
+from bt_actions.servers.stalls import AT_MOST
 
 JUST_PAST = 0.1
 """Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""

@@ -34,9 +34,9 @@ from bt_actions.ros.past import Past
 from bt_actions.ros.predecessors import Predecessors
 from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, ledger, lock
 from bt_actions.ros.way import TOO_NEW, Way, ask
-from bt_actions.server import LEASE, PROBES_KEPT, Server, ServerWatch
-from bt_actions.standstill import ANSWERS_TAKE_IN_ALL
-from bt_actions.testimony import Told
+from bt_actions.servers.presence import LEASE, PROBES_KEPT, Server, ServerWatch
+from bt_actions.servers.replies import Told
+from bt_actions.servers.stalls import ANSWERS_TAKE_IN_ALL
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.suggest import did_you_mean, listing
 

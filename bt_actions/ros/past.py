@@ -19,7 +19,7 @@ from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.shared import Ticket
-from bt_actions.twin import TwinTestimony
+from bt_actions.servers.duplicates import TwinTestimony
 
 if TYPE_CHECKING:
     from bt_actions.ros.line import Line

@@ -19,8 +19,8 @@ from bt_actions.goals.terms import State
 from bt_actions.ledger import Ledger
 from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.log import log
-from bt_actions.standstill import Leniency
-from bt_actions.testimony import Testimony
+from bt_actions.servers.replies import Testimony
+from bt_actions.servers.stalls import Leniency
 
 if TYPE_CHECKING:
     from bt_actions.ros.line import Line

@@ -46,7 +46,7 @@ from bt_actions.ros.shared import (
     lock,
 )
 from bt_actions.ros.signals import ended_by_signals, insists
-from bt_actions.server import Server
+from bt_actions.servers.presence import Server
 from bt_actions.utilities.plain_text import in_words, raised
 
 IN_FLIGHT = 8

@@ -15,15 +15,15 @@ import uuid
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goals.terms import Event, State
-from bt_actions.hearing import NEVER, TWICE, Hearing
 from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.graph import enclave, servers
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight, look_for
-from bt_actions.server import LEASE, Server
-from bt_actions.standstill import ANSWERS_TAKE
+from bt_actions.servers.presence import LEASE, Server
+from bt_actions.servers.reachability import NEVER, TWICE, Hearing
+from bt_actions.servers.stalls import ANSWERS_TAKE
 
 if TYPE_CHECKING:
     from bt_actions.ros.line import Line

@@ -12,7 +12,7 @@ from bt_actions.goals.attempts import Attempts
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.goals.terms import State
-from bt_actions.testimony import Testimony
+from bt_actions.servers.replies import Testimony
 
 if TYPE_CHECKING:
     from bt_actions.ros import shared

@@ -17,12 +17,12 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import Command, Event, Now, State
-from bt_actions.hearing import Hearing
 from bt_actions.ros import alarm, line, past, shared, traffic, way
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.ros.line import Line
 from bt_actions.ros.traffic import Traffic
-from bt_actions.standstill import ANSWERS_TAKE, ANSWERS_TAKE_IN_ALL, Standstill
+from bt_actions.servers.reachability import Hearing
+from bt_actions.servers.stalls import ANSWERS_TAKE, ANSWERS_TAKE_IN_ALL, Standstill
 from tests.machine.judge import Judge, Violation
 from tests.machine.parts import Leaf, LeafPlan, Ticket
 from tests.machine.world import NODES, Job, Message, World

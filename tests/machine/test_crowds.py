@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from bt_actions import testimony
 from bt_actions.ros.past import Past
-from bt_actions.twin import TwinTestimony
+from bt_actions.servers import replies as testimony
+from bt_actions.servers.duplicates import TwinTestimony
 from tests.machine.conftest import THOROUGH
 from tests.machine.crowds import CrowdPlay, crowded_history
 from tests.machine.histories import first_broken, shrink, tell

@@ -20,7 +20,7 @@ from bt_actions.goals.terms import Command, Event, State
 from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Domain, Ticket
 from bt_actions.ros.traffic import Traffic
-from bt_actions.standstill import Standstill
+from bt_actions.servers.stalls import Standstill
 from tests.machine.histories import broken, first_broken, random_history
 from tests.machine.production import now as playing
 

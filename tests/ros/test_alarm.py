@@ -13,7 +13,7 @@ from bt_actions.ros import alarm
 from bt_actions.ros.collector import FULL, Collector
 from bt_actions.ros.shared import lock
 from bt_actions.ros.suspended import Suspended
-from bt_actions.standstill import STOOD_STILL
+from bt_actions.servers.stalls import STOOD_STILL
 from tests.support.waiting import until
 
 

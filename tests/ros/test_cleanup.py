@@ -19,7 +19,7 @@ from bt_actions.roll_call import RollCall
 from bt_actions.ros import action_view
 from bt_actions.ros import cleanup as module
 from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
-from bt_actions.standstill import OUT_OF_SIGHT, Standstill
+from bt_actions.servers.stalls import OUT_OF_SIGHT, Standstill
 from tests.support.processes import HostFactory, Journal, Process
 
 SEND = (

@@ -35,8 +35,8 @@ from bt_actions.ros.line import BESIDE, LEASE, LOOK_WHILE_RUNNING, SILENT_FOR, L
 from bt_actions.ros.predecessors import Predecessors
 from bt_actions.ros.shared import FEEDBACK_KEPT, LOST_KEPT, Ticket, lock
 from bt_actions.ros.traffic import Traffic
-from bt_actions.server import PROBES_KEPT, Server, ServerWatch
-from bt_actions.standstill import ANSWERS_TAKE_IN_ALL, AT_MOST, Leniency, Standstill
+from bt_actions.servers.presence import PROBES_KEPT, Server, ServerWatch
+from bt_actions.servers.stalls import ANSWERS_TAKE_IN_ALL, AT_MOST, Leniency, Standstill
 
 OURS, NEW = b"ours", b"new"
 

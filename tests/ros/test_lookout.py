@@ -21,7 +21,7 @@ from bt_actions.ros.graph import enclave
 from bt_actions.ros.log import log
 from bt_actions.ros.lookout import Sight
 from bt_actions.ros.shared import lock
-from bt_actions.standstill import Standstill
+from bt_actions.servers.stalls import Standstill
 from tests.support.trees import in_turn
 from tests.support.waiting import holds_for, until
 

@@ -25,7 +25,7 @@ from bt_actions.ros.line import Line
 from bt_actions.ros.past import QUESTIONS, STALE, Ended, Past
 from bt_actions.ros.predecessors import Predecessors
 from bt_actions.ros.shared import Ticket
-from bt_actions.server import ServerWatch
+from bt_actions.servers.presence import ServerWatch
 
 GOAL, ONE, OTHER = b"goal", b"one", b"other"
 AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3

@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 
 from bt_actions.goals.terms import Event, State
-from bt_actions.hearing import DOUBT_LASTS, MUTE_AFTER, NEVER, Hearing
 from bt_actions.ros import alarm
 from bt_actions.ros import way as module
 from bt_actions.ros.shared import Domain
 from bt_actions.ros.way import Way
-from bt_actions.server import LEASE, Server
-from bt_actions.standstill import ANSWERS_TAKE, Standstill
+from bt_actions.servers.presence import LEASE, Server
+from bt_actions.servers.reachability import DOUBT_LASTS, MUTE_AFTER, NEVER, Hearing
+from bt_actions.servers.stalls import ANSWERS_TAKE, Standstill
 
 
 def way_of(client: Any, state: Server = Server.READY) -> Way:

@@ -24,7 +24,7 @@ from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros import alarm, shared
 from bt_actions.ros.shared import lock
 from bt_actions.ros.traffic import IN_FLIGHT
-from bt_actions.server import Server
+from bt_actions.servers.presence import Server
 from tests.support.foreign import PROGRAMS
 from tests.support.processes import PATIENCE, Host, Journal, Process
 from tests.support.reliability import Record, first_paragraph

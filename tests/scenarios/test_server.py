@@ -25,7 +25,13 @@ from bt_actions.ros.line import Line
 from bt_actions.ros.shared import Change, lock
 from bt_actions.ros.traffic import Traffic
 from bt_actions.ros.way import Way
-from bt_actions.server import NOT_READY_FOR, PROBE_EVERY, SLOWEST_START, Server, ServerWatch
+from bt_actions.servers.presence import (
+    NOT_READY_FOR,
+    PROBE_EVERY,
+    SLOWEST_START,
+    Server,
+    ServerWatch,
+)
 from tests.support.middleware import AS_IT_COMES, NOTHING_SET
 from tests.support.processes import Host, HostFactory, Journal, Process
 from tests.support.reliability import Record

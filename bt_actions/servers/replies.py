@@ -25,7 +25,7 @@ from bt_actions.goals.terms import (
     STATUS_SUCCEEDED,
     Event,
 )
-from bt_actions.server import GID, Server, ServerWatch
+from bt_actions.servers.presence import GID, Server, ServerWatch
 
 Told = list[tuple[Event, Any]]
 NEVER = float("-inf")

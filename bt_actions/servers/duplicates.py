@@ -14,8 +14,8 @@ from typing import Any
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
-from bt_actions.server import GID, ServerWatch
-from bt_actions.testimony import Testimony, Told
+from bt_actions.servers.presence import GID, ServerWatch
+from bt_actions.servers.replies import Testimony, Told
 
 
 class TwinTestimony(Testimony):
