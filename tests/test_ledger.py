@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions import ledger as module
 from bt_actions.goals.ids import new_goal_id
-from bt_actions.ledger import (
+from bt_actions.recovery import ledger as module
+from bt_actions.recovery.ledger import (
     KEPT_FOR,
     LENGTH,
     ROWS_AT_MOST,
@@ -32,7 +32,7 @@ SERVERS = frozenset({b"a" * 16, b"b" * 16})
 LEAVES = """
 import os, sys
 from bt_actions.goals.ids import new_goal_id
-from bt_actions.ledger import Ledger
+from bt_actions.recovery.ledger import Ledger
 ledger, ids = Ledger(print), [new_goal_id() for _ in range(4)]
 for number, goal_id in enumerate(ids):
     ledger.enter(goal_id, f"/robot_{number}/move", number, [b"a" * 16], accept=60.0)

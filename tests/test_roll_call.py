@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bt_actions.roll_call import (
+from bt_actions.recovery.roll_call import (
     ASK_AGAIN,
     LATE,
     QUESTIONS,

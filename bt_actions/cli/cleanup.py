@@ -28,7 +28,7 @@ from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
-    from bt_actions.ros.cleanup import LeftBehind, Swept
+    from bt_actions.recovery.sweep import LeftBehind, Swept
 
 _EPILOG = """\
 A process that is killed (kill -9, out of memory) cannot cancel its goals; the robot goes on. This
@@ -154,7 +154,7 @@ def _sweep(
 ) -> tuple[Swept, list[str], list[str]]:
     """Look, and cancel; return what was seen, goals of others, and actions that are missing."""
     try:
-        from bt_actions.ros.cleanup import CannotStart, cleanup
+        from bt_actions.recovery.sweep import CannotStart, cleanup
     except ImportError as error:
         raise no_ros(error) from error
 

@@ -16,7 +16,7 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import State
-from bt_actions.ledger import Ledger
+from bt_actions.recovery.ledger import Ledger
 from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.log import log
 from bt_actions.servers.replies import Testimony

@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from bt_actions.goals.ids import author_of, new_goal_id
-from bt_actions.ledger import directory
+from bt_actions.recovery.ledger import directory
 from bt_actions.ros.log import log
 from bt_actions.utilities.whole_file import replace_file
 

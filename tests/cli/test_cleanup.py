@@ -15,8 +15,8 @@ from bt_actions.cli import main
 from bt_actions.cli.cleanup import _Stop, sweep
 from bt_actions.cli.signals import SAME_WISH
 from bt_actions.goals.policy import End
-from bt_actions.ros import cleanup as module
-from bt_actions.ros.cleanup import LeftBehind, Swept
+from bt_actions.recovery import sweep as module
+from bt_actions.recovery.sweep import LeftBehind, Swept
 from tests.cli.conftest import Start
 from tests.support.processes import Journal, Process
 from tests.support.waiting import holds_for, until
@@ -179,7 +179,7 @@ def test_a_signal_that_comes_too_late_to_be_told_takes_effect_in_the_end() -> No
 TOO_LATE = """
 import os, signal, sys
 from bt_actions.cli import main
-from bt_actions.ros import cleanup
+from bt_actions.recovery import sweep as cleanup
 cleanup.cleanup = lambda **_: cleanup.Swept([], [], {}, 7)
 main(["cleanup"])
 os.kill(os.getpid(), signal.SIGTERM)

@@ -15,10 +15,10 @@ from unique_identifier_msgs.msg import UUID
 
 from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
-from bt_actions.roll_call import RollCall
+from bt_actions.recovery import sweep as module
+from bt_actions.recovery.roll_call import RollCall
+from bt_actions.recovery.sweep import CannotStart, LeftBehind, Swept, cleanup
 from bt_actions.ros import action_view
-from bt_actions.ros import cleanup as module
-from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
 from bt_actions.servers.stalls import OUT_OF_SIGHT, Standstill
 from tests.support.processes import HostFactory, Journal, Process
 

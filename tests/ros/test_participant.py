@@ -12,8 +12,8 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
 from bt_actions import TreeRunner
+from bt_actions.recovery.sweep import cleanup
 from bt_actions.ros import participant
-from bt_actions.ros.cleanup import cleanup
 from bt_actions.ros.lookout import Sight
 from bt_actions.ros.parameters import parameters_in
 from tests.support.trees import Gate

@@ -11,12 +11,12 @@ import pytest
 
 from bt_actions.goals.ids import Author
 from bt_actions.goals.policy import End
-from bt_actions.ledger import Sent
-from bt_actions.roll_call import RollCall
-from bt_actions.ros import cleanup as module
-from bt_actions.ros import unanswered as module_of_unanswered
-from bt_actions.ros.cleanup import CannotStart, LeftBehind, Swept, cleanup
-from bt_actions.ros.unanswered import Unanswered
+from bt_actions.recovery import sweep as module
+from bt_actions.recovery import unanswered as module_of_unanswered
+from bt_actions.recovery.ledger import Sent
+from bt_actions.recovery.roll_call import RollCall
+from bt_actions.recovery.sweep import CannotStart, LeftBehind, Swept, cleanup
+from bt_actions.recovery.unanswered import Unanswered
 from tests.support.processes import Journal, Process
 
 SEND = """
@@ -25,7 +25,7 @@ from rclpy.action import ActionClient
 from robot_control_interfaces.action import MoveRobot
 from unique_identifier_msgs.msg import UUID
 from bt_actions.goals.ids import new_goal_id
-from bt_actions.ledger import Ledger
+from bt_actions.recovery.ledger import Ledger
 from bt_actions.ros.graph import servers
 action, domain, distance, known, lost = sys.argv[1:]
 domain, distance, lost = int(domain), float(distance), lost == "1"

@@ -680,7 +680,7 @@ def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
     launch: Launch, new_host: HostFactory, tree: Tree, name: str, domain: int, record: Record
 ) -> None:
     """SIGKILL to the orchestrator; SIGSTOP to the server when cleanup sees it; SIGCONT after 8 s"""
-    from bt_actions.ros.cleanup import cleanup
+    from bt_actions.recovery.sweep import cleanup
 
     host = new_host(short_lease=False)
     journal = host.open(name)
@@ -708,7 +708,7 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     """SIGKILL to the orchestrator while cleanup looks, and has seen its goal"""
     from rclpy.context import Context
 
-    from bt_actions.ros.cleanup import LeftBehind, cleanup
+    from bt_actions.recovery.sweep import LeftBehind, cleanup
 
     journal = serve("1:slow=10")
     run = launch("run", str(tree(name, distance=9.0)))

@@ -1,6 +1,6 @@
 """Unanswered: a run is gone, and its server has its goal without having accepted it.
 
-No status tells of such a goal; what its sender had on record does (bt_actions/ledger.py).
+No status tells of such a goal; what its sender had on record does (bt_actions/recovery/ledger.py).
 """
 
 from __future__ import annotations

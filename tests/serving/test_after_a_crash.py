@@ -53,7 +53,7 @@ def test_where_nobody_can_see_what_was_left_no_goal_is_accepted_and_it_is_said_w
     killed.send(signal.SIGKILL)
     host.kill()
     killed.wait()
-    program = "import bt_actions.ros.cleanup as c; c.LOOK_LONGEST = 2.0; " + MAIN
+    program = "import bt_actions.recovery.sweep as c; c.LOOK_LONGEST = 2.0; " + MAIN
     again = start_program("-c", program, "serve", "--trees", str(folder), short_lease=True)
     assert again.wait() == 3
     assert not again.lines

@@ -29,10 +29,10 @@ from bt_actions.goals.goal import DENIED_FOR_GOOD
 from bt_actions.goals.ids import Author, author_of
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
-from bt_actions.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
+from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
+from bt_actions.recovery.unanswered import Unanswered
 from bt_actions.ros import participant
 from bt_actions.ros.action_view import STATUS, ActionView
-from bt_actions.ros.unanswered import Unanswered
 from bt_actions.servers.stalls import AT_MOST, STOOD_STILL, Standstill
 
 TURN = 0.05

@@ -3,7 +3,7 @@
 A server shows the goals that it has accepted. Of one that it has received, and has not decided on
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
 So each process keeps a file of its goals without an answer, its ledger, which outlives it, and
-which cleanup reads (ros/unanswered.py). It lies in memory (/dev/shm), so that writing it waits for
+which cleanup reads (recovery/unanswered.py). It lies in memory (/dev/shm), so that writing it waits for
 no disk.
 
 The file is named by the bytes that all goal ids of its process begin with (goal_ids.py). A goal has

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_actions.ledger import Sent, left_behind, mark_lost, strike_left
-from bt_actions.roll_call import RollCall
+from bt_actions.recovery.ledger import Sent, left_behind, mark_lost, strike_left
+from bt_actions.recovery.roll_call import RollCall
 
 if TYPE_CHECKING:
-    from bt_actions.ros.cleanup import LeftBehind
+    from bt_actions.recovery.sweep import LeftBehind
 
 
 class Unanswered:
