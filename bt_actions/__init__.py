@@ -14,7 +14,7 @@ from bt_actions.behaviours.variables import Var
 from bt_actions.document import load_tree
 from bt_actions.goals.attempts import AttemptRecord
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.runner import GoalReport, TreeError, TreeRunner
+from bt_actions.running.runner import GoalReport, TreeError, TreeRunner
 
 __all__ = [  # noqa: RUF022 - grouped by use
     # leaves

@@ -23,7 +23,7 @@ from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.goals.terms import Event
-from bt_actions.ticking import root_of
+from bt_actions.running.ticking import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
     from bt_actions.cli.views import View
     from bt_actions.cli.words import Closing
-    from bt_actions.run_report import Row
+    from bt_actions.running.report import Row
 
 _EPILOG = """\
 examples:
@@ -156,7 +156,7 @@ class CallView(GoalView):
     def result_lines(self) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""
         from bt_actions.cli.words import brief
-        from bt_actions.run_report import columns
+        from bt_actions.running.report import columns
 
         result = self._leaf.result
         if result is None:

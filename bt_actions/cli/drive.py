@@ -28,11 +28,11 @@ from bt_actions.cli.results import results
 from bt_actions.cli.signals import SAME_WISH, Signals
 from bt_actions.cli.views import QuietView, View
 from bt_actions.cli.words import Closing, waiting_text
-from bt_actions.run_report import Report
+from bt_actions.running.report import Report
 
 if TYPE_CHECKING:
     from bt_actions.events import Event
-    from bt_actions.runner import GoalReport
+    from bt_actions.running.runner import GoalReport
 
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""

@@ -19,7 +19,7 @@ from bt_actions import render
 from bt_actions.cli.choosing import branches, choose, fork_of, is_below
 from bt_actions.cli.stderr import CaughtStderr
 from bt_actions.cli.words import Closing, feedback_text, goal_text, last_words
-from bt_actions.run_report import Report, Row
+from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
 
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ from bt_actions.cli.common import note
 from bt_actions.cli.words import brief
 from bt_actions.document import given_inputs, place_of, tree_name
 from bt_actions.events import Event, TreeStarted
-from bt_actions.run_report import Report, summary
+from bt_actions.running.report import Report, summary
 from bt_actions.utilities.plain_text import clean, in_words
 
 if TYPE_CHECKING:
-    from bt_actions.runner import TreeRunner
+    from bt_actions.running.runner import TreeRunner
 
 
 class Presence:

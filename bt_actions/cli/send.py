@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bt_actions.cli.parser import Subparsers
     from bt_actions.cli.words import Closing
     from bt_actions.events import Event
-    from bt_actions.run_report import Report, Row
+    from bt_actions.running.report import Report, Row
 
 _EPILOG = """\
 examples:

@@ -27,12 +27,12 @@ from bt_actions.cli.signals import Signals
 from bt_actions.cli.simulated import Wanted, remark, wanted
 from bt_actions.cli.views import JsonView, LineView, View
 from bt_actions.cli.words import Closing
-from bt_actions.run_report import Report
+from bt_actions.running.report import Report
 
 if TYPE_CHECKING:
     from bt_actions.events import Event
     from bt_actions.ros.naming import Outlook
-    from bt_actions.runner import GoalReport, TreeRunner
+    from bt_actions.running.runner import GoalReport, TreeRunner
     from bt_actions.simulation.faults import Fault
     from bt_actions.simulation.world import Part
 
@@ -70,7 +70,7 @@ class Session:
             import bt_actions.ros.spinning  # noqa: F401 - the runner imports it late
         except ImportError as error:
             raise no_ros(error) from error
-        from bt_actions.runner import TreeRunner as Runner
+        from bt_actions.running.runner import TreeRunner as Runner
 
         self.report = Report(root)
         with starting_ros():
@@ -251,7 +251,7 @@ def _bug(error: BaseException | None) -> str:
     """One line about an exception in a behaviour, with the place in the user's code."""
     if error is None:
         return ""
-    from bt_actions.runner import TreeError
+    from bt_actions.running.runner import TreeError
 
     cause = error.__cause__ or error
     frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)

@@ -17,7 +17,7 @@ from py_trees.common import Status
 from bt_actions.cli.words import Closing, goal_text, last_words, outputs_of, troubles
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.render import action_of, kind, rows
-from bt_actions.run_report import DONE, Report, Row, place_of
+from bt_actions.running.report import DONE, Report, Row, place_of
 from bt_actions.utilities.plain_text import as_json, clean
 
 if TYPE_CHECKING:

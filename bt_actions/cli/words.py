@@ -12,7 +12,7 @@ from py_trees.common import Status
 
 from bt_actions.cli.common import Exit
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.run_report import Report, Row, summary, table
+from bt_actions.running.report import Report, Row, summary, table
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import shorten
 

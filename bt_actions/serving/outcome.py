@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass
 
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.run_report import Report, Row
+from bt_actions.running.report import Report, Row
 
 __all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]
 

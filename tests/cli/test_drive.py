@@ -21,8 +21,8 @@ from bt_actions.cli.views import LineView
 from bt_actions.cli.words import Closing
 from bt_actions.events import Event
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.run_report import Report
-from bt_actions.runner import GoalReport
+from bt_actions.running.report import Report
+from bt_actions.running.runner import GoalReport
 from tests.cli.fakes import FakeAction, FakeRunner, Story
 from tests.support.waiting import until
 

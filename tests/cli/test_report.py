@@ -21,8 +21,8 @@ from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import PLACE
 from bt_actions.events import Event, NodeChanged, TreeFinished
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.run_report import Report, Row, summary, table
-from bt_actions.ticking import ChangeVisitor, path_of
+from bt_actions.running.report import Report, Row, summary, table
+from bt_actions.running.ticking import ChangeVisitor, path_of
 from tests.cli.fakes import FakeAction, Story
 
 

@@ -27,7 +27,7 @@ from bt_actions.document import load_tree
 from bt_actions.document.findings import LOADED
 from bt_actions.events import Event, TreeFinished
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.run_report import Report
+from bt_actions.running.report import Report
 from tests.cli.fakes import FakeAction, FakeProgress, Story
 
 

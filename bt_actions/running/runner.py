@@ -28,7 +28,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.ticking import (
+from bt_actions.running.ticking import (
     ChangeVisitor,
     Misbehaviour,
     Patience,

@@ -1,0 +1,1 @@
+"""Running a tree: ticks, the runner, the report of a run."""
