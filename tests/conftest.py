@@ -60,7 +60,7 @@ def _all_records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def _records(_all_records: Path) -> Iterator[None]:
-    """What a test's programs send and nobody answers is no other test's (bt_actions/recovery/ledger.py).
+    """What a test's programs send and nobody answers is no other test's (recovery/ledger.py).
 
     With a patch of its own: the test's has to be undone before what other fixtures have patched.
     """

@@ -2,8 +2,8 @@
 
 It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-What happens to the goal is decided in goal.py and carried out in ros/traffic.py; here stand only
-the visit to the leaf, its attempts, and what the tree sees of them.
+What happens to the goal is decided in goals/goal.py and carried out in ros/traffic.py; here stand
+only the visit to the leaf, its attempts, and what the tree sees of them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.goals.terms import Event
-from bt_actions.running.ticking import root_of
+from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.gate import Gate
-from bt_actions.expressions.values import plain
+from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
 
 __all__ = ["ForEach", "Repeat", "RetryChild"]

@@ -160,6 +160,6 @@ class CallService(Behaviour):
             return True
         try:
             return self._when(self.response)
-        except ExpressionError as error:  # counts as no, as in attempts.py
+        except ExpressionError as error:  # counts as no, as in goals/attempts.py
             self.feedback_message += f"; retry.when: {error.message}"
             return False

@@ -12,7 +12,7 @@ from typing import Any
 
 from py_trees.blackboard import Blackboard
 
-from bt_actions.expressions.values import numbers_only
+from bt_actions.utilities.plain_data import numbers_only
 
 
 class MissingVariable(ValueError, KeyError):

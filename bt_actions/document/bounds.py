@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import chain
 
-from bt_actions.expressions.values import numbers_only
+from bt_actions.utilities.plain_data import numbers_only
 
 __all__ = ["MAX_CHARACTERS", "MAX_ITEMS", "MAX_LEVELS", "refuse_large"]
 

@@ -21,7 +21,7 @@ from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.tree import Document
 from bt_actions.document.unread import Doubts
 from bt_actions.document.workspace import Workspace
-from bt_actions.expressions.values import plain
+from bt_actions.utilities.plain_data import plain
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour

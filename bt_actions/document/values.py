@@ -33,7 +33,7 @@ from bt_actions.document.nodes import (
 from bt_actions.document.source import SUFFIXES, Source, read_source
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.expressions.values import MAX_ITEMS as MAX_TEXT
-from bt_actions.expressions.values import numbers_only
+from bt_actions.utilities.plain_data import numbers_only
 
 __all__ = [
     "BAD",

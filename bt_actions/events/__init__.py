@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.goals.policy import End, Outcome
-
-if TYPE_CHECKING:
-    from bt_actions.behaviours.action import ActionBehaviour
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +36,8 @@ class GoalChanged:
     """A goal has a new state, outcome or end; also after its leaf has left it."""
 
     time: float
-    behaviour: ActionBehaviour
+    behaviour: Behaviour
+    """The leaf, an `ActionBehaviour`."""
     state: str
     attempt: int
     outcome: Outcome | None

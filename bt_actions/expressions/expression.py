@@ -25,11 +25,11 @@ from bt_actions.expressions.values import (
     call,
     field,
     item,
-    plain,
     reason,
     show,
     truth,
 )
+from bt_actions.utilities.plain_data import plain
 
 __all__ = ["MAX_LENGTH", "Expression", "ExpressionError"]
 

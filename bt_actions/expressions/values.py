@@ -14,6 +14,7 @@ from dataclasses import fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
 
+from bt_actions.utilities.plain_data import plain, scalar
 from bt_actions.utilities.plain_text import in_words
 from bt_actions.utilities.shorten import shorten
 
@@ -23,7 +24,6 @@ FUNCTIONS: dict[str, Callable[..., object]] = {"len": len, "abs": abs, "min": mi
 
 ONE_VALUE = frozenset({"len", "abs"})
 """The functions that take no list of arguments."""
-_NUMBERS = frozenset({bool, int, float})
 
 
 LENGTHS = frozenset({"length", "size", "count"})
@@ -56,11 +56,6 @@ def _length(value: object) -> int:
     if not isinstance(value, Sized):
         raise ValueError(f"{show(value)} has no length")
     return len(value)
-
-
-def numbers_only(items: Iterable[object]) -> bool:
-    """Whether nothing but numbers is in a list; looks at millions without a loop of Python's."""
-    return _NUMBERS.issuperset(map(type, items))
 
 
 def number(value: object) -> int | float:
@@ -145,30 +140,6 @@ def item(value: object, index: object) -> object:
     if not -size <= index < size:
         raise ValueError(f"index {index} is outside of {size} items")
     return scalar(value[index])
-
-
-def scalar(value: object) -> object:
-    """A numpy scalar, and a byte of ROS, as Python's own number; arrays stay as they are until
-    somebody compares them."""
-    if isinstance(value, bytes) and len(value) == 1:
-        return value[0]
-    if type(value).__module__ == "numpy" and not getattr(value, "shape", ()):
-        return value.item()  # type: ignore[attr-defined]
-    return value
-
-
-def plain(value: object) -> object:
-    if isinstance(value, (bool, int, float, str)):
-        return value
-    if isinstance(value, bytes):
-        return scalar(value)
-    if isinstance(value, list):
-        return [scalar(item) for item in value] if value and isinstance(value[0], bytes) else value
-    to_list = getattr(value, "tolist", None)  # array.array and numpy alike
-    if to_list is not None and type(value).__module__ in ("array", "numpy"):
-        items: object = to_list()
-        return items
-    return value
 
 
 def bounded(value: object) -> object:

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from bt_actions.expressions.values import numbers_only, plain, scalar
 from bt_actions.messages.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
 from bt_actions.messages.fields import (
     FLOATS,
@@ -33,6 +32,7 @@ from bt_actions.messages.interfaces import (
     interface_name,
     short_name,
 )
+from bt_actions.utilities.plain_data import numbers_only, plain, scalar
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 

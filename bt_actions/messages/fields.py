@@ -12,8 +12,8 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
-from bt_actions.expressions.values import scalar
 from bt_actions.messages.interfaces import short_name
+from bt_actions.utilities.plain_data import scalar
 
 __all__ = [
     "FLOATS",

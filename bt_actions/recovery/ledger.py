@@ -3,14 +3,14 @@
 A server shows the goals that it has accepted. Of one that it has received, and has not decided on
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
 So each process keeps a file of its goals without an answer, its ledger, which outlives it, and
-which cleanup reads (recovery/unanswered.py). It lies in memory (/dev/shm), so that writing it waits for
-no disk.
+which cleanup reads (recovery/unanswered.py). It lies in memory (/dev/shm), so that writing it waits
+for no disk.
 
-The file is named by the bytes that all goal ids of its process begin with (goal_ids.py). A goal has
-a row of fixed length, which is written in place before the goal is sent, and blanked when it has
-been answered. A process that ends in good order removes the file, but for goals whose server went
-away: that may only stand still. What is read is believed no further than that a question about a
-goal is worth asking.
+The file is named by the bytes that all goal ids of its process begin with (goals/ids.py). A goal
+has a row of fixed length, which is written in place before the goal is sent, and blanked when it
+has been answered. A process that ends in good order removes the file, but for goals whose server
+went away: that may only stand still. What is read is believed no further than that a question about
+a goal is worth asking.
 """
 
 from __future__ import annotations

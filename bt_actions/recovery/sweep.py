@@ -1,7 +1,7 @@
 """Finds and cancels goals that a killed orchestrator left on servers it can no longer speak to.
 
 A process that dies by SIGKILL cancels nothing. Its goals are found in the status topics of all
-actions in sight, told by their ids (goal_ids.py), and canceled one by one; goals of other clients,
+actions in sight, told by their ids (goals/ids.py), and canceled one by one; goals of other clients,
 and of orchestrators that are alive, or that cannot be looked for from here, are never touched. No
 action type is needed for any of it. That a server has nothing to tell is believed when it has
 answered for long enough (roll_call.py).

@@ -3,7 +3,7 @@
 A server keeps the last ten requests of all its clients together and drops the others silently:
 sixty goals that are interrupted in one moment would go on for a second, until they are canceled
 again. So what is over waits here for an answer, or until one is not expected any more. It decides
-nothing: who is to be canceled, and when again, is goal.py's. All under the one lock.
+nothing: who is to be canceled, and when again, is goals/goal.py's. All under the one lock.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 In a program that holds millions of objects a full collection takes half a second and more. To this
 process's deadlines it looks as if the process had been stopped, and it is not so: the middleware's
-own threads run, and take in what is sent. Judges nothing (standstill.py).
+own threads run, and take in what is sent. Judges nothing (servers/stalls.py).
 """
 
 from __future__ import annotations

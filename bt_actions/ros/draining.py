@@ -1,7 +1,7 @@
 """Waits, under one deadline, until goals that nobody wants any more are accounted for.
 
 It cancels them, takes what is answered, and gives up in the end: no goal is waited for twice. What
-becomes of a goal is for goal.py to decide, and when to ask anew, too.
+becomes of a goal is for goals/goal.py to decide, and when to ask anew, too.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """One action server as one node sees it: the shared client, the watch, and the goals on it.
 
 Takes what the server says and what discovery shows, tells the goals, and does what they say. It
-decides nothing about a goal (goal.py), about who is alive (server.py), about what is believed
-(testimony.py), or about goals that have ended (past.py). All under the one lock.
+decides nothing about a goal (goals/goal.py), about who is alive (servers/presence.py), about what
+is believed (servers/replies.py), or about goals that have ended (past.py). All under the one lock.
 """
 
 from __future__ import annotations
@@ -340,7 +340,7 @@ class Line:
                 self._send_cancel(goal.id)
             else:
                 self.ask_to_cancel(goal.id)
-        except Exception as error:  # noqa: BLE001 - InvalidHandle, RCLError, or TypeError of a wrong message
+        except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
             if command is Command.SEND:
                 self.tell(ticket, Event.SEND_FAILED, error)
             else:

@@ -2,7 +2,8 @@
 
 A word of such a goal may be older than its end, or the word of another server of the name that took
 it, too. This tells the two apart, asks where it cannot, and hands the line a twin where there is
-one. What is believed of what servers say of that is twin.py's. All under the one lock.
+one. What is believed of what servers say of that is servers/duplicates.py's. All under the one
+lock.
 """
 
 from __future__ import annotations

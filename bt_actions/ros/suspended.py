@@ -1,6 +1,7 @@
 """For how long the whole machine was suspended, in which the steady clock stands still, too.
 
-Servers on other machines go on meanwhile and may drop this process. Judges nothing (standstill.py).
+Servers on other machines go on meanwhile and may drop this process. Judges nothing
+(servers/stalls.py).
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ deadlines and the watch over the servers (on the alarm, a plain thread that slee
 open). What a leaf leaves behind is thereby drained without it.
 
 One lock guards all of it. Under the lock nothing waits, and no code of the user's runs: observers
-only take note. This file decides nothing about a goal (goal.py), its tries (attempts.py), or
-whether a server is alive (server.py).
+only take note. This file decides nothing about a goal (goals/goal.py), its tries
+(goals/attempts.py), or whether a server is alive (servers/presence.py).
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """How one line reaches its server: in its node's participant or, where that fails, in another.
 
 Our participant may be blind to a server that runs (ros/lookout.py), or that server deaf to it
-(hearing.py). This tells the lookout when, tries a client in the participant that it makes, and has
-the line go on with that one, and come home again when it is gone. Of goals it decides nothing: they
-are told that their server is to be asked anew, and given time for that. All under the one lock.
+(servers/reachability.py). This tells the lookout when, tries a client in the participant that it
+makes, and has the line go on with that one, and come home again when it is gone. Of goals it
+decides nothing: they are told that their server is to be asked anew, and given time for that. All
+under the one lock.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from py_trees.composites import Selector
 from bt_actions import document
 from bt_actions.behaviours.gate import Gate
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.ticking import path_of
+from bt_actions.utilities.places import path_of
 from bt_actions.utilities.plain_text import clean
 
 if TYPE_CHECKING:

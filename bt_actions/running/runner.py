@@ -28,16 +28,8 @@ from py_trees.trees import BehaviourTree
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.ticking import (
-    ChangeVisitor,
-    Misbehaviour,
-    Patience,
-    SetUp,
-    culprit_of,
-    path_of,
-    root_of,
-    tick_once,
-)
+from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, Patience, SetUp, tick_once
+from bt_actions.utilities.places import culprit_of, path_of, root_of
 from bt_actions.utilities.plain_text import raised
 
 if TYPE_CHECKING:

@@ -14,6 +14,8 @@ from py_trees.composites import Composite
 from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
+from bt_actions.utilities.places import path_of
+
 
 def tick_once(tree: BehaviourTree) -> None:
     """Tick as `BehaviourTree.tick` does, which walks the whole tree even for no visitor."""
@@ -197,30 +199,3 @@ class ChangeVisitor(VisitorBase):
                 self._known[node] = node.status
                 changes.append((node, node.status))
         return changes
-
-
-def root_of(behaviour: Behaviour) -> Behaviour:
-    """Return the root of the tree that the behaviour is in."""
-    while behaviour.parent is not None:
-        behaviour = behaviour.parent
-    return behaviour
-
-
-def path_of(behaviour: Behaviour) -> tuple[str, ...]:
-    """Return the names from the root down to the behaviour."""
-    names = [behaviour.name]
-    while behaviour.parent is not None:
-        behaviour = behaviour.parent
-        names.append(behaviour.name)
-    return tuple(reversed(names))
-
-
-def culprit_of(error: BaseException) -> Behaviour | None:
-    """Return the innermost behaviour on the way to where `error` was raised."""
-    culprit, traceback = None, error.__traceback__
-    while traceback is not None:
-        candidate = traceback.tb_frame.f_locals.get("self")
-        if isinstance(candidate, Behaviour):
-            culprit = candidate
-        traceback = traceback.tb_next
-    return culprit

@@ -20,8 +20,8 @@ from bt_actions.events import Event, NodeChanged
 from bt_actions.messages.conversion import to_plain
 from bt_actions.running.report import Report
 from bt_actions.running.runner import TreeRunner
-from bt_actions.running.ticking import path_of
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
+from bt_actions.utilities.places import path_of
 from bt_actions.utilities.plain_text import as_json
 
 __all__ = ["Leaf", "Run"]

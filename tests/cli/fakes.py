@@ -11,7 +11,7 @@ from py_trees.common import Status
 
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.ticking import path_of
+from bt_actions.utilities.places import path_of
 
 
 @dataclass

@@ -22,7 +22,8 @@ from bt_actions.document.findings import PLACE
 from bt_actions.events import Event, NodeChanged, TreeFinished
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row, summary, table
-from bt_actions.running.ticking import ChangeVisitor, path_of
+from bt_actions.running.ticking import ChangeVisitor
+from bt_actions.utilities.places import path_of
 from tests.cli.fakes import FakeAction, Story
 
 

@@ -1,4 +1,4 @@
-"""What is on record of a goal (bt_actions/recovery/ledger.py): from before it is sent until its answer."""
+"""What is on record of a goal (recovery/ledger.py): from before it is sent until its answer."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.fixture(autouse=True)
 def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The records of what is sent (bt_actions/recovery/ledger.py), of this scenario's programs alone."""
+    """The records of what is sent (recovery/ledger.py), of this scenario's programs alone."""
     directory = tmp_path / "ledger"
     monkeypatch.setenv("BT_ACTIONS_LEDGER", str(directory))
     return directory

@@ -1,0 +1,32 @@
+"""Where a behaviour stands in its tree. No ROS."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+
+
+def root_of(behaviour: Behaviour) -> Behaviour:
+    """Return the root of the tree that the behaviour is in."""
+    while behaviour.parent is not None:
+        behaviour = behaviour.parent
+    return behaviour
+
+
+def path_of(behaviour: Behaviour) -> tuple[str, ...]:
+    """Return the names from the root down to the behaviour."""
+    names = [behaviour.name]
+    while behaviour.parent is not None:
+        behaviour = behaviour.parent
+        names.append(behaviour.name)
+    return tuple(reversed(names))
+
+
+def culprit_of(error: BaseException) -> Behaviour | None:
+    """Return the innermost behaviour on the way to where `error` was raised."""
+    culprit, traceback = None, error.__traceback__
+    while traceback is not None:
+        candidate = traceback.tb_frame.f_locals.get("self")
+        if isinstance(candidate, Behaviour):
+            culprit = candidate
+        traceback = traceback.tb_next
+    return culprit
