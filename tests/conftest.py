@@ -228,14 +228,14 @@ def no_leaks(domain: int) -> Iterator[None]:
 
     Goals of servers that are gone stay open on purpose, in case the server returns.
     """
-    from bt_actions.ros import alarm
-    from bt_actions.ros.line import Line
-    from bt_actions.ros.shared import domain_of
+    from bt_actions.traffic import alarm
+    from bt_actions.traffic.endpoint import ActionEndpoint
+    from bt_actions.traffic.shared import domain_of
     from tests.support.waiting import until
 
     def open_goals() -> list[Any]:
-        lines = [line for line in alarm.minded() if isinstance(line, Line)]
-        goals = [ticket.goal for line in lines for ticket in list(line.goals.values())]
+        lines = [line for line in alarm.minded() if isinstance(line, ActionEndpoint)]
+        goals = [handle.goal for line in lines for handle in list(line.goals.values())]
         return [goal for goal in goals if not goal.lost]
 
     def threads() -> set[threading.Thread]:

@@ -130,7 +130,7 @@ def denied_suspect() -> Life:
 
 def test_a_wish_to_stop_means_something_in_every_state_and_each_event_in_some() -> None:
     for state in State:
-        for event in (Event.INTERRUPTED, Event.CLOSED):
+        for event in (Event.INTERRUPTED, Event.PROCESS_EXITING):
             assert not TABLE[state, event].drops, f"{event} in {state}"
     for event in Event:
         assert not all(TABLE[state, event].drops for state in State), event
@@ -281,14 +281,14 @@ def test_a_twin_is_canceled_and_holds_nothing() -> None:
     """A goal that has ended, and that a second server runs."""
     life = executing()
     life.on(Event.RESULT, SUCCEEDED)
-    twin = life.goal.twin(life.now)
-    assert (twin.id, twin.outcome) == (life.goal.id, Outcome.SERVER_AMBIGUOUS)
-    assert not twin.holding
-    assert list(twin.on(Event.SERVER_RETURNED, life.now)) == [CANCEL, ASK]
-    assert twin.end is End.UNKNOWN
-    assert twin.bars(waiting().goal, same_server=True)
-    assert list(twin.on(Event.RESULT, life.now, CANCELED)) == []
-    assert (twin.state, twin.end) == (State.DONE, End.CANCELED)
+    duplicate = life.goal.duplicate(life.now)
+    assert (duplicate.id, duplicate.outcome) == (life.goal.id, Outcome.SERVER_AMBIGUOUS)
+    assert not duplicate.holding
+    assert list(duplicate.on(Event.SERVER_RETURNED, life.now)) == [CANCEL, ASK]
+    assert duplicate.end is End.UNKNOWN
+    assert duplicate.blocks(waiting().goal, same_server=True)
+    assert list(duplicate.on(Event.RESULT, life.now, CANCELED)) == []
+    assert (duplicate.state, duplicate.end) == (State.DONE, End.CANCELED)
 
 
 @pytest.mark.parametrize("how", ["at once", "in time"])
@@ -527,7 +527,7 @@ def test_what_the_server_said_of_a_cancel_is_told_as_long_as_it_holds() -> None:
     assert "has not answered" in life.goal.cancel_said, "it is another one, perhaps"
     life.on(Event.CANCEL_ANSWERED, CANCEL_ACCEPTED)
     life.on(Event.CANCEL_ANSWERED, CANCEL_TERMINATED)
-    life.on(Event.LEFT)
+    life.on(Event.NODE_CLOSED)
     assert "has agreed to cancel it, and it has not ended" in life.goal.cancel_said
 
 
@@ -610,7 +610,7 @@ def test_a_word_about_a_goal_that_is_done_wakes_nobody() -> None:
     life.on(Event.INTERRUPTED)
     for _ in range(UNHEARD):
         life.pass_time(ASK_AGAIN)
-    life.on(Event.CLOSED)
+    life.on(Event.PROCESS_EXITING)
     life.on(Event.STATUS, STATUS_CANCELED)
     assert life.due_in is None
 
@@ -621,7 +621,7 @@ def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_s
         life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
         life.pass_time(1.0)
     assert not life.goal.suspect
-    for goes in (Event.SERVER_LOST, Event.LEFT):
+    for goes in (Event.SERVER_LOST, Event.NODE_CLOSED):
         life.on(goes, "gone")
         assert life.on(Event.SERVER_RETURNED) == [CANCEL], "to ask does no harm"
         life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
@@ -946,10 +946,10 @@ def test_a_suspect_bars_nothing_longer_than_its_server_that_is_back_takes_to_den
     life = denied_suspect()
     life.on(Event.SERVER_LOST, "cut")
     life.on(Event.SERVER_RETURNED)
-    assert life.goal.owed
+    assert life.goal.outstanding
     denied(life)
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
-    assert not life.goal.owed
+    assert not life.goal.outstanding
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK], "and if it turns up all the same"
 
 
@@ -991,12 +991,12 @@ def test_a_goal_that_its_server_denies_is_canceled_all_the_same() -> None:
 def test_what_its_node_leaves_is_canceled_where_its_server_is_seen_again(make: Any) -> None:
     life = make()
     life.on(Event.INTERRUPTED)
-    assert life.on(Event.LEFT) == [RELEASE]
+    assert life.on(Event.NODE_CLOSED) == [RELEASE]
     life.is_free(Outcome.CANCELED, End.UNKNOWN)
     assert life.due_in is None
-    assert life.on(Event.LEFT) == []
+    assert life.on(Event.NODE_CLOSED) == []
     assert CANCEL in life.on(Event.SERVER_RETURNED)
-    assert life.goal.owed
+    assert life.goal.outstanding
     life.on(Event.RESULT, CANCELED)
     assert (life.goal.state, life.goal.end) == (State.DONE, End.CANCELED)
 
@@ -1063,7 +1063,7 @@ def test_a_server_that_dies_after_showing_the_end_leaves_no_question() -> None:
 @pytest.mark.parametrize("make", [sending, executing, suspect])
 def test_a_process_that_ends_says_which_goal_it_cannot_account_for(make: Any) -> None:
     life = make()
-    life.on(Event.CLOSED)
+    life.on(Event.PROCESS_EXITING)
     assert life.goal.state is State.DONE
     assert life.goal.end is End.UNKNOWN
     assert life.goal.outcome is not None
@@ -1071,7 +1071,7 @@ def test_a_process_that_ends_says_which_goal_it_cannot_account_for(make: Any) ->
 
 def test_a_process_that_ends_before_sending_has_nothing_to_account_for() -> None:
     life = waiting()
-    life.on(Event.CLOSED)
+    life.on(Event.PROCESS_EXITING)
     life.ended(Outcome.CANCELED, End.NEVER_STARTED)
 
 
@@ -1196,7 +1196,7 @@ def test_a_suspect_that_was_waited_for_in_vain_is_unknown_and_still_canceled_if_
     assert life.goal.suspect
     life.on(Event.DRAINED)
     assert (life.goal.outcome, life.goal.end) == (Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
-    assert not life.goal.owed, "the server may get other goals"
+    assert not life.goal.outstanding, "the server may get other goals"
     assert Command.CANCEL in life.on(Event.ACCEPTED)
 
 
@@ -1204,9 +1204,9 @@ def test_what_was_waited_for_in_vain_bars_others_again_when_its_lost_server_is_b
     life = suspect()
     life.on(Event.DRAINED)
     life.on(Event.SERVER_LOST, "gone")
-    assert not life.goal.owed
+    assert not life.goal.outstanding
     assert life.on(Event.SERVER_RETURNED) == [CANCEL]
-    assert life.goal.owed, "the server may have it after all, and can be asked now"
+    assert life.goal.outstanding, "the server may have it after all, and can be asked now"
 
 
 def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -> None:
@@ -1216,11 +1216,11 @@ def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -
     own = frozenset({"base", "arm"})
     life.goal.resources = own
     life.on(Event.SERVER_LOST, "gone")
-    assert not life.goal.bars(base, same_server=True), "nobody can tell, and it holds nothing"
+    assert not life.goal.blocks(base, same_server=True), "nobody can tell, and it holds nothing"
     life.on(Event.SERVER_RETURNED)
-    assert life.goal.bars(base, same_server=False)
-    assert not life.goal.bars(beside, same_server=False)
-    assert life.goal.bars(beside, same_server=True)
+    assert life.goal.blocks(base, same_server=False)
+    assert not life.goal.blocks(beside, same_server=False)
+    assert life.goal.blocks(beside, same_server=True)
 
 
 def test_a_suspect_that_is_denied_for_good_need_not_be_waited_for() -> None:
@@ -1284,7 +1284,7 @@ def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> No
     for _ in range(int(DENIED_FOR_GOOD / (away + 1.5)) + 1):
         life.pass_time(1.5)
         denied(life)
-        life.on(Event.LEFT)
+        life.on(Event.NODE_CLOSED)
         life.pass_time(away)
         life.on(Event.SERVER_RETURNED)
     denied(life)
@@ -1296,9 +1296,9 @@ def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> No
 @pytest.mark.parametrize(
     ("ways", "counts"),
     [
-        ([Event.LEFT], True),
+        ([Event.NODE_CLOSED], True),
         ([Event.SERVER_LOST], False),
-        ([Event.LEFT, Event.SERVER_LOST], False),
+        ([Event.NODE_CLOSED, Event.SERVER_LOST], False),
     ],
     ids=["left", "lost", "left, and then out of sight"],
 )
@@ -1328,5 +1328,5 @@ def test_a_process_that_ends_does_not_say_never_started_of_a_request_without_ans
     life = suspect()
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     life.pass_time(life.goal.timeouts.accept or 0.0)
-    life.on(Event.CLOSED)
+    life.on(Event.PROCESS_EXITING)
     life.ended(Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)

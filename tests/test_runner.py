@@ -1455,7 +1455,7 @@ class TestLastMoments:
         self, host: Host, name: str, node: Any
     ) -> None:
         """Its server comes back while the observers are told that the tree has finished."""
-        from bt_actions.ros.shared import Change
+        from bt_actions.traffic.shared import Change
 
         host.open(name, "1:reject_cancel")
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.2, cancel=0.3))
@@ -1463,11 +1463,11 @@ class TestLastMoments:
 
             def late(event: Any) -> None:
                 if isinstance(event, TreeFinished):
-                    (ticket,) = runner._tickets
-                    runner._tickets.clear()  # as of a goal that was lost, and so accounted for
-                    goal = ticket.goal
+                    (handle,) = runner._handles
+                    runner._handles.clear()  # as of a goal that was lost, and so accounted for
+                    goal = handle.goal
                     now = time.monotonic()
-                    change = Change(now, ticket, goal.state, goal.outcome, goal.end, goal.reason)
+                    change = Change(now, handle, goal.state, goal.outcome, goal.end, goal.reason)
                     runner._note(change)
 
             runner.observe(late)

@@ -2,8 +2,8 @@
 
 It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-What happens to the goal is decided in goals/goal.py and carried out in ros/traffic.py; here stand
-only the visit to the leaf, its attempts, and what the tree sees of them.
+What happens to the goal is decided in goals/goal.py and carried out in traffic/traffic.py; here
+stand only the visit to the leaf, its attempts, and what the tree sees of them.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:
-    from bt_actions.ros.shared import Ticket
-    from bt_actions.ros.traffic import Traffic
+    from bt_actions.traffic.shared import GoalHandle
+    from bt_actions.traffic.traffic import Traffic
 
 CHANCE = random.Random()
 """Varies the pauses before retries; one for all leaves, as a seed costs more than a leaf."""
@@ -120,9 +120,9 @@ class ActionBehaviour(Behaviour):
         self._to_save: dict[str, Any] = {}
         self._shown_feedback: tuple[Any, str] = (None, "")
         self._traffic: Traffic | None = None
-        self._line: Any = None
-        self._ticket: Ticket | None = None
-        self._left_behind: list[Ticket] = []
+        self._endpoint: Any = None
+        self._handle: GoalHandle | None = None
+        self._left_behind: list[GoalHandle] = []
         self._attempts = Attempts(self.retry, self._when, CHANCE)
         self._tree_closed = False
         self._started = 0.0
@@ -143,17 +143,17 @@ class ActionBehaviour(Behaviour):
     @property
     def end(self) -> End | None:
         """How the last goal stands on its server, as far as is known by now."""
-        return self._ticket.goal.end if self._ticket is not None else None
+        return self._handle.goal.end if self._handle is not None else None
 
     @property
     def result(self) -> Any:
         """The last result message, also of a goal that failed; None where there was none."""
-        return self._ticket.goal.result if self._ticket is not None else None
+        return self._handle.goal.result if self._handle is not None else None
 
     @property
     def attempt(self) -> int:
         """The number of the attempt of this visit, from 1; 0 before the first."""
-        under_way = self._ticket is not None and not self._filed(self._ticket)
+        under_way = self._handle is not None and not self._filed(self._handle)
         return len(self._attempts.history) + under_way
 
     @property
@@ -170,21 +170,21 @@ class ActionBehaviour(Behaviour):
     @property
     def server(self) -> str:
         """The action's fully qualified name once set up, and until then as it was given."""
-        return self._line.name if self._line is not None else self.action_name
+        return self._endpoint.name if self._endpoint is not None else self.action_name
 
     def progress(self) -> Progress:
         """Return what the action is doing at this moment; safe to call from any thread."""
-        ticket, traffic = self._ticket, self._traffic
+        handle, traffic = self._handle, self._traffic
         attempts = self.retry.attempts
-        if traffic is None or ticket is None:
+        if traffic is None or handle is None:
             return Progress("IDLE", self.attempt, attempts, None, None, "")
         now = traffic.clocks.now()
-        if self.status is Status.RUNNING and self._filed(ticket):
+        if self.status is Status.RUNNING and self._filed(handle):
             left = self._attempts.pause_left(now, look_only=True)
             return Progress("BACKOFF", self.attempt, attempts, None, left, "backoff")
-        from bt_actions.ros.shared import lock
+        from bt_actions.traffic.shared import lock
 
-        goal = ticket.goal
+        goal = handle.goal
         with lock:  # its deadlines change with what arrives, on other threads
             deadline = goal.deadline(now)
         what, left_or_none = (
@@ -195,17 +195,17 @@ class ActionBehaviour(Behaviour):
     @property
     def drained(self) -> bool:
         """Whether every goal this leaf has sent so far is accounted for."""
-        return all(ticket.accounted_for for ticket in self.open_tickets())
+        return all(handle.accounted_for for handle in self.open_handles())
 
     @property
     def draining(self) -> bool:
         """Whether a goal of this leaf has to end yet, within its `timeout.cancel` and the like."""
-        return any(ticket.goal.outcome is None for ticket in self.open_tickets())
+        return any(handle.goal.outcome is None for handle in self.open_handles())
 
     def due_in(self) -> float | None:
         """Return the seconds until this leaf needs a tick though nothing has happened."""
-        if self._traffic is None or self._ticket is None or not self._filed(self._ticket):
-            return None  # while a goal is open, ros/traffic.py minds its deadlines
+        if self._traffic is None or self._handle is None or not self._filed(self._handle):
+            return None  # while a goal is open, traffic/traffic.py minds its deadlines
         return self._attempts.pause_left(self._traffic.clocks.now())
 
     # py_trees' contract
@@ -220,7 +220,7 @@ class ActionBehaviour(Behaviour):
         """
         node = node_in(kwargs, self)
         from bt_actions.messages.conversion import interface
-        from bt_actions.ros.traffic import Traffic
+        from bt_actions.traffic.traffic import Traffic
 
         if isinstance(self.action_type, str):
             self.action_type = interface(self.action_type, "action")
@@ -228,18 +228,18 @@ class ActionBehaviour(Behaviour):
         traffic = Traffic.of(node)
         if traffic is self._traffic:
             return
-        self._leave_line()
-        self._line = traffic.line(self.action_type, self.action_name)
+        self._leave_endpoint()
+        self._endpoint = traffic.endpoint(self.action_type, self.action_name)
         self._traffic = traffic
 
     def initialise(self) -> None:
         """Begin a visit. What an earlier one left behind is drained beside it."""
         self._require_setup()
-        if self._ticket is not None and not self._filed(self._ticket):
+        if self._handle is not None and not self._filed(self._handle):
             ActionBehaviour.terminate(self, Status.INVALID)  # the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._when, CHANCE)
         self._outcome = None
-        self._left_behind, self._ticket = self.open_tickets(), None
+        self._left_behind, self._handle = self.open_handles(), None
         self._begin()
 
     def update(self) -> Status:
@@ -247,21 +247,21 @@ class ActionBehaviour(Behaviour):
         self._require_setup()
         if self._outcome is not None:
             self.initialise()  # shut down while RUNNING, and set up again: another visit
-        traffic, ticket = self._traffic, self._ticket
+        traffic, handle = self._traffic, self._handle
         assert traffic is not None
-        assert ticket is not None
+        assert handle is not None
         begun = False
         while True:
-            if self._filed(ticket):
+            if self._filed(handle):
                 left = self._attempts.pause_left(traffic.clocks.now())
                 if left > 0.0 or begun:
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
                     return Status.RUNNING
-                ticket, begun = self._begin(), True
-            traffic.advance(ticket, self._make_message)
-            settled = traffic.is_settled(ticket)  # then all of its feedback is here
-            for _ in range(len(ticket.feedback)):  # not what comes meanwhile: a tick must end
-                message = ticket.feedback.popleft()
+                handle, begun = self._begin(), True
+            traffic.advance(handle, self._make_message)
+            settled = traffic.is_settled(handle)  # then all of its feedback is here
+            for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
+                message = handle.feedback.popleft()
                 if self.on_feedback is not None:
                     self.on_feedback(message)
                 if self._is_over():
@@ -269,9 +269,9 @@ class ActionBehaviour(Behaviour):
             if self._is_over():
                 return Status.FAILURE
             if not settled:
-                self.feedback_message = self._in_words(ticket)
+                self.feedback_message = self._in_words(handle)
                 return Status.RUNNING
-            record = self._judge(ticket)
+            record = self._judge(handle)
             if self._is_over():
                 return Status.FAILURE
             again = self._attempts.again(record, traffic.clocks.now())
@@ -282,15 +282,15 @@ class ActionBehaviour(Behaviour):
 
     def terminate(self, new_status: Status) -> None:
         """Let go at once of a goal that is still open; it is canceled and drained."""
-        ticket = self._ticket
-        if self._traffic is None or ticket is None:
+        handle = self._handle
+        if self._traffic is None or handle is None:
             return
-        if self._filed(ticket):
+        if self._filed(handle):
             if self._outcome is None and self.history:
                 self._outcome = self.history[-1].outcome  # stopped in the pause before a retry
             return
-        if new_status is Status.INVALID or ticket.goal.outcome is None:
-            self._traffic.interrupt(ticket)
+        if new_status is Status.INVALID or handle.goal.outcome is None:
+            self._traffic.interrupt(handle)
             self.file_interrupted()
 
     def shutdown(self) -> None:
@@ -302,31 +302,31 @@ class ActionBehaviour(Behaviour):
         if self._traffic is None:
             return
         if not self._tree_closed:
-            from bt_actions.ros.draining import drain
+            from bt_actions.traffic.drain import drain
 
             leaves = list(_leaves_of_tree(self))
-            drain([ticket for leaf in leaves for ticket in leaf.open_tickets()])
+            drain([handle for leaf in leaves for handle in leaf.open_handles()])
             for leaf in leaves:
                 leaf.file_interrupted()
                 leaf._tree_closed = True  # noqa: SLF001 - of our own kind
-        self._leave_line()
+        self._leave_endpoint()
 
-    def open_tickets(self) -> list[Ticket]:
+    def open_handles(self) -> list[GoalHandle]:
         """Return the goals of this leaf that are not over, left behind ones too.
 
         Also those that a second server has taken when they had ended here.
         """
-        tickets = [*self._left_behind, *([self._ticket] if self._ticket is not None else [])]
-        if self._line is not None:
-            tickets += [ticket for ticket in self._line.goals_of(self) if ticket not in tickets]
-        return [ticket for ticket in tickets if not ticket.is_over]
+        handles = [*self._left_behind, *([self._handle] if self._handle is not None else [])]
+        if self._endpoint is not None:
+            handles += [handle for handle in self._endpoint.goals_of(self) if handle not in handles]
+        return [handle for handle in handles if not handle.is_over]
 
     def file_interrupted(self) -> None:
         """Record that the visit ended before its outcome: its goal was canceled, or is drained."""
-        ticket = self._ticket
-        if self._traffic is None or ticket is None or self._filed(ticket):
+        handle = self._handle
+        if self._traffic is None or handle is None or self._filed(handle):
             return
-        goal = ticket.goal
+        goal = handle.goal
         outcome, reason = goal.outcome, goal.reason
         if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
             outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
@@ -358,13 +358,13 @@ class ActionBehaviour(Behaviour):
         if self._traffic is None:
             raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
 
-    def _begin(self) -> Ticket:
+    def _begin(self) -> GoalHandle:
         assert self._traffic is not None
         self._tree_closed = False
-        self._left_behind = self.open_tickets()
+        self._left_behind = self.open_handles()
         self._started = self._traffic.clocks.now().ros
-        self._ticket = self._traffic.begin(
-            self._line,
+        self._handle = self._traffic.begin(
+            self._endpoint,
             self,
             self.timeouts,
             self.resources,
@@ -373,16 +373,16 @@ class ActionBehaviour(Behaviour):
             keeps_feedback=self.on_feedback is not None,
             settles=self.settles,
         )
-        return self._ticket
+        return self._handle
 
     def _is_over(self) -> bool:
         """Whether code of the user's has ended the visit: stopped this leaf, or shut it down."""
         return self._outcome is not None or self._traffic is None
 
-    def _filed(self, ticket: Ticket) -> bool:
+    def _filed(self, handle: GoalHandle) -> bool:
         """Whether this attempt is over and in the history."""
         history = self.history  # a new visit begins a new one
-        return bool(history) and history[-1].goal is ticket.goal
+        return bool(history) and history[-1].goal is handle.goal
 
     def _make_message(self) -> Any:
         from bt_actions.messages.conversion import fill
@@ -411,9 +411,9 @@ class ActionBehaviour(Behaviour):
             if wrong := unknown_field(Expression(text), "result", action.Result):
                 raise ValueError(f"{self.name}: {what}: {wrong}")
 
-    def _judge(self, ticket: Ticket) -> AttemptRecord:
+    def _judge(self, handle: GoalHandle) -> AttemptRecord:
         assert self._traffic is not None
-        goal = ticket.goal
+        goal = handle.goal
         outcome, reason = goal.outcome, goal.reason
         assert outcome is not None
         if outcome is Outcome.SUCCEEDED:
@@ -455,21 +455,21 @@ class ActionBehaviour(Behaviour):
         wanted = f"{self._expect_text} was expected" if self._expect_text else "not as expected"
         return f"{wanted}, but the result is: {shorten(result)}"
 
-    def _in_words(self, ticket: Ticket) -> str:
+    def _in_words(self, handle: GoalHandle) -> str:
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
-        feedback = ticket.goal.feedback
+        feedback = handle.goal.feedback
         if feedback is not self._shown_feedback[0]:
             told = f": {shorten_fields(feedback)}" if feedback is not None else ""
             self._shown_feedback = feedback, told
-        state = ticket.goal.state.value.lower().replace("_", " ")
+        state = handle.goal.state.value.lower().replace("_", " ")
         return f"{state}{tries}{self._shown_feedback[1]}"
 
-    def _leave_line(self) -> None:
+    def _leave_endpoint(self) -> None:
         if self._traffic is not None:
-            open_here = self.open_tickets()  # a second server's share, too
-            self._left_behind = [each for each in open_here if each is not self._ticket]
-            self._traffic.leave(self._line)
-        self._traffic = self._line = None
+            open_here = self.open_handles()  # a second server's share, too
+            self._left_behind = [each for each in open_here if each is not self._handle]
+            self._traffic.leave(self._endpoint)
+        self._traffic = self._endpoint = None
 
 
 def _leaves_of_tree(leaf: Behaviour) -> Iterator[ActionBehaviour]:

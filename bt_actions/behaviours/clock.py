@@ -19,7 +19,7 @@ class NodeTime:
         if node is None:
             self._clocks = None
             return
-        from bt_actions.ros.traffic import Traffic
+        from bt_actions.traffic.traffic import Traffic
 
         self._clocks = Traffic.of(node).clocks
 

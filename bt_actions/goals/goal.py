@@ -9,7 +9,7 @@ The rules this file lives by:
 - After what comes with DONE nothing is sent.
 
 A leaf is free to go on as soon as `outcome` is set. The goal itself may live on in CANCELING:
-somebody (ros/traffic.py) keeps feeding it events until it is DONE. Whether to try again is not
+somebody (traffic/traffic.py) keeps feeding it events until it is DONE. Whether to try again is not
 decided here (attempts.py), nor who may have a resource (resources.py).
 """
 
@@ -187,15 +187,15 @@ class Goal:
         return self.state is State.SENDING or unanswered
 
     @property
-    def owed(self) -> bool:
+    def outstanding(self) -> bool:
         """Whether a server that has it must be rid of it before it gets another goal."""
         unknown = self._sent and self.end is End.UNKNOWN and not self._holding
         return unknown and (self._accepted or not self.waited_for)
 
-    def bars(self, other: Goal, *, same_server: bool) -> bool:
+    def blocks(self, other: Goal, *, same_server: bool) -> bool:
         """Whether this goal, given up as it is, must be accounted for before `other` is sent."""
         shares = other.busy in (Busy.WAIT, Busy.FAIL) and bool(self.resources & other.resources)
-        return self.owed and (same_server or shares)
+        return self.outstanding and (same_server or shares)
 
     @property
     def drains_within(self) -> float:
@@ -213,23 +213,30 @@ class Goal:
     def deadline(self, now: Now) -> tuple[Event, float] | None:
         """Return the deadline that falls due first and the seconds left, or None."""
         for left, event in self._deadlines.left(now):
-            if event is not Event.ASK_DUE:
+            if event is not Event.POLL_DUE:
                 return event, max(0.0, left)
         return None
 
-    def twin(self, now: Now) -> Goal:
+    def duplicate(self, now: Now) -> Goal:
         """Return the same goal, which has ended here, as a second server runs it.
 
         It counts as lost, and is canceled at SERVER_RETURNED.
         """
-        twin = Goal(
+        duplicate = Goal(
             self.id, self.server, self.timeouts, now, resources=self.resources, busy=self.busy
         )
-        twin._deadlines.clear()
-        twin._holding, twin._sent, twin._accepted, twin.lost = False, True, True, True
-        twin.state, twin.end = State.CANCELING, End.SERVER_GONE
-        twin._settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
-        return twin
+        duplicate._deadlines.clear()
+        duplicate._holding, duplicate._sent, duplicate._accepted, duplicate.lost = (
+            False,
+            True,
+            True,
+            True,
+        )
+        duplicate.state, duplicate.end = State.CANCELING, End.SERVER_GONE
+        duplicate._settle(
+            Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended"
+        )
+        return duplicate
 
     # What the caller may tell
 
@@ -257,7 +264,7 @@ class Goal:
     def _is_heard_of(self, now: Now) -> None:
         """Whoever may have it speaks, and so can be asked again."""
         if self._unheard > UNHEARD and self.state is not State.DONE:
-            self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
+            self._deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)
         self._unheard = 0
 
     def poll(self, now: Now) -> tuple[Command, ...]:
@@ -376,7 +383,7 @@ class Goal:
         self._deadlines.disarm(Event.ACCEPT_DUE)
         self._deadlines.arm(Event.RESULT_DUE, self.timeouts.result, now)
         self._deadlines.arm(Event.FEEDBACK_DUE, self.timeouts.feedback, now)
-        self._deadlines.arm(Event.ASK_DUE, ASK_IN_ANY_CASE, now)
+        self._deadlines.arm(Event.POLL_DUE, ASK_IN_ANY_CASE, now)
         self._commands.append(Command.ASK_RESULT)
         return State.EXECUTING
 
@@ -481,7 +488,7 @@ class Goal:
         elif self._seen_status is None:
             self._seen_status = detail
             self._deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended
-            self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
+            self._deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)
         return self.state
 
     def _terminal_status_canceling(self, now: Now, detail: Any) -> State:
@@ -500,7 +507,7 @@ class Goal:
             return self._finished_by_status()
         self._commands.append(Command.ASK_RESULT)
         again = ASK_IN_ANY_CASE if self._seen_status is None else ASK_AGAIN
-        self._deadlines.arm(Event.ASK_DUE, again, now)
+        self._deadlines.arm(Event.POLL_DUE, again, now)
         return State.EXECUTING
 
     def _finished(self, now: Now, detail: Any) -> State:
@@ -533,7 +540,7 @@ class Goal:
         """Ask again; believed the third time: SERVER_LOST."""
         self._doubts += 1
         if self._doubts < DOUBTS:
-            self._deadlines.arm(Event.ASK_DUE, ASK_AGAIN, now)
+            self._deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)
             return State.EXECUTING
         return self._forgotten()
 
@@ -580,10 +587,10 @@ class Goal:
         assert self._denied_since is not None
         left = self._denied_since + DENIED_FOR_GOOD - now.steady
         if left > 0.0:
-            self._deadlines.arm(Event.ASK_DUE, left, now)
+            self._deadlines.arm(Event.POLL_DUE, left, now)
         else:
             self._never_came, self.end = True, End.NEVER_STARTED
-            self._deadlines.disarm(Event.ASK_DUE)
+            self._deadlines.disarm(Event.POLL_DUE)
 
     def _ask_again(self, now: Now, detail: Any) -> State:
         """Ask again, cancel and result; after several questions believe the status."""
@@ -829,7 +836,7 @@ class Goal:
             self._asked += 1
             if self._asked > OFTEN and self._seen_status is None:
                 again = ASK_LESS
-        self._deadlines.arm(Event.ASK_DUE, again, now)
+        self._deadlines.arm(Event.POLL_DUE, again, now)
 
 
 @dataclass(frozen=True, slots=True)
@@ -872,7 +879,7 @@ def _table() -> dict[tuple[State, Event], Row]:
         (sending, Event.REPLACED): (Goal._replaced_unanswered, {canceling}),
         (executing, Event.FEEDBACK): (Goal._feedback, {executing}),
         (executing, Event.STATUS): (Goal._terminal_status_seen, {executing}),
-        (executing, Event.ASK_DUE): (Goal._ask_for_lost_result, {executing, done}),
+        (executing, Event.POLL_DUE): (Goal._ask_for_lost_result, {executing, done}),
         (executing, Event.RESULT): (Goal._finished, {done}),
         (executing, Event.RESULT_UNKNOWN): (Goal._denied_while_executing, {executing, done}),
         (executing, Event.RESULT_DUE): (Goal._result_due, {canceling}),
@@ -891,7 +898,7 @@ def _table() -> dict[tuple[State, Event], Row]:
         (canceling, Event.CANCEL_ANSWERED): (Goal._cancel_answered, {canceling}),
         (canceling, Event.ACCEPT_DUE): (Goal._suspicion, {canceling}),
         (canceling, Event.CANCEL_DUE): (Goal._cancel_due, {canceling, done}),
-        (canceling, Event.ASK_DUE): (Goal._ask_again, {canceling, done}),
+        (canceling, Event.POLL_DUE): (Goal._ask_again, {canceling, done}),
         (canceling, Event.DRAINED): (Goal._drained, {canceling, done}),
         (canceling, Event.INTERRUPTED): (Goal._interrupted_while_canceling, {canceling}),
         (canceling, Event.SERVER_AMBIGUOUS): (Goal._taken_by_two_while_canceling, {canceling}),
@@ -900,19 +907,19 @@ def _table() -> dict[tuple[State, Event], Row]:
         (done, Event.INTERRUPTED): (Goal._stay, {done}),
         (done, Event.REPLACED): (Goal._stay, {done}),
         (done, Event.DRAINED): (Goal._stay, {done}),
-        (done, Event.CLOSED): (Goal._stay, {done}),
+        (done, Event.PROCESS_EXITING): (Goal._stay, {done}),
     }
     for state in (queued, waiting):
         decided[state, Event.INVALID] = (Goal._invalid, {done})
         decided[state, Event.INTERRUPTED] = (Goal._withdraw, {done})
-        decided[state, Event.CLOSED] = (Goal._close_unsent, {done})
+        decided[state, Event.PROCESS_EXITING] = (Goal._close_unsent, {done})
     decided[sending, Event.SERVER_LOST] = (Goal._lose, {canceling})
     for state in (executing, canceling):
         decided[state, Event.SERVER_CHANGED] = (Goal._ask_changed_server, {state})
         decided[state, Event.SERVER_LOST] = (Goal._lose, {canceling, done})
     for state in (sending, executing, canceling):
-        decided[state, Event.LEFT] = (Goal._left, {canceling, done})
-        decided[state, Event.CLOSED] = (Goal._close, {done})
+        decided[state, Event.NODE_CLOSED] = (Goal._left, {canceling, done})
+        decided[state, Event.PROCESS_EXITING] = (Goal._close, {done})
     table = {}
     for state in State:
         for event in Event:

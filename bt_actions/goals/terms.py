@@ -61,15 +61,15 @@ class Event(Enum):
     INTERRUPTED = "the tree no longer wants it"
     REPLACED = "a newer goal of this process was accepted in its place"  # by which server
     DRAINED = "it was waited for long enough: what is not known stays so"
-    LEFT = "its node goes, and the process stays: somebody else has to see to it"
-    CLOSED = "the process ends: give up"
+    NODE_CLOSED = "its node goes, and the process stays: somebody else has to see to it"
+    PROCESS_EXITING = "the process ends: give up"
     QUEUE_DUE = "timeout.queue has passed"
     SERVER_DUE = "timeout.server has passed"
     ACCEPT_DUE = "timeout.accept has passed"
     RESULT_DUE = "timeout.result has passed"
     FEEDBACK_DUE = "timeout.feedback has passed"
     CANCEL_DUE = "timeout.cancel has passed"
-    ASK_DUE = "time to ask the server again"
+    POLL_DUE = "time to ask the server again"
 
 
 # GoalStatus and CancelGoal as ROS 2 numbers them (action_msgs).

@@ -33,7 +33,7 @@ from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
 from bt_actions.recovery.unanswered import Unanswered
 from bt_actions.ros import participant
 from bt_actions.ros.action_view import STATUS, ActionView
-from bt_actions.servers.stalls import AT_MOST, STOOD_STILL, Standstill
+from bt_actions.servers.stalls import AT_MOST, STOOD_STILL, Stalls
 
 TURN = 0.05
 """Seconds between two looks for what has come in;"""
@@ -143,8 +143,8 @@ def cleanup(
     for as long as its sender gave the server to decide, and for DENIED_FOR_GOOD, whichever is most.
 
     Where a server in sight does not answer, or this process stands still for long meanwhile, it may
-    be that it will never tell this participant anything (ros/lookout.py). So it looks again with a
-    new one, unless `context` is given.
+    be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
+    with a new one, unless `context` is given.
 
     Raises CannotStart, if nothing has been looked at yet; ValueError for a `look`, a `patience` or
     an `accept` that is negative or no number, and for a name in `wanted` that is none; and what
@@ -155,7 +155,7 @@ def cleanup(
         raise ValueError(f"{given}: seconds are 0 or more")
     sweep = _Sweep(look, patience, accept, found, sighted, elsewhere, missing, stopped)
     for tries_left in (2, 1, 0) if context is None else (0,):
-        still = Standstill()
+        still = Stalls()
         still.lives(time.monotonic())  # it counts from when the participant is made
         try:
             with _participant(context, namespace) as node:
@@ -259,10 +259,10 @@ class _Sweep:
             self._calls.setdefault(name, RollCall(now))
         self._find()  # before the first status: one that tells an end comes once
 
-    def goes_through(self, still: Standstill, *, breaks_off: bool) -> bool:
+    def goes_through(self, still: Stalls, *, breaks_off: bool) -> bool:
         """Look, cancel, and wait; return False where it `breaks_off`, for another participant.
 
-        Because of a standstill, or of a server in sight that does not answer.
+        Because of a stall, or of a server in sight that does not answer.
         """
         began = looked = last = time.monotonic()
         until = began + self._look
@@ -278,7 +278,7 @@ class _Sweep:
                     self._deadline += now - last
                     self._awaits_until += now - last
             self._turn(still)
-            last = time.monotonic()  # its own work is no standstill
+            last = time.monotonic()  # its own work is no stall
             lacks = self._lacks()
             self._looked_out |= now >= self._deadline
             looking = now < self._deadline and (now < until or bool(lacks))
@@ -342,7 +342,7 @@ class _Sweep:
             left.awaited and self._calls[left.action].sighted for left in self._left.values()
         )
 
-    def _turn(self, still: Standstill) -> None:
+    def _turn(self, still: Stalls) -> None:
         """Take all that has come in, then look around, and ask."""
         for action, view in self._views.items():
             self._hear(action, view)

@@ -35,8 +35,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import lock
-from bt_actions.servers.reachability import Hearing
+from bt_actions.servers.reachability import Reachability
+from bt_actions.traffic.shared import lock
 from bt_actions.utilities.plain_text import raised
 
 TAKE_AT_MOST = 200
@@ -121,7 +121,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         self._result_requests: dict[int, _Question] = {}
         self._cancel_requests: dict[int, _Question] = {}
         self._inbox: deque[tuple[str, Any, Any]] = deque()
-        self.hearing = Hearing()
+        self.reachability = Reachability()
         """Under the one lock, as all requests."""
         self.on_trial = False
         """The listener has another client; here it wants to hear of statuses alone."""
@@ -152,7 +152,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         with self._lock:
             number = self._client_handle.send_goal_request(request)
             self._goal_requests[number] = question = _Question(goal_id)
-            self.hearing.asked(question.asked)
+            self.reachability.asked(question.asked)
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result, which the server answers when the goal has ended."""
@@ -165,11 +165,11 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         with self._lock:
             number = self._client_handle.send_cancel_request(request)
             self._keep(self._cancel_requests, number, question := _Question(goal_id))
-            self.hearing.asked(question.asked)
+            self.reachability.asked(question.asked)
 
     def probe(self, probe: int, random_id: bytes) -> None:
         """Ask for a goal that nobody knows: each live server answers once, with status 0."""
-        self.hearing.asked(self._ask_result(random_id, probe))
+        self.reachability.asked(self._ask_result(random_id, probe))
 
     def _ask_result(self, goal_id: bytes, about: bytes | int) -> float:
         request = self._impl.GetResultService.Request()
@@ -298,7 +298,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
     def _tell(self, kind: str, about: Any, detail: Any) -> None:
         tell = self._listener
         if kind in ("goal", "result", "cancel", "probe"):
-            self.hearing.answered(asked=detail[0])
+            self.reachability.answered(asked=detail[0])
         if self.on_trial and kind != "status":
             return
         if kind == "feedback":

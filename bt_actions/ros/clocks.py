@@ -11,7 +11,7 @@ from typing import Any
 
 from bt_actions.goals.terms import Now
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import lock
+from bt_actions.traffic.shared import lock
 
 MOMENT = 2.0
 """Seconds for which simulated time may not have begun until that is said."""

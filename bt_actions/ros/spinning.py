@@ -30,7 +30,7 @@ from bt_actions.ros import participant
 from bt_actions.ros.executor import OnceExecutor
 from bt_actions.ros.log import log
 from bt_actions.ros.naming import named_node
-from bt_actions.ros.traffic import Traffic
+from bt_actions.traffic.traffic import Traffic
 
 THREADS = 2
 """Of the multi-threaded executor; the interpreter lock does the work, more are no faster."""

@@ -25,8 +25,8 @@ from rclpy.qos import (
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.closable import closable
 from bt_actions.ros.in_sight import without_topic
-from bt_actions.ros.shared import lock
-from bt_actions.ros.traffic import Traffic
+from bt_actions.traffic.shared import lock
+from bt_actions.traffic.traffic import Traffic
 
 __all__ = ["Latest", "Speaker", "qos_profile", "wake"]
 

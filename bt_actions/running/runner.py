@@ -33,7 +33,7 @@ from bt_actions.utilities.places import culprit_of, path_of, root_of
 from bt_actions.utilities.plain_text import raised
 
 if TYPE_CHECKING:
-    from bt_actions.ros.shared import Change, Ticket
+    from bt_actions.traffic.shared import Change, GoalHandle
 
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
@@ -121,7 +121,7 @@ class TreeRunner:
         self._shutting_down = threading.Lock()
         self._is_down = False
         self._pid = os.getpid()
-        self._tickets: set[Ticket] = set()
+        self._handles: set[GoalHandle] = set()
         self._patience = Patience(_warn)  # on its behalf the ticks of ours begin goals
         self._spinner = Spinner(
             node, executor, name=name, namespace=namespace, context=context, died=self._spin_died
@@ -129,8 +129,8 @@ class TreeRunner:
         self._visitor = ChangeVisitor(self._set_up_rest, self._spinner.taken_away)
         self._traffic = _traffic_of(self._spinner.node)
         self._traffic.observe(self._note)
-        # Before the exit hook of ros/traffic.py: a tree that ticks on would send another goal, and
-        # a daemon thread in spin() aborts the process that ends beside it.
+        # Before the exit hook of traffic/traffic.py: a tree that ticks on would send another goal,
+        # and a daemon thread in spin() aborts the process that ends beside it.
         atexit.register(self._at_exit)
 
     @property
@@ -148,15 +148,15 @@ class TreeRunner:
         """The goals of this tree whose end is UNKNOWN, by now."""
         return [
             GoalReport(
-                ticket.name,
-                ticket.goal.server,
-                ticket.goal.id.hex(),
-                ticket.goal.outcome,
-                f"{ticket.goal.reason}{ticket.goal.cancel_said}",
+                handle.name,
+                handle.goal.server,
+                handle.goal.id.hex(),
+                handle.goal.outcome,
+                f"{handle.goal.reason}{handle.goal.cancel_said}",
             )
-            for ticket in list(self._tickets)
-            if ticket.goal.end is End.UNKNOWN
-            and (ticket.goal.outcome is not None or not self._running.locked())
+            for handle in list(self._handles)
+            if handle.goal.end is End.UNKNOWN
+            and (handle.goal.outcome is not None or not self._running.locked())
         ]
 
     @property
@@ -250,7 +250,7 @@ class TreeRunner:
 
     def _ended_by_signals(self) -> contextlib.AbstractContextManager[None]:
         from bt_actions.ros.signals import ended_by_signals
-        from bt_actions.ros.traffic import close_process
+        from bt_actions.traffic.traffic import close_process
 
         return ended_by_signals(self._signalled, close_process)
 
@@ -280,7 +280,7 @@ class TreeRunner:
         self._thread = threading.Thread(
             target=self._run_started, args=(future,), name="bt_actions-tree"
         )
-        self._thread.daemon = True  # the exit hook of ros/traffic.py drains what it leaves
+        self._thread.daemon = True  # the exit hook of traffic/traffic.py drains what it leaves
         self._is_heard = False
         try:
             self._thread.start()
@@ -307,14 +307,14 @@ class TreeRunner:
             self._is_heard = True
 
     def _release(self) -> None:
-        from bt_actions.ros.shared import lock
+        from bt_actions.traffic.shared import lock
 
         self._stop_wanted = self._abandoned = self._pause_wanted = False
         try:
             with lock:  # under which _note() is called
                 self._runs_on = None
-                late = {change.ticket for change in list(self._changes)}  # since it last looked
-                self._tickets |= {ticket for ticket in late if self._has_left(ticket)}
+                late = {change.handle for change in list(self._changes)}  # since it last looked
+                self._handles |= {handle for handle in late if self._has_left(handle)}
         finally:
             _runs.discard(self)
             self._running.release()
@@ -342,9 +342,9 @@ class TreeRunner:
             futures.wait([future], None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         if not future.done():
             goals = [
-                f"{ticket.name} on {ticket.goal.server} is {ticket.goal.state.value}"
-                for ticket in list(self._tickets)
-                if not ticket.is_over
+                f"{handle.name} on {handle.goal.server} is {handle.goal.state.value}"
+                for handle in list(self._handles)
+                if not handle.is_over
             ]
             what = f"; {', '.join(goals)}" if goals else ""
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s{what}")
@@ -573,15 +573,15 @@ class TreeRunner:
         """Whether the tree is paused; carries a change of that over to goals not sent yet."""
         if self._pause_wanted != self._paused:
             self._paused = self._pause_wanted
-            tickets = list(self._tickets)
-            (self._traffic.pause if self._paused else self._traffic.resume)(tickets)
+            handles = list(self._handles)
+            (self._traffic.pause if self._paused else self._traffic.resume)(handles)
         return self._paused
 
     def _end(self, status: Status) -> None:
         """Stop what still runs, drain the tree's goals, and tell."""
         root = self.tree.root
         if self._paused:
-            self._traffic.resume(list(self._tickets))
+            self._traffic.resume(list(self._handles))
             self._paused = False
         self._flush()  # a goal may have begun in a tick that raised
         if any(node.status is Status.RUNNING for node in root.iterate()):  # not the root, then
@@ -592,10 +592,10 @@ class TreeRunner:
                 self._leave_with(error)
                 self._let_go(culprit_of(error))
         self._patience.end()
-        _drain(self._tickets, self._hurry)
+        _drain(self._handles, self._hurry)
         self._flush()
         self._tell(self._visitor.stopped())
-        self._tickets = {ticket for ticket in self._tickets if not ticket.is_over}
+        self._handles = {handle for handle in self._handles if not handle.is_over}
         _flush_log()  # who tells of the end tells it last
         self._emit(TreeFinished(time.monotonic(), status))
 
@@ -645,15 +645,15 @@ class TreeRunner:
         Between two runs only of those that a run of ours has left.
         """
         if self._runs_on is None:
-            if change is None or not self._has_left(change.ticket):
+            if change is None or not self._has_left(change.handle):
                 return
-            self._tickets.add(change.ticket)  # a twin is news
+            self._handles.add(change.handle)  # a duplicate is news
         if change is not None:
             self._changes.append(change)
         self._wake()
 
-    def _has_left(self, ticket: Ticket) -> bool:
-        return ticket in self._tickets or (ticket.begun_by is self._patience and not ticket.is_over)
+    def _has_left(self, handle: GoalHandle) -> bool:
+        return handle in self._handles or (handle.begun_by is self._patience and not handle.is_over)
 
     def _flush(self) -> None:
         while True:
@@ -661,33 +661,33 @@ class TreeRunner:
                 change = self._changes.popleft()
             except IndexError:
                 return
-            ticket = change.ticket
-            if not self._is_ours(ticket):
+            handle = change.handle
+            if not self._is_ours(handle):
                 continue  # another tree on the same node
-            self._tickets.add(ticket)
-            if ticket.owner is not None:  # else its leaf was thrown away since
+            self._handles.add(handle)
+            if handle.owner is not None:  # else its leaf was thrown away since
                 self._emit(
                     GoalChanged(
                         time.monotonic(),
-                        ticket.owner,
+                        handle.owner,
                         change.state.value,
-                        ticket.attempt,
+                        handle.attempt,
                         change.outcome,
                         change.end,
                         change.reason,
-                        ticket.goal.id.hex(),
+                        handle.goal.id.hex(),
                     )
                 )
-            if ticket.is_over:
-                self._tickets.discard(ticket)
-            elif ticket.goal.lost:  # and what was lost longer ago is over by now
-                self._tickets -= {each for each in list(self._tickets) if each.is_over}
+            if handle.is_over:
+                self._handles.discard(handle)
+            elif handle.goal.lost:  # and what was lost longer ago is over by now
+                self._handles -= {each for each in list(self._handles) if each.is_over}
 
-    def _is_ours(self, ticket: Ticket) -> bool:
+    def _is_ours(self, handle: GoalHandle) -> bool:
         """Whether the goal is this tree's: begun in a tick of it, wherever its leaf is by now."""
-        if ticket in self._tickets or ticket.begun_by is self._patience:
+        if handle in self._handles or handle.begun_by is self._patience:
             return True
-        return ticket.owner is not None and root_of(ticket.owner) is self.tree.root
+        return handle.owner is not None and root_of(handle.owner) is self.tree.root
 
     def _emit(self, event: Event) -> None:
         for observer in list(self._observers):
@@ -733,12 +733,12 @@ def _flush_log() -> None:
 
 
 def _traffic_of(node: Any) -> Any:
-    from bt_actions.ros.traffic import Traffic
+    from bt_actions.traffic.traffic import Traffic
 
     return Traffic.of(node)
 
 
-def _drain(tickets: set[Ticket], hurry: Any) -> None:
-    from bt_actions.ros.draining import drain
+def _drain(handles: set[GoalHandle], hurry: Any) -> None:
+    from bt_actions.traffic.drain import drain
 
-    drain(list(tickets), hurry)
+    drain(list(handles), hurry)

@@ -1,4 +1,5 @@
-"""What is believed of what servers say of a twin: a goal that has ended, and turns up elsewhere.
+"""What is believed of what servers say of a duplicate: a goal that has ended, and turns up
+elsewhere.
 
 Whoever has told its end before tells it once more when it is asked, and no answer says whose it is.
 So an end is news where one more server tells it than has told it before, or where nobody else is
@@ -15,14 +16,14 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
 from bt_actions.servers.presence import GID, ServerWatch
-from bt_actions.servers.replies import Testimony, Told
+from bt_actions.servers.replies import Replies, Told
 
 
-class TwinTestimony(Testimony):
-    """What is believed of what servers say of a twin. Its `sent_to` are those that may run it."""
+class DuplicateReplies(Replies):
+    """What is believed of a duplicate. Its `sent_to` are the servers that may run it."""
 
-    def __init__(self, goal: Goal, ended: Testimony, sent_to: frozenset[GID]) -> None:
-        """`goal` is the twin, `ended` what was believed of the goal that has ended."""
+    def __init__(self, goal: Goal, ended: Replies, sent_to: frozenset[GID]) -> None:
+        """`goal` is the duplicate, `ended` what was believed of the goal that has ended."""
         super().__init__(goal)
         self.sent_to = sent_to
         self._told_before = ended.ends_told

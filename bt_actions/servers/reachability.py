@@ -1,11 +1,11 @@
 """Does a server that is in sight hear what one client asks, and does the client hear its answers?
 
 Discovery may tell one side only: a server may have dropped a process that was stopped, or cut off,
-for longer than its lease, and never take it in again (ros/lookout.py). It is shown then, and what
-it is asked gets lost. Told of questions and answers; what takes a server long (a busy executor)
-shows in the same way, so silence is no proof. Nor may it be filled with questions: a server keeps
-the last ten requests of all its clients together, and answers no other. No ROS, no thread, no
-clock of its own.
+for longer than its lease, and never take it in again (ros/rediscovery.py). It is shown then, and
+what it is asked gets lost. Told of questions and answers; what takes a server long (a busy
+executor) shows in the same way, so silence is no proof. Nor may it be filled with questions: a
+server keeps the last ten requests of all its clients together, and answers no other. No ROS, no
+thread, no clock of its own.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ TRY_LASTS = 5.5
 TRY_AGAIN = 60.0
 """and then only after so many since the last."""
 DOUBT_LASTS = 10.0
-"""Seconds after a standstill within which a way to be heard is found, if there is one."""
+"""Seconds after a stall within which a way to be heard is found, if there is one."""
 NEVER = float("-inf")
 
 
-class Hearing:
+class Reachability:
     """The questions of one client that any server answers at once (seconds, steady clock)."""
 
     def __init__(self) -> None:
@@ -78,7 +78,7 @@ class Hearing:
         self._tries += 1
         self._tried_at = now
 
-    def is_mute(self, now: float) -> bool:
+    def is_unresponsive(self, now: float) -> bool:
         """Whether there was no answer to any question for long, and another way may be looked for.
 
         Also while that is done.

@@ -4,7 +4,8 @@ One server's word does not speak for another's: where a second one opened, or wo
 request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
 other may run. So while more than one of the servers that the request went to may live, an ending
 is believed when all in sight have answered a question, or when it has turned out that one is left,
-beside ghosts. A goal that has ended, and turns up at another server, is a twin (duplicates.py).
+beside ghosts. A goal that has ended, and turns up at another server, is a duplicate
+(duplicates.py).
 
 Told of answers and of looks at the server, it returns what the goal is to be told. What follows
 from that is the goal's (goals/goal.py); who lives is known to the watch (presence.py). No ROS, no
@@ -35,7 +36,7 @@ OVERTAKEN = 1.0
 """Seconds after a newcomer is shown within which a word of who was there before may be older."""
 
 
-class Testimony:
+class Replies:
     """What is believed of what servers say of one goal.
 
     `answers` are always all those that one question has had by now, the newest last, and `asked` is

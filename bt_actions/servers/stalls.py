@@ -16,19 +16,19 @@ ANSWERS_TAKE = 1.0
 """and seconds, at most, until what was sent meanwhile has come in: twice as long as it stood still,
 if that is less."""
 ANSWERS_TAKE_IN_ALL = 3.0
-"""Seconds for which one deadline waits for that, where standstills follow each other closely."""
+"""Seconds for which one deadline waits for that, where stalls follow each other closely."""
 OUT_OF_SIGHT = 1.5
 """Seconds without a sign of life from which on a lease may have run out: none that is useful is
 shorter than 3 s, and each is renewed long before its end;"""
 BACK_IN_SIGHT = 4.0
 """and seconds until all are in sight again: Fast DDS announces a process every 3 s or sooner."""
 AT_MOST = 20
-"""So many standstills are borne with by whoever has nothing else to go by."""
+"""So many stalls are borne with by whoever has nothing else to go by."""
 NEVER = float("-inf")
 
 
-class Standstill:
-    """What is to be borne with, after standstills, at any moment (seconds of the steady clock).
+class Stalls:
+    """What is to be borne with, after stalls, at any moment (seconds of the steady clock).
 
     Who asks lives: a question is a sign of life, too.
     """
@@ -87,12 +87,12 @@ class Standstill:
 
 
 class Leniency:
-    """Bears with one thing as long as standstills may be the cause, but with `AT_MOST` in a row."""
+    """Bears with one thing as long as stalls may be the cause, but with `AT_MOST` in a row."""
 
     def __init__(self) -> None:
         self._since: int | None = None
 
-    def bears(self, still: Standstill, *, cause: bool) -> bool:
+    def bears(self, still: Stalls, *, cause: bool) -> bool:
         """Whether to bear with it now; where there is no `cause` to, it begins anew."""
         if not cause:
             self._since = None

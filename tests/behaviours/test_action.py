@@ -104,12 +104,12 @@ def test_a_visit_whose_first_tick_breaks_off_is_interrupted_by_the_next(
     leaf.setup(node=node)
     traffic = leaf._traffic
     assert traffic is not None
-    until(lambda: leaf._line is not None and leaf._line.client.server_is_ready())
+    until(lambda: leaf._endpoint is not None and leaf._endpoint.client.server_is_ready())
     advance = traffic.advance
 
-    def interrupted(ticket: Any, make: Any) -> None:
-        advance(ticket, make)
-        if ticket.goal.sent:
+    def interrupted(handle: Any, make: Any) -> None:
+        advance(handle, make)
+        if handle.goal.sent:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(traffic, "advance", interrupted)
@@ -152,10 +152,10 @@ def test_a_loop_that_stands_still_is_not_told_of_another_type(
     host.open(name)
     leaf = MoveRobot("m", 1.0, action_name=name, timeout=Timeouts(server=0.5))
     leaf.setup(node=node)
-    until(leaf._line.client.server_is_ready)
+    until(leaf._endpoint.client.server_is_ready)
     leaf.initialise()  # and is not ticked until its deadline is over
-    ticket = leaf.open_tickets()[0]
-    until(lambda: ticket.goal.outcome is not None)
+    handle = leaf.open_handles()[0]
+    until(lambda: handle.goal.outcome is not None)
     assert leaf.update() is Status.FAILURE
     assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
     assert leaf.reason.endswith("is in sight, but was not ready, or has requests enough to answer")
@@ -174,7 +174,7 @@ def test_an_answer_that_cannot_be_taken_keeps_no_other_goal_from_being_canceled(
     with TreeRunner(together(*leaves), node=node) as runner:
         runner.start()
         until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
-        monkeypatch.setattr(leaves[0]._line.client, "pump", broken)
+        monkeypatch.setattr(leaves[0]._endpoint.client, "pump", broken)
     assert [journal.ends() for journal in journals] == [["canceled"], ["canceled"]]
     told: list[str] = []  # by the log's own thread
     until(lambda: "not be taken: RuntimeError: of a type" in "".join(told),

@@ -237,15 +237,15 @@ def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
 
 
 def test_each_node_has_an_id_of_its_own_in_the_order_of_the_file(story: Story) -> None:
-    twins = [FakeAction("Step"), FakeAction("Step"), FakeAction("Step")]
-    root = Sequence("Step", memory=True, children=[*twins[:2]])
+    duplicates = [FakeAction("Step"), FakeAction("Step"), FakeAction("Step")]
+    root = Sequence("Step", memory=True, children=[*duplicates[:2]])
 
     def insert_one_and_fail() -> Iterator[Event]:
         yield story.start()
-        root.add_child(twins[2])
-        for twin in reversed(twins):
-            yield story.goal(twin, "DONE", outcome=Outcome.ABORTED, end=End.ABORTED)
-            yield story.node(twin, Status.FAILURE)
+        root.add_child(duplicates[2])
+        for duplicate in reversed(duplicates):
+            yield story.goal(duplicate, "DONE", outcome=Outcome.ABORTED, end=End.ABORTED)
+            yield story.node(duplicate, Status.FAILURE)
         yield story.node(root, Status.FAILURE)
 
     started, *told, finished = objects_of(root, insert_one_and_fail(), Status.FAILURE)

@@ -63,10 +63,10 @@ class CrowdJudge(Judge):
         super().at_the_end()
         for job in self.caller.world.jobs:
             rule = f"what runs is asked to cancel, by whomever it runs: {job}"
-            self._hold(job.unwanted or not job.live or self._ticket(job).ledger.closed, rule)
-        for line in self.caller.lines:
-            for ticket in line.goals.values():
-                self._hold(ticket.accounted_for, f"all have answered: {ticket.goal!r}")
+            self._hold(job.unwanted or not job.live or self._handle(job).ledger.closed, rule)
+        for endpoint in self.caller.endpoints:
+            for handle in endpoint.goals.values():
+                self._hold(handle.accounted_for, f"all have answered: {handle.goal!r}")
 
 
 class CrowdPlay(Play):

@@ -150,10 +150,10 @@ class Play:
                 self._show()
 
     def _show(self) -> None:
-        for ticket in self.caller.tickets:
-            shown = f"         {ticket}: {ticket.goal!r} {ticket.goal.reason}"
-            if self._last.get(ticket.name) != shown:
-                self._last[ticket.name] = shown
+        for handle in self.caller.handles:
+            shown = f"         {handle}: {handle.goal!r} {handle.goal.reason}"
+            if self._last.get(handle.name) != shown:
+                self._last[handle.name] = shown
                 self.say(shown)
 
     def finish(self, number: int) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from bt_actions.goals.goal import PATIENCE, Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
-from tests.machine.parts import Before, Leaf, Ledger, Ticket
+from tests.machine.parts import Before, GoalHandle, Leaf, Ledger
 
 if TYPE_CHECKING:
     from bt_actions.goals.attempts import AttemptRecord
@@ -39,37 +39,37 @@ class Judge:
     def __init__(self) -> None:
         self._violation: Violation | None = None
 
-    def begins(self, ticket: Ticket) -> None:
+    def begins(self, handle: GoalHandle) -> None:
         now = self.caller.world.now
-        ticket.ledger = Ledger(now.steady, now.ros, polled_at=now.steady)
+        handle.ledger = Ledger(now.steady, now.ros, polled_at=now.steady)
 
-    def sees_clock(self, ticket: Ticket) -> None:
+    def sees_clock(self, handle: GoalHandle) -> None:
         """The goal looks at its node's clock."""
-        now, ledger = self.caller.world.now, ticket.ledger
+        now, ledger = self.caller.world.now, handle.ledger
         if now.ros > ledger.ros:
             ledger.forward += now.ros - ledger.ros
         ledger.ros = now.ros
 
-    def before(self, ticket: Ticket) -> Before:
-        goal = ticket.goal
-        self.sees_clock(ticket)
+    def before(self, handle: GoalHandle) -> Before:
+        goal = handle.goal
+        self.sees_clock(handle)
         return Before(goal.state, goal.outcome, goal.reason, goal.accepted, goal.end, goal.lost)
 
     def after(
         self,
-        ticket: Ticket,
+        handle: GoalHandle,
         before: Before,
         event: Event | None,
         detail: Any,
         commands: tuple[Command, ...],
     ) -> None:
-        goal, ledger = ticket.goal, ticket.ledger
+        goal, ledger = handle.goal, handle.ledger
         now = self.caller.world.now
         if goal.state is not before.state:
             if event is None:
-                self._not_early(ticket, before.state)
+                self._not_early(handle, before.state)
             elif event is Event.GRANTED:
-                self._in_turn(ticket)
+                self._in_turn(handle)
             ledger.since = now.steady
         if goal.accepted and not before.accepted:
             ledger.begun_at = ledger.forward
@@ -88,8 +88,8 @@ class Judge:
                 ledger.unwanted = ledger.replaced = True
         if event is Event.REJECTED:
             ledger.refused = True
-        ledger.left |= event is Event.LEFT
-        if event is Event.CLOSED and before.state is not State.DONE:
+        ledger.left |= event is Event.NODE_CLOSED
+        if event is Event.PROCESS_EXITING and before.state is not State.DONE:
             ledger.closed = True
             ledger.excuse = ledger.excuse or "its run, or the process, ended"
         if event is Event.DRAINED and goal.end is End.UNKNOWN and not goal.accepted:
@@ -99,16 +99,16 @@ class Judge:
         if goal.end is End.NEVER_STARTED is not before.end and event is None:
             self._hold(ledger.denied, "a suspect is judged when its server denies it, not sooner")
             ledger.excuse = ledger.excuse or "it was judged never to have started"
-        self._commands(ticket, before, commands)
-        self._outcome(ticket, before)
-        self._deadlines_are_kept_in_mind(ticket)
+        self._commands(handle, before, commands)
+        self._outcome(handle, before)
+        self._deadlines_are_kept_in_mind(handle)
         if goal.accepted and not before.accepted and before.state is State.CANCELING:
             self._hold(Command.CANCEL in commands, "what turns up unwanted is canceled at once")
         if before.lost and not goal.lost and goal.live:
             self._hold(Command.CANCEL in commands, "a lost goal that is back is canceled at once")
 
-    def _commands(self, ticket: Ticket, before: Before, commands: tuple[Command, ...]) -> None:
-        goal, ledger = ticket.goal, ticket.ledger
+    def _commands(self, handle: GoalHandle, before: Before, commands: tuple[Command, ...]) -> None:
+        goal, ledger = handle.goal, handle.ledger
         if before.state is State.DONE:
             self._hold(not commands and goal.state is State.DONE, "nothing is sent after DONE")
         for command in commands:
@@ -130,8 +130,8 @@ class Judge:
             self._hold(goal.outcome is not None, "a goal that is DONE has an outcome")
             self._hold(goal.due_in(self.caller.world.now) is None, "DONE waits for nothing")
 
-    def _outcome(self, ticket: Ticket, before: Before) -> None:
-        goal, ledger = ticket.goal, ticket.ledger
+    def _outcome(self, handle: GoalHandle, before: Before) -> None:
+        goal, ledger = handle.goal, handle.ledger
         if before.outcome is not None:
             same = goal.outcome is before.outcome and goal.reason == before.reason
             self._hold(same, "an outcome is decided once")
@@ -141,7 +141,7 @@ class Judge:
         if ledger.unwanted:
             self._hold(goal.outcome is Outcome.CANCELED, "what was given up ends as CANCELED")
         if goal.outcome in (Outcome.ABORTED, Outcome.CANCELED_BY_OTHER):
-            self._hold(not self._preempted(ticket), "what a newer goal replaced ends as CANCELED")
+            self._hold(not self._preempted(handle), "what a newer goal replaced ends as CANCELED")
         if goal.outcome in _CLAIMS:
             true = {job.status for job in ledger.jobs}
             claimed = [status for status, end in ENDS.items() if end is _CLAIMS[goal.outcome]]
@@ -151,7 +151,7 @@ class Judge:
                 job
                 for job in ledger.jobs
                 if job.live and job.server.matched and not job.server.cut
-                if self.caller.world.in_sight(job.server, ticket.node)
+                if self.caller.world.in_sight(job.server, handle.node)
             ]
             self._hold(ledger.crowded or not in_reach, "SERVER_LOST: the server is out of reach")
         if goal.outcome is Outcome.CANCELED_BY_OTHER:
@@ -160,19 +160,19 @@ class Judge:
             refused = ledger.refused and not before.accepted
             self._hold(refused, "REJECTED is what the server said, and it had not accepted")
 
-    def _preempted(self, ticket: Ticket) -> bool:
+    def _preempted(self, handle: GoalHandle) -> bool:
         """Whether a server has accepted a newer goal in place of this one, in truth."""
         return any(
             newer.goal.busy is Busy.REPLACE
-            and int(newer.goal.id) > int(ticket.goal.id)
+            and int(newer.goal.id) > int(handle.goal.id)
             and newer.goal.state in (State.SENDING, State.EXECUTING)
-            and newer.goal.resources & ticket.goal.resources
+            and newer.goal.resources & handle.goal.resources
             and newer.ledger.jobs
-            for newer in self.caller.tickets
+            for newer in self.caller.handles
         )
 
-    def _deadlines_are_kept_in_mind(self, ticket: Ticket) -> None:
-        goal, limits, ledger = ticket.goal, ticket.goal.timeouts, ticket.ledger
+    def _deadlines_are_kept_in_mind(self, handle: GoalHandle) -> None:
+        goal, limits, ledger = handle.goal, handle.goal.timeouts, handle.ledger
         if goal.state is State.DONE or goal.due_in(self.caller.world.now) is not None:
             return
         if goal.lost and ledger.left:
@@ -193,9 +193,9 @@ class Judge:
             excused = settled or (goal.suspect and goal.waited_for and not goal.holding)
         self._hold(excused, f"no deadline is forgotten ({state.value})")
 
-    def polled(self, ticket: Ticket) -> None:
+    def polled(self, handle: GoalHandle) -> None:
         """Check that no deadline has passed without effect."""
-        goal, limits, ledger = ticket.goal, ticket.goal.timeouts, ticket.ledger
+        goal, limits, ledger = handle.goal, handle.goal.timeouts, handle.ledger
         now = self.caller.world.now.steady
         ledger.slow = max(ledger.slow, now - ledger.polled_at)
         ledger.polled_at = now
@@ -221,12 +221,12 @@ class Judge:
             elif limits.cancel is not None:
                 self._within(here, 2 * accept + limits.cancel, "cancel")
 
-    def _not_early(self, ticket: Ticket, state: State) -> None:
+    def _not_early(self, handle: GoalHandle, state: State) -> None:
         """Check that a deadline that took effect had passed."""
-        limits, ledger = ticket.goal.timeouts, ticket.ledger
+        limits, ledger = handle.goal.timeouts, handle.ledger
         here = self.caller.world.now.steady - ledger.since
         if state is State.EXECUTING:
-            if not ledger.replaced and ticket.goal.state is not State.DONE:
+            if not ledger.replaced and handle.goal.state is not State.DONE:
                 running = ledger.forward - ledger.begun_at + JUST
                 silent = 0.0 if ledger.heard_at is None else ledger.forward - ledger.heard_at + JUST
                 passed = (limits.result is not None and running >= limits.result) or (
@@ -242,46 +242,46 @@ class Judge:
             in_time = limit is not None and here + JUST >= limit
             self._hold(in_time, f"no deadline strikes early ({state.value})")
 
-    def _in_turn(self, ticket: Ticket) -> None:
+    def _in_turn(self, handle: GoalHandle) -> None:
         """Check that nobody is overtaken in the queue."""
-        if ticket.goal.busy is not Busy.WAIT:
+        if handle.goal.busy is not Busy.WAIT:
             return
-        for other in self.caller.tickets:
-            if other is ticket:
+        for other in self.caller.handles:
+            if other is handle:
                 return
             if other.goal.state is State.QUEUED:
-                overlap = other.goal.resources & ticket.goal.resources
+                overlap = other.goal.resources & handle.goal.resources
                 self._hold(not overlap, "first come, first served")
 
     def nobody_waits_in_vain(self) -> None:
         """Check that who queues has somebody who holds, or waits longer, for the same."""
         wanted: set[str] = set()
-        for ticket in self.caller.tickets:
-            if ticket.goal.state is not State.QUEUED:
+        for handle in self.caller.handles:
+            if handle.goal.state is not State.QUEUED:
                 continue
-            names = ticket.goal.resources
+            names = handle.goal.resources
             why = names & wanted or self.caller.resources.holders(names)
-            self._hold(why, f"what is free goes to who waits longest: {ticket}")
+            self._hold(why, f"what is free goes to who waits longest: {handle}")
             wanted |= names
 
     def _within(self, passed: float, limit: float | None, name: str) -> None:
         self._hold(limit is None or passed < limit + JUST, f"timeout.{name} takes effect")
 
-    def interrupted_again(self, ticket: Ticket) -> None:
+    def interrupted_again(self, handle: GoalHandle) -> None:
         """Interrupt once more and see that nothing changes."""
-        goal, now = ticket.goal, self.caller.world.now
-        before = (self.before(ticket), goal.due_in(now))
+        goal, now = handle.goal, self.caller.world.now
+        before = (self.before(handle), goal.due_in(now))
         commands = goal.on(Event.INTERRUPTED, now)
-        same = before == (self.before(ticket), goal.due_in(now))
+        same = before == (self.before(handle), goal.due_in(now))
         self._hold(same and not commands, "interrupting twice is interrupting once")
 
     # Leaves and servers
 
-    def noted(self, leaf: Leaf, ticket: Ticket, record: AttemptRecord, again: bool) -> None:
+    def noted(self, leaf: Leaf, handle: GoalHandle, record: AttemptRecord, again: bool) -> None:
         """A leaf has taken note of an outcome."""
         if again and leaf.attempts is not None:
             self._hold(record.end is not End.UNKNOWN, "a retry waits until the end is known")
-            self._hold(not ticket.ledger.unwanted, "what was given up is not tried again")
+            self._hold(not handle.ledger.unwanted, "what was given up is not tried again")
             outcomes = leaf.plan.retry.outcomes
             gone = record.end is End.SERVER_GONE and Outcome.SERVER_LOST not in outcomes
             self._hold(not gone, "a goal whose server is gone is tried again only if asked for")
@@ -290,89 +290,89 @@ class Judge:
             in_bounds = len(leaf.attempts.history) < leaf.plan.retry.attempts
             self._hold(in_bounds, "attempts counts all tries")
 
-    def sent(self, ticket: Ticket, reached: int) -> None:
+    def sent(self, handle: GoalHandle, reached: int) -> None:
         """A goal request has left for so many live servers."""
-        for other in self.caller.tickets:
-            if other.goal.lost and self.caller.out_of_sight(other, ticket):
-                ticket.ledger.beside += (other,)
-            elif other.line.name == ticket.line.name and other.goal.outcome is not None:
+        for other in self.caller.handles:
+            if other.goal.lost and self.caller.out_of_sight(other, handle):
+                handle.ledger.beside += (other,)
+            elif other.endpoint.name == handle.endpoint.name and other.goal.outcome is not None:
                 taken_for_ghosts = other.goal.end is End.SERVER_GONE  # as they answer nothing
                 runs = not other.goal.holding and any(
                     job.live
-                    and self.caller.world.in_sight(job.server, ticket.node)
+                    and self.caller.world.in_sight(job.server, handle.node)
                     and not (taken_for_ghosts and job.server.cut)
                     for job in other.ledger.jobs
                 )
                 excused: str | bool = other.ledger.excuse
                 excused = excused or (other.ledger.crowded and len(other.ledger.heard) < 2)
                 excused = excused or (other.goal.waited_for and not other.goal.accepted)
-                rule = f"{other} was given up, and is canceled before {ticket} is sent there"
+                rule = f"{other} was given up, and is canceled before {handle} is sent there"
                 self._hold(not runs or excused, rule)
-            elif other is not ticket and other.line.name == ticket.line.name:
-                _, newer = sorted((other.goal, ticket.goal), key=lambda goal: int(goal.id))
+            elif other is not handle and other.endpoint.name == handle.endpoint.name:
+                _, newer = sorted((other.goal, handle.goal), key=lambda goal: int(goal.id))
                 crosses = other.goal.unanswered and newer.busy is Busy.REPLACE
-                crosses = crosses and bool(other.goal.resources & ticket.goal.resources)
-                self._hold(not crosses, f"{other} is answered before {ticket} is sent")
+                crosses = crosses and bool(other.goal.resources & handle.goal.resources)
+                self._hold(not crosses, f"{other} is answered before {handle} is sent")
         if reached > 1:
-            ticket.ledger.crowded = True
+            handle.ledger.crowded = True
 
-    def is_done(self, ticket: Ticket) -> None:
+    def is_done(self, handle: GoalHandle) -> None:
         """A goal is DONE, and its line has put it away; not what a line is told that is gone."""
-        if self.caller.closed or len(ticket.ledger.heard) < 2:
+        if self.caller.closed or len(handle.ledger.heard) < 2:
             return
         world = self.caller.world
-        known = [job for job in ticket.ledger.jobs if job.server.gid in ticket.ledger.heard]
-        runs = any(job.live and world.in_sight(job.server, ticket.node) for job in known)
+        known = [job for job in handle.ledger.jobs if job.server.gid in handle.ledger.heard]
+        runs = any(job.live and world.in_sight(job.server, handle.node) for job in known)
         rule = "an end is known when it has ended everywhere, or a twin is kept in mind"
-        minded = self._is_minded(ticket) or not self._may_be_several(ticket)
+        minded = self._is_minded(handle) or not self._may_be_several(handle)
         self._hold(not runs or minded, rule)
 
-    def twin_is_done(self, twin: Goal) -> None:
+    def twin_is_done(self, duplicate: Goal) -> None:
         """What a second server took has ended there."""
-        ticket = self.caller.seen[twin.id]
-        ends = [ENDS[job.status] for job in ticket.ledger.jobs if job.status in ENDS]
-        if ticket.goal.end in ends:
-            ends.remove(ticket.goal.end)
-        true = twin.end in ends or twin.end not in ENDS.values()
-        self._hold(true, f"the end of a twin is none that was told before: {twin!r}, {ends}")
+        handle = self.caller.seen[duplicate.id]
+        ends = [ENDS[job.status] for job in handle.ledger.jobs if job.status in ENDS]
+        if handle.goal.end in ends:
+            ends.remove(handle.goal.end)
+        true = duplicate.end in ends or duplicate.end not in ENDS.values()
+        self._hold(true, f"the end of a twin is none that was told before: {duplicate!r}, {ends}")
 
-    def hears_acceptance(self, ticket: Ticket, server: ModelServer) -> None:
+    def hears_acceptance(self, handle: GoalHandle, server: ModelServer) -> None:
         """A server's acceptance has been taken in, the first or one more."""
-        news, ledger = server.gid not in ticket.ledger.heard, ticket.ledger
+        news, ledger = server.gid not in handle.ledger.heard, handle.ledger
         ledger.heard |= {server.gid}
         runs = any(job.live and job.server is server for job in ledger.jobs)
-        several = self._may_be_several(ticket)
-        if news and runs and ticket.goal.state is State.DONE and several:
-            minded = ledger.closed or self._is_minded(ticket)
+        several = self._may_be_several(handle)
+        if news and runs and handle.goal.state is State.DONE and several:
+            minded = ledger.closed or self._is_minded(handle)
             self._hold(minded, "what a second server accepts of a goal that has ended is minded")
 
-    def _is_minded(self, ticket: Ticket) -> bool:
-        """Whether the goal, or its twin, is on a line; of another node, where that took it over."""
-        return any(ticket.goal.id in line.goals for line in self.caller.lines)
+    def _is_minded(self, handle: GoalHandle) -> bool:
+        """Whether the goal, or its duplicate, has an endpoint, be it that of another node."""
+        return any(handle.goal.id in endpoint.goals for endpoint in self.caller.endpoints)
 
     @staticmethod
-    def _may_be_several(ticket: Ticket) -> bool:
+    def _may_be_several(handle: GoalHandle) -> bool:
         """Whether more than one is shown: else two acceptances may be those of one."""
-        return len(ticket.testimony.sent_to | ticket.line.watch.gids) > 1
+        return len(handle.replies.sent_to | handle.endpoint.watch.gids) > 1
 
     def accepted_on_server(self, job: Job) -> None:
         """A server begins to execute a goal: is it alone on its resources?"""
-        ticket = self._ticket(job)
-        ticket.ledger.jobs += (job,)
+        handle = self._handle(job)
+        handle.ledger.jobs += (job,)
         for other in self.caller.world.jobs:
             if other is job or not other.live or other.goal_id == job.goal_id:
                 continue
-            rival = self._ticket(other)
-            if rival.goal.resources & ticket.goal.resources:
-                older, newer = sorted((rival, ticket), key=lambda t: int(t.goal.id))
+            rival = self._handle(other)
+            if rival.goal.resources & handle.goal.resources:
+                older, newer = sorted((rival, handle), key=lambda t: int(t.goal.id))
                 asked_for = newer.goal.busy in (Busy.REPLACE, Busy.SHARE) or (
                     older.goal.busy in (Busy.REPLACE, Busy.SHARE)
                 )
-                excused = any(t.ledger.excuse or t.ledger.crowded for t in (rival, ticket))
-                excused |= rival in ticket.ledger.beside or ticket in rival.ledger.beside
-                self._hold(asked_for or excused, f"{rival} and {ticket} are never live together")
+                excused = any(t.ledger.excuse or t.ledger.crowded for t in (rival, handle))
+                excused |= rival in handle.ledger.beside or handle in rival.ledger.beside
+                self._hold(asked_for or excused, f"{rival} and {handle} are never live together")
 
-    def _ticket(self, job: Job) -> Ticket:
+    def _handle(self, job: Job) -> GoalHandle:
         return self.caller.seen[job.goal_id]
 
     # The end
@@ -380,32 +380,32 @@ class Judge:
     def settled(self) -> bool:
         """Whether every goal is DONE, or given up with its end known."""
         return all(
-            ticket.goal.state is State.DONE
-            or (ticket.goal.outcome is not None and ticket.goal.end is not End.UNKNOWN)
-            or (ticket.goal.suspect and ticket.goal.waited_for and not ticket.goal.holding)
-            for ticket in self.caller.tickets
+            handle.goal.state is State.DONE
+            or (handle.goal.outcome is not None and handle.goal.end is not End.UNKNOWN)
+            or (handle.goal.suspect and handle.goal.waited_for and not handle.goal.holding)
+            for handle in self.caller.handles
         )
 
     def at_the_end(self) -> None:
         """Compare what is reported with what is true, after every server had its chance."""
         self.insist()
         caller = self.caller
-        for ticket in caller.tickets:
-            goal = ticket.goal
+        for handle in caller.handles:
+            goal = handle.goal
             done = goal.state is State.DONE or goal.end is not End.UNKNOWN
             done |= goal.suspect and goal.waited_for and not goal.holding  # and reported so
-            self._hold(goal.outcome is not None and done, f"every goal ends: {ticket} {goal!r}")
-            self._hold(not goal.holding, f"every resource is given back: {ticket} {goal!r}")
-            self._the_end_is_true(ticket)
+            self._hold(goal.outcome is not None and done, f"every goal ends: {handle} {goal!r}")
+            self._hold(not goal.holding, f"every resource is given back: {handle} {goal!r}")
+            self._the_end_is_true(handle)
         self._hold(len(caller.resources) == 0, "no resource is leaked")
 
-    def _the_end_is_true(self, ticket: Ticket) -> None:
-        goal, ledger = ticket.goal, ticket.ledger
+    def _the_end_is_true(self, handle: GoalHandle) -> None:
+        goal, ledger = handle.goal, handle.ledger
         closed, jobs = self.caller.closed or ledger.closed, ledger.jobs
         if not closed and not ledger.crowded:
             running = [job for job in jobs if job.live]
-            self._hold(not running, f"no goal is left running: {ticket} {goal!r}")
-        said = f"the end is what the server says: {ticket} {goal!r}, {[j.status for j in jobs]}"
+            self._hold(not running, f"no goal is left running: {handle} {goal!r}")
+        said = f"the end is what the server says: {handle} {goal!r}, {[j.status for j in jobs]}"
         if goal.end in ENDS.values():
             self._hold(any(ENDS.get(job.status) is goal.end for job in jobs), said)
         elif goal.end is End.NEVER_STARTED:
@@ -426,7 +426,7 @@ class Judge:
             self._hold(cause, f"UNKNOWN with a cause: {said}")
 
     def insist(self) -> None:
-        """Raise what was raised before: ros/line.py may have caught it, as it does any error."""
+        """Raise what was raised before: traffic/endpoint.py may have caught it, like any error."""
         if self._violation is not None:
             raise self._violation
 

@@ -12,11 +12,11 @@ from bt_actions.goals.attempts import Attempts
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.goals.terms import State
-from bt_actions.servers.replies import Testimony
+from bt_actions.servers.replies import Replies
 
 if TYPE_CHECKING:
-    from bt_actions.ros import shared
-    from bt_actions.ros.line import Line
+    from bt_actions.traffic import shared
+    from bt_actions.traffic.endpoint import ActionEndpoint
     from tests.machine.world import Job
 
 
@@ -66,16 +66,16 @@ class Ledger:
     closed: bool = False
     left: bool = False
     """Its node has gone, and somebody else is to see to it."""
-    beside: tuple[Ticket, ...] = ()
+    beside: tuple[GoalHandle, ...] = ()
     """Lost goals whose server was out of sight when this one was sent: they may turn up again."""
     jobs: tuple[Job, ...] = ()
 
 
 @dataclass(eq=False, slots=True)
-class Ticket:
-    """A goal on its way (shared.Ticket), with its name and what the judge keeps of it."""
+class GoalHandle:
+    """A goal on its way (shared.GoalHandle), with its name and what the judge keeps of it."""
 
-    real: shared.Ticket
+    real: shared.GoalHandle
     name: str
     ledger: Ledger = field(init=False)
 
@@ -84,18 +84,18 @@ class Ticket:
         return self.real.goal
 
     @property
-    def line(self) -> Line:
-        return self.real.line
+    def endpoint(self) -> ActionEndpoint:
+        return self.real.endpoint
 
     @property
     def node(self) -> int:
         """The number of the node that sees to it."""
-        number: int = self.line.traffic.node.number
+        number: int = self.endpoint.traffic.node.number
         return number
 
     @property
-    def testimony(self) -> Testimony:
-        return self.real.testimony
+    def replies(self) -> Replies:
+        return self.real.replies
 
     def __repr__(self) -> str:
         return self.name
@@ -127,7 +127,7 @@ class Leaf:
     name: str
     plan: LeafPlan
     attempts: Attempts | None = None
-    ticket: shared.Ticket | None = None
+    handle: shared.GoalHandle | None = None
     visits: int = 0
 
     def __repr__(self) -> str:

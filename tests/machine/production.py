@@ -1,4 +1,5 @@
-"""Leaves, and the production ros/line.py and ros/traffic.py beneath them, in a model world.
+"""Leaves, and the production traffic/endpoint.py and traffic/traffic.py beneath them, in a model
+world.
 
 A model is what lies around them: the client, the node, the graph, the clocks and the alarm's
 thread. Of the two files themselves nothing is copied. Each step of a goal is shown to the judge.
@@ -17,14 +18,17 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import Command, Event, Now, State
-from bt_actions.ros import alarm, line, past, shared, traffic, way
 from bt_actions.ros.action_client import GOALS_KEPT
-from bt_actions.ros.line import Line
-from bt_actions.ros.traffic import Traffic
-from bt_actions.servers.reachability import Hearing
-from bt_actions.servers.stalls import ANSWERS_TAKE, ANSWERS_TAKE_IN_ALL, Standstill
+from bt_actions.servers.reachability import Reachability
+from bt_actions.servers.stalls import ANSWERS_TAKE, ANSWERS_TAKE_IN_ALL, Stalls
+from bt_actions.traffic import alarm, shared, traffic
+from bt_actions.traffic import ended as past
+from bt_actions.traffic import endpoint as endpoint
+from bt_actions.traffic import route as route
+from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.traffic import Traffic
 from tests.machine.judge import Judge, Violation
-from tests.machine.parts import Leaf, LeafPlan, Ticket
+from tests.machine.parts import GoalHandle, Leaf, LeafPlan
 from tests.machine.world import NODES, Job, Message, World
 
 DOMAIN = 1
@@ -53,7 +57,7 @@ class ModelClient:
     def __init__(self, node: Any, action_type: Any, name: str, listener: Any) -> None:
         self.node, self.name, self._listener = node, name, listener
         self.closed = self.has_more = False
-        self.hearing = Hearing()
+        self.reachability = Reachability()
         self._asked: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
         self._past: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
 
@@ -87,9 +91,9 @@ class ModelClient:
         number = caller.file(self)
         self._asked[number] = (kind, about, caller.moment(), {})
         if kind != "result":
-            self.hearing.asked(caller.moment())
-        ticket = caller.seen.get(goal_id)
-        name = "" if ticket is None else ticket.name
+            self.reachability.asked(caller.moment())
+        handle = caller.seen.get(goal_id)
+        name = "" if handle is None else handle.name
         nobody = caller.world.servers[0]
         message = Message(kind, nobody, goal_id, name, number=number, to_server=True)
         return caller.world.send(message, self.name, self.node.number)
@@ -115,7 +119,7 @@ class ModelClient:
         if self.closed or question is None:
             return
         kind, about, asked, by_server = question
-        self.hearing.answered(asked)
+        self.reachability.answered(asked)
         if kind == "probe":
             self._listener.probe_answered(about)
             return
@@ -135,7 +139,7 @@ class ModelClient:
 class Silence:
     """The log, to which nobody listens."""
 
-    def error(self, line: str) -> None: ...
+    def error(self, endpoint: str) -> None: ...
 
     info = warning = error
 
@@ -159,7 +163,7 @@ class Context:
 
 
 class Node:
-    """What Line and Traffic ask of a node."""
+    """What ActionEndpoint and Traffic ask of a node."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -181,7 +185,7 @@ class Caller:
     def __init__(self, world: World, plans: Iterable[LeafPlan], judge: Judge) -> None:
         self.world, self.judge = world, judge
         self.leaves = [Leaf(f"leaf{number}", each) for number, each in enumerate(plans)]
-        self.seen: dict[bytes, Ticket] = {}
+        self.seen: dict[bytes, GoalHandle] = {}
         """Every goal that was ever begun, the oldest first."""
         self.closed = False
         self.froze = False
@@ -193,9 +197,11 @@ class Caller:
         _playing[:] = [self]
         shared._domains.clear()
         alarm._open.clear()
-        alarm.standstill = Standstill()
+        alarm.stalls = Stalls()
         self._traffics = {number: self._traffic(number) for number in NODES}
-        self._lines: dict[tuple[str, int], Line] = {}  # made when a leaf first wants them
+        self._endpoints: dict[
+            tuple[str, int], ActionEndpoint
+        ] = {}  # made when a leaf first wants them
         world.client = self
         judge.caller = self
         kinds = (
@@ -213,7 +219,7 @@ class Caller:
                 "look": (lambda: (None,), lambda _: self.attend()),
                 "drained": (
                     self._left_behind,
-                    lambda ticket: ticket.line.tell(ticket.real, Event.DRAINED),
+                    lambda handle: handle.endpoint.tell(handle.real, Event.DRAINED),
                 ),
                 "rerun": (lambda: () if self.closed else NODES, self.run_again),
             }
@@ -245,54 +251,54 @@ class Caller:
         made.seen_since = float("-inf")  # it has discovered who is there
         return made
 
-    def come(self, action: str, node: int) -> Line:
+    def come(self, action: str, node: int) -> ActionEndpoint:
         """Return the line of a node to an action, made when it is first wanted."""
-        found = self._lines.get((action, node))
+        found = self._endpoints.get((action, node))
         if found is None:
             of_node = self._traffics[node]
-            found = of_node._lines.get(action)
+            found = of_node._endpoints.get(action)
             if found is None:
-                found = of_node._lines[action] = Line(of_node, "type", action)
+                found = of_node._endpoints[action] = ActionEndpoint(of_node, "type", action)
             found.users += 1
-            self._lines[action, node] = found
+            self._endpoints[action, node] = found
         return found
 
     def new_goal_id(self) -> bytes:
         return b"%d" % len(self.seen)
 
-    def begun(self, real: shared.Ticket) -> None:
-        """Take note of a ticket that is made, but for a twin's, which has its goal's id."""
+    def begun(self, real: shared.GoalHandle) -> None:
+        """Take note of a handle that is made, but for a duplicate's, which has its goal's id."""
         if real.goal.id not in self.seen:
-            ticket = self.seen[real.goal.id] = Ticket(real, self._next_name)
-            self.judge.begins(ticket)
+            handle = self.seen[real.goal.id] = GoalHandle(real, self._next_name)
+            self.judge.begins(handle)
 
-    def known(self, goal: Goal) -> Ticket | None:
-        """Return what the judge knows of a goal: nothing where that is a twin."""
-        ticket = self.seen.get(goal.id)
-        return ticket if ticket is not None and ticket.goal is goal else None
+    def known(self, goal: Goal) -> GoalHandle | None:
+        """Return what the judge knows of a goal: nothing where that is a duplicate."""
+        handle = self.seen.get(goal.id)
+        return handle if handle is not None and handle.goal is goal else None
 
     def told(
         self, goal: Goal, event: Event, detail: Any, step: Callable[[], tuple[Command, ...]]
     ) -> tuple[Command, ...]:
         """Have the judge see what a goal is told, and what it says."""
-        ticket = self.known(goal)
-        if ticket is None:
+        handle = self.known(goal)
+        if handle is None:
             return step()
-        before = self.judge.before(ticket)
+        before = self.judge.before(handle)
         commands = step()
         shown = None if event.name.endswith("_DUE") else event
-        self.judge.after(ticket, before, shown, detail, commands)
+        self.judge.after(handle, before, shown, detail, commands)
         return commands
 
-    def put_away(self, goal: Goal) -> None:
+    def park(self, goal: Goal) -> None:
         """Have the judge see that a goal is DONE, and its line has put it away."""
         if goal.state is not State.DONE:
             return
-        ticket = self.known(goal)
-        if ticket is None:
+        handle = self.known(goal)
+        if handle is None:
             self.judge.twin_is_done(goal)
         else:
-            self.judge.is_done(ticket)
+            self.judge.is_done(handle)
 
     # The leaves
 
@@ -300,31 +306,31 @@ class Caller:
         """Visit an idle leaf, or let a running one take note and go on."""
         of_node = self._traffics[leaf.plan.node]
         to_action = self.come(leaf.plan.action, leaf.plan.node)
-        if leaf.ticket is not None and leaf.attempts is not None:
+        if leaf.handle is not None and leaf.attempts is not None:
             to_action.look(self.moment())
-            leaf.ticket.line.poll(leaf.ticket)
-            goal = leaf.ticket.goal
+            leaf.handle.endpoint.poll(leaf.handle)
+            goal = leaf.handle.goal
             if goal.outcome is not None:
-                self._judge_attempt(leaf, leaf.attempts, leaf.ticket)
+                self._judge_attempt(leaf, leaf.attempts, leaf.handle)
                 return
         if leaf.attempts is None:
             leaf.attempts = Attempts(leaf.plan.retry, None, self._chance)
             leaf.visits += 1
-        if leaf.ticket is None:
+        if leaf.handle is None:
             if leaf.attempts.pause_left(self.world.now) > 0.0:
                 return
             self._next_name = f"{leaf.name}.{leaf.visits}.{leaf.attempts.attempt}"
             wants = leaf.plan.timeouts, leaf.plan.resources, leaf.plan.busy
-            leaf.ticket = of_node.begin(to_action, leaf, *wants)
-        of_node.advance(leaf.ticket, self._message)
+            leaf.handle = of_node.begin(to_action, leaf, *wants)
+        of_node.advance(leaf.handle, self._message)
 
     def _message(self) -> str:
         if self.takes("builds_nonsense"):
             raise ValueError("no such variable")
         return "goal"
 
-    def _judge_attempt(self, leaf: Leaf, attempts: Attempts, ticket: shared.Ticket) -> None:
-        goal = ticket.goal
+    def _judge_attempt(self, leaf: Leaf, attempts: Attempts, handle: shared.GoalHandle) -> None:
+        goal = handle.goal
         outcome = goal.outcome
         assert outcome is not None
         if outcome is Outcome.SUCCEEDED and self.takes("unexpected"):
@@ -332,16 +338,16 @@ class Caller:
         record = AttemptRecord(attempts.attempt, outcome, goal.reason, 0.0, 0.0, None, goal)
         again = attempts.again(record, self.world.now)
         self.judge.noted(leaf, self.seen[goal.id], record, again)
-        leaf.ticket = None
+        leaf.handle = None
         if not again:
             leaf.attempts = None
 
     def interrupt(self, leaf: Leaf) -> None:
         """What py_trees' terminate(INVALID) does; twice, because it may come twice."""
-        if leaf.ticket is not None:
-            leaf.ticket.line.tell(leaf.ticket, Event.INTERRUPTED)
-            self.judge.interrupted_again(self.seen[leaf.ticket.goal.id])
-        leaf.ticket = leaf.attempts = None
+        if leaf.handle is not None:
+            leaf.handle.endpoint.tell(leaf.handle, Event.INTERRUPTED)
+            self.judge.interrupted_again(self.seen[leaf.handle.goal.id])
+        leaf.handle = leaf.attempts = None
 
     def run_again(self, node: int) -> None:
         """The run of one node ends, and another begins."""
@@ -351,23 +357,23 @@ class Caller:
         self._traffics[node].destroy()
         self._traffics[node] = self._traffic(node)
         for action in self.world.actions:
-            self._lines.pop((action, node), None)
+            self._endpoints.pop((action, node), None)
 
     def close(self) -> None:
         """The process ends."""
         self.closed = True
-        for ticket in self.tickets:
-            ticket.line.tell(ticket.real, Event.CLOSED)
+        for handle in self.handles:
+            handle.endpoint.tell(handle.real, Event.PROCESS_EXITING)
 
-    def _left_behind(self) -> list[Ticket]:
+    def _left_behind(self) -> list[GoalHandle]:
         """Goals that are still waited for, though no leaf has them any more."""
-        held = {leaf.ticket for leaf in self.leaves}
+        held = {leaf.handle for leaf in self.leaves}
         return [
-            ticket
-            for ticket in self.tickets
-            if ticket.real not in held
-            and ticket.goal.outcome is not None
-            and (ticket.goal.end is End.UNKNOWN or ticket.goal.suspect)
+            handle
+            for handle in self.handles
+            if handle.real not in held
+            and handle.goal.outcome is not None
+            and (handle.goal.end is End.UNKNOWN or handle.goal.suspect)
         ]
 
     # What arrives, and what time does
@@ -389,20 +395,20 @@ class Caller:
 
     def attend(self) -> None:
         """What the alarm does, which is late where the process was frozen."""
-        alarm.standstill.rests(self.moment())
+        alarm.stalls.rests(self.moment())
         self._attend()
         if self.takes("freezes"):
             self._freeze((0.9, 2.5, 6.0)[self._moments % 3])
 
     def _attend(self) -> None:
         for each in list(alarm._open):
-            assert isinstance(each, Line)
+            assert isinstance(each, ActionEndpoint)
             each._look_at = 0.0
             each.attend(self.moment())
             for real in each.goals.values():
-                ticket = self.known(real.goal)
-                if ticket is not None and not self.froze:
-                    self.judge.polled(ticket)
+                handle = self.known(real.goal)
+                if handle is not None and not self.froze:
+                    self.judge.polled(handle)
         self.judge.nobody_waits_in_vain()
 
     def _freeze(self, seconds: float) -> None:
@@ -411,12 +417,12 @@ class Caller:
         So do servers that it sees, beyond their lease.
         """
         self.froze = True
-        alarm.standstill.lives(self.moment())
+        alarm.stalls.lives(self.moment())
         before = {
-            ticket: ticket.goal.state
-            for ticket in self.tickets
-            if ticket.goal.state in (State.WAITING_FOR_SERVER, State.SENDING, State.EXECUTING)
-            and not (ticket.ledger.crowded or self._falters(ticket) or self._was_patient(ticket))
+            handle: handle.goal.state
+            for handle in self.handles
+            if handle.goal.state in (State.WAITING_FOR_SERVER, State.SENDING, State.EXECUTING)
+            and not (handle.ledger.crowded or self._falters(handle) or self._was_patient(handle))
         }
         world, hidden = self.world, set[tuple[bytes, int]]()
         if seconds > LEASE:
@@ -425,48 +431,48 @@ class Caller:
         world.overlooked |= hidden
         world.now = Now(world.now.steady + seconds, world.now.ros + seconds * world.pace)
         self._attend()
-        for ticket, state in before.items():
-            if ticket.goal.state is not state:
-                raise Violation(f"who was frozen looks first for what came meanwhile: {ticket}")
+        for handle, state in before.items():
+            if handle.goal.state is not state:
+                raise Violation(f"who was frozen looks first for what came meanwhile: {handle}")
         world.overlooked -= hidden
         for message in world._deliverable():
             if message in world.air:
                 world.deliver(message)
         self.attend()
 
-    def _falters(self, ticket: Ticket) -> bool:
-        """Whether its server is in sight without its services, which no standstill does."""
-        where = ticket.line.name, ticket.node
+    def _falters(self, handle: GoalHandle) -> bool:
+        """Whether its server is in sight without its services, which no stall does."""
+        where = handle.endpoint.name, handle.node
         return bool(self.world.shown(*where)) and not self.world.ready(*where)
 
     @staticmethod
-    def _was_patient(ticket: Ticket) -> bool:
-        """Whether a deadline of it was held for as long as standstills in a row are borne with."""
-        deadlines, longest = ticket.goal._deadlines, ANSWERS_TAKE_IN_ALL - ANSWERS_TAKE
+    def _was_patient(handle: GoalHandle) -> bool:
+        """Whether a deadline of it was held for as long as stalls in a row are borne with."""
+        deadlines, longest = handle.goal._deadlines, ANSWERS_TAKE_IN_ALL - ANSWERS_TAKE
         return any(deadlines.held(event, ANSWERS_TAKE_IN_ALL) > longest for event in Event)
 
     def due_in(self) -> float:
         """Return the seconds until something is due (half a second where nothing is)."""
-        tickets = [ticket for each in self.lines for ticket in each.goals.values()]
-        dues = [ticket.goal.due_in(self.world.now) for ticket in tickets]
+        handles = [handle for each in self.endpoints for handle in each.goals.values()]
+        dues = [handle.goal.due_in(self.world.now) for handle in handles]
         return min((due for due in dues if due is not None), default=0.5)
 
     # For the judge
 
     @property
-    def tickets(self) -> list[Ticket]:
+    def handles(self) -> list[GoalHandle]:
         return list(self.seen.values())
 
     @property
-    def resources(self) -> Resources[shared.Ticket]:
+    def resources(self) -> Resources[shared.GoalHandle]:
         return shared.domain_of(DOMAIN).resources
 
     @property
-    def lines(self) -> list[Line]:
-        return [each for of_node in self._traffics.values() for each in of_node._lines.values()]
+    def endpoints(self) -> list[ActionEndpoint]:
+        return [each for of_node in self._traffics.values() for each in of_node._endpoints.values()]
 
-    def _lines_to(self, action: str) -> list[Line]:
-        return [each for each in self.lines if each.name == action]
+    def _lines_to(self, action: str) -> list[ActionEndpoint]:
+        return [each for each in self.endpoints if each.name == action]
 
     def accepted_on_server(self, job: Job) -> None:
         """Not seen by any real caller: for the judge."""
@@ -479,89 +485,93 @@ class Caller:
         """
         for each in self._lines_to(action):
             for real in each.goals.values():
-                ticket = self.known(real.goal)
-                if ticket is not None:
-                    ticket.ledger.crowded |= not (but_lost and ticket.goal.lost)
+                handle = self.known(real.goal)
+                if handle is not None:
+                    handle.ledger.crowded |= not (but_lost and handle.goal.lost)
 
-    def out_of_sight(self, lost: Ticket, wanted: Ticket) -> bool:
+    def out_of_sight(self, lost: GoalHandle, wanted: GoalHandle) -> bool:
         """Whether nothing that the node of `wanted` sees shows the lost one's servers."""
-        action, world = lost.line.name, self.world
+        action, world = lost.endpoint.name, self.world
         return not any(
-            lost.testimony.sent_to & world.shown(action, wanted.node)
+            lost.replies.sent_to & world.shown(action, wanted.node)
             and world.ready(action, wanted.node)
             for each in self._lines_to(action)
             if each.traffic.node.number == wanted.node
         )
 
 
-def _drain(tickets: Iterable[shared.Ticket], hurry: Any = None) -> None:
+def _drain(handles: Iterable[shared.GoalHandle], hurry: Any = None) -> None:
     """A drain whose patience is over at once."""
-    wanted = [ticket for ticket in tickets if ticket.goal.state is not State.DONE]
-    for ticket in wanted:
-        ticket.line.tell(ticket, Event.INTERRUPTED)
-    for ticket in wanted:
-        if not ticket.accounted_for:
-            ticket.line.tell(ticket, Event.DRAINED)
+    wanted = [handle for handle in handles if handle.goal.state is not State.DONE]
+    for handle in wanted:
+        handle.endpoint.tell(handle, Event.INTERRUPTED)
+    for handle in wanted:
+        if not handle.accounted_for:
+            handle.endpoint.tell(handle, Event.DRAINED)
 
 
 @contextmanager
 def installed() -> Iterator[None]:
     """Put the model world around the production code; the one lock is ours meanwhile."""
-    made, close_book = shared.Ticket.__post_init__, Line.close_book
+    made, retire = shared.GoalHandle.__post_init__, ActionEndpoint.retire
     on, poll = Goal.on, Goal.poll
 
-    def post_init(ticket: shared.Ticket) -> None:
-        made(ticket)
-        now().begun(ticket)
+    def post_init(handle: shared.GoalHandle) -> None:
+        made(handle)
+        now().begun(handle)
 
     def told(goal: Goal, event: Event, moment: Any, detail: Any = None) -> Any:
         return now().told(goal, event, detail, lambda: on(goal, event, moment, detail))
 
     def polled(goal: Goal, moment: Now) -> tuple[Command, ...]:
-        ticket = now().known(goal)
-        if ticket is not None:
-            now().judge.sees_clock(ticket)
+        handle = now().known(goal)
+        if handle is not None:
+            now().judge.sees_clock(handle)
         return poll(goal, moment)
 
-    def put_away(of_ticket: Line, ticket: shared.Ticket) -> None:
-        close_book(of_ticket, ticket)
-        now().put_away(ticket.goal)
+    def park(of_ticket: ActionEndpoint, handle: shared.GoalHandle) -> None:
+        retire(of_ticket, handle)
+        now().park(handle.goal)
 
-    def fail(of_what: Line, what: str, error: Exception) -> None:
+    def fail(of_what: ActionEndpoint, what: str, error: Exception) -> None:
         raise error
 
     def appears() -> None:
-        alarm.standstill.lives(now().moment())
-        alarm.standstill.rests(now().moment())
+        alarm.stalls.lives(now().moment())
+        alarm.stalls.rests(now().moment())
 
     patches: list[tuple[Any, str, Any]] = [
-        (line, "time", ModelTime),
+        (endpoint, "time", ModelTime),
         (past, "time", ModelTime),
-        (way, "time", ModelTime),
+        (route, "time", ModelTime),
         (traffic, "time", ModelTime),
-        (line, "ActionClient", ModelClient),
-        (way, "ActionClient", ModelClient),
-        (way, "servers", lambda node, name: now().world.shown(name, node.number)),
-        (line, "is_valid", lambda node: True),
-        (way, "is_valid", lambda node: True),
+        (endpoint, "ActionClient", ModelClient),
+        (route, "ActionClient", ModelClient),
+        (route, "servers", lambda node, name: now().world.shown(name, node.number)),
+        (endpoint, "is_valid", lambda node: True),
+        (route, "is_valid", lambda node: True),
         (traffic, "is_valid", lambda node: True),
-        (way, "_remapped", lambda node, name: True),  # nothing is looked for out of sight
-        (Line, "_instead", lambda self, ticket: ""),
-        (Line, "close_book", put_away),
-        (Line, "_warn_once", fail),
-        (Line, "__hash__", lambda self: self.traffic.node.number),  # sets are in the same order
-        (line, "log", Silence()),
-        (way, "log", Silence()),
+        (route, "_remapped", lambda node, name: True),  # nothing is looked for out of sight
+        (ActionEndpoint, "_instead", lambda self, handle: ""),
+        (ActionEndpoint, "retire", park),
+        (ActionEndpoint, "_warn_once", fail),
+        (
+            ActionEndpoint,
+            "__hash__",
+            lambda self: self.traffic.node.number,
+        ),  # sets are in the same order
+        (endpoint, "log", Silence()),
+        (route, "log", Silence()),
         (traffic, "log", Silence()),
         (traffic, "new_goal_id", lambda: now().new_goal_id()),
         (traffic, "drain", _drain),
-        (alarm, "standstill", Standstill()),
+        (alarm, "stalls", Stalls()),
         (alarm, "_open", set()),
         (alarm, "mind", lambda each: alarm._open.add(each)),
         (alarm, "appears", appears),
-        (line, "ledger", NoLedger()),
+        (endpoint, "ledger", NoLedger()),
         (shared, "_domains", {}),
-        (shared.Ticket, "__post_init__", post_init),
+        (shared.GoalHandle, "__post_init__", post_init),
         (Goal, "on", told),
         (Goal, "poll", polled),
     ]

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from bt_actions.ros.past import Past
-from bt_actions.servers import replies as testimony
-from bt_actions.servers.duplicates import TwinTestimony
+from bt_actions.servers import replies as replies
+from bt_actions.servers.duplicates import DuplicateReplies
+from bt_actions.traffic.ended import Past
 from tests.machine.conftest import THOROUGH
 from tests.machine.crowds import CrowdPlay, crowded_history
 from tests.machine.histories import first_broken, shrink, tell
@@ -33,13 +33,17 @@ def test_no_history_breaks_a_rule() -> None:
 
 
 MISTAKES: dict[str, tuple[Any, str, Callable[..., Any]]] = {
-    "believes two of three": (testimony, "_answers_wanted", lambda watch: 2),
-    "waits for who is not there": (testimony, "_answers_wanted", lambda watch: 3),
-    "takes what was told before for news": (TwinTestimony, "_news", lambda self, ended: ended),
-    "takes any answer for all": (testimony.Testimony, "_may_be_at_two", lambda self, watch: False),
-    "is alone with whom it does not know": (TwinTestimony, "_is_alone", lambda self, watch: True),
+    "believes two of three": (replies, "_answers_wanted", lambda watch: 2),
+    "waits for who is not there": (replies, "_answers_wanted", lambda watch: 3),
+    "takes what was told before for news": (DuplicateReplies, "_news", lambda self, ended: ended),
+    "takes any answer for all": (replies.Replies, "_may_be_at_two", lambda self, watch: False),
+    "is alone with whom it does not know": (
+        DuplicateReplies,
+        "_is_alone",
+        lambda self, watch: True,
+    ),
     "hears the first of two acceptances": (Past, "accepted", lambda self, *answer: None),
-    "forgets what has ended": (Past, "keep", lambda self, ticket: None),
+    "forgets what has ended": (Past, "keep", lambda self, handle: None),
 }
 
 

@@ -37,8 +37,8 @@ def test_the_histories_come_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
         (State.CANCELING, Event.SEND_FAILED),
         (State.DONE, Event.REPLACED),
         (State.DONE, Event.DRAINED),
-        (State.SENDING, Event.LEFT),  # a node that goes has interrupted its goals before
-        (State.EXECUTING, Event.LEFT),
+        (State.SENDING, Event.NODE_CLOSED),  # a node that goes has interrupted its goals before
+        (State.EXECUTING, Event.NODE_CLOSED),
     }
     unseen: set[object] = {*Outcome, *End} - {Outcome.UNEXPECTED_RESULT}  # which a leaf decides
 
@@ -49,8 +49,8 @@ def test_the_histories_come_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
     original = Goal.on
     monkeypatch.setattr(Goal, "on", on)
     for seed in range(6_000):
-        for ticket in play(random_history(seed)).caller.tickets:
-            unseen -= {ticket.goal.outcome, ticket.goal.end}
+        for handle in play(random_history(seed)).caller.handles:
+            unseen -= {handle.goal.outcome, handle.goal.end}
         if not unreached and not unseen:
             return
     assert (unreached, unseen) == (set(), set())

@@ -17,10 +17,10 @@ from bt_actions.goals.goal import TABLE, Goal, Row
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.resources import Answer, Resources
 from bt_actions.goals.terms import Command, Event, State
-from bt_actions.ros.line import Line
-from bt_actions.ros.shared import Domain, Ticket
-from bt_actions.ros.traffic import Traffic
-from bt_actions.servers.stalls import Standstill
+from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.shared import Domain, GoalHandle
+from bt_actions.traffic.traffic import Traffic
 from tests.machine.histories import broken, first_broken, random_history
 from tests.machine.production import now as playing
 
@@ -65,14 +65,14 @@ def begins_though_it_was_interrupted(patch: Patch) -> None:
 
 @mutation
 def takes_a_late_answer_for_the_attempt_that_runs_now(patch: Patch) -> None:
-    def heard_of(line: Line, goal_id: bytes) -> Ticket | None:
-        runs_now: Ticket | None = playing().seen[goal_id].real.owner.ticket
+    def heard_of(endpoint: ActionEndpoint, goal_id: bytes) -> GoalHandle | None:
+        runs_now: GoalHandle | None = playing().seen[goal_id].real.owner.handle
         if runs_now is not None:
             return runs_now if runs_now.goal.sent else None
-        return original(line, goal_id)
+        return original(endpoint, goal_id)
 
-    original = Line._heard_of
-    patch.setattr(Line, "_heard_of", heard_of)
+    original = ActionEndpoint._heard_of
+    patch.setattr(ActionEndpoint, "_heard_of", heard_of)
 
 
 @mutation
@@ -175,35 +175,39 @@ def lets_a_lost_goal_run_on_when_its_server_is_back(patch: Patch) -> None:
 
 @mutation
 def sends_beside_a_lost_goal_that_wants_the_same_resource(patch: Patch) -> None:
-    patch.setattr(Goal, "bars", lambda goal, other, *, same_server: goal.owed and same_server)
+    patch.setattr(
+        Goal, "blocks", lambda goal, other, *, same_server: goal.outstanding and same_server
+    )
 
 
 @mutation
 def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
-    def bars(goal: Goal, other: Goal, *, same_server: bool) -> bool:
-        return goal.owed and bool(goal.resources & other.resources)
+    def blocks(goal: Goal, other: Goal, *, same_server: bool) -> bool:
+        return goal.outstanding and bool(goal.resources & other.resources)
 
-    patch.setattr(Goal, "bars", bars)
+    patch.setattr(Goal, "blocks", blocks)
 
 
 @mutation
 def minds_only_the_goals_of_its_own_node(patch: Patch) -> None:
-    patch.setattr(Traffic, "_in_the_way_of", lambda self, ticket: ticket.line.in_the_way_of(ticket))
+    patch.setattr(
+        Traffic, "_conflicts", lambda self, handle: handle.endpoint.conflicts_with(handle)
+    )
 
 
 @mutation
 def knows_of_nothing_in_the_way(patch: Patch) -> None:
-    patch.setattr(Traffic, "_in_the_way_of", lambda self, ticket: False)
+    patch.setattr(Traffic, "_conflicts", lambda self, handle: False)
 
 
 @mutation
 def leaves_a_lost_goal_to_a_node_that_is_not_shown_its_server(patch: Patch) -> None:
-    patch.setattr(Line, "_take_over", lambda self, now: None)
+    patch.setattr(ActionEndpoint, "_take_over", lambda self, now: None)
 
 
 @mutation
 def adopts_nothing_that_was_left(patch: Patch) -> None:
-    patch.setattr(Line, "_adopt", lambda self: None)
+    patch.setattr(ActionEndpoint, "_adopt", lambda self: None)
 
 
 @mutation
@@ -213,12 +217,12 @@ def remembers_nothing_that_is_lost(patch: Patch) -> None:
 
 @mutation
 def takes_who_is_not_in_sight_yet_for_lost(patch: Patch) -> None:
-    patch.setattr(Standstill, "servers_take", lambda self, now: 0.0)
+    patch.setattr(Stalls, "servers_take", lambda self, now: 0.0)
 
 
 @mutation
 def takes_what_has_not_come_in_yet_for_late(patch: Patch) -> None:
-    patch.setattr(Standstill, "answers_take", lambda self, now: 0.0)
+    patch.setattr(Stalls, "answers_take", lambda self, now: 0.0)
 
 
 @mutation
@@ -269,12 +273,12 @@ def runs_on_beside_the_goal_that_replaced_it(patch: Patch) -> None:
 
 @mutation
 def takes_preemption_for_a_failure(patch: Patch) -> None:
-    patch.setattr(Line, "_rival_sent", lambda self, ticket: False)
+    patch.setattr(ActionEndpoint, "_rival_sent", lambda self, handle: False)
 
 
 @mutation
 def sends_what_replaces_a_goal_beside_the_request_of_that(patch: Patch) -> None:
-    patch.setattr(Line, "may_overtake", lambda self, ticket: False)
+    patch.setattr(ActionEndpoint, "may_overtake", lambda self, handle: False)
 
 
 @mutation

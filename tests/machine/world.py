@@ -96,10 +96,10 @@ class Message:
     to_server: bool = False
 
     def __repr__(self) -> str:
-        way = "to" if self.to_server else "from"
+        route = "to" if self.to_server else "from"
         about = f" of {self.name}" if self.name else ""
         detail = "" if self.detail is None else f" {self.detail}"
-        return f"{self.kind}{about}{detail} {way} {self.server}"
+        return f"{self.kind}{about}{detail} {route} {self.server}"
 
 
 class Client(Protocol):

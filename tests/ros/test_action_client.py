@@ -20,7 +20,7 @@ from bt_actions import Gripper, MoveRobot
 from bt_actions.ros import action_client
 from bt_actions.ros.action_client import ANSWERS_KEPT, GOALS_KEPT, TAKE_AT_MOST, ActionClient
 from bt_actions.ros.graph import servers
-from bt_actions.ros.traffic import Traffic
+from bt_actions.traffic.traffic import Traffic
 from tests.support.processes import Host, HostFactory
 from tests.support.waiting import holds_for, until
 
@@ -470,7 +470,7 @@ def test_a_relative_name_is_the_same_action_as_the_full_one(node: Node, name: st
     for leaf in leaves:
         leaf.setup(node=node)
     assert leaves[1].server == name
-    assert leaves[0]._line is leaves[1]._line
+    assert leaves[0]._endpoint is leaves[1]._endpoint
     for leaf in leaves:
         leaf.shutdown()
 
@@ -487,7 +487,7 @@ def test_two_types_under_one_name_are_an_error_that_names_both(node: Node, name:
 
 def test_each_node_has_clients_of_its_own(node: Node, context: Context, name: str) -> None:
     other = Node("other", context=context)
-    lines = [Traffic.of(each).line(GripperAction, name) for each in (node, other)]
+    lines = [Traffic.of(each).endpoint(GripperAction, name) for each in (node, other)]
     assert lines[0].client is not lines[1].client
     for line in lines:
         line.traffic.leave(line)

@@ -1,4 +1,4 @@
-"""The alarm is awake when it was asked to be, and knows a standstill from Python's own work."""
+"""The alarm is awake when it was asked to be, and knows a stall from Python's own work."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from bt_actions.ros import alarm
 from bt_actions.ros.collector import FULL, Collector
-from bt_actions.ros.shared import lock
 from bt_actions.ros.suspended import Suspended
 from bt_actions.servers.stalls import STOOD_STILL
+from bt_actions.traffic import alarm
+from bt_actions.traffic.shared import lock
 from tests.support.waiting import until
 
 
@@ -62,7 +62,7 @@ def test_who_asks_to_be_woken_while_it_is_attended_is_heard(attended: Attended) 
 
 def test_the_garbage_collector_is_no_standstill(attended: Attended) -> None:
     """Python's threads wait for it, and those that take in what is sent do not."""
-    times = alarm.standstill.times
+    times = alarm.stalls.times
     work = threading.Event()
 
     def as_long_as(phase: str, info: dict[str, int]) -> None:
@@ -81,14 +81,14 @@ def test_the_garbage_collector_is_no_standstill(attended: Attended) -> None:
         until(lambda: len(attended.looks) > looks + 1)
     finally:
         gc.callbacks.remove(as_long_as)
-    assert alarm.standstill.times == times
+    assert alarm.stalls.times == times
 
 
 def test_a_wait_without_work_is_one(attended: Attended) -> None:
-    times = alarm.standstill.times
+    times = alarm.stalls.times
     with lock:
         threading.Event().wait(2 * STOOD_STILL)
-    until(lambda: alarm.standstill.times > times)
+    until(lambda: alarm.stalls.times > times)
 
 
 def test_a_collector_counts_what_full_collections_took_and_only_while_it_watches() -> None:

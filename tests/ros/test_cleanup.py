@@ -19,7 +19,7 @@ from bt_actions.recovery import sweep as module
 from bt_actions.recovery.roll_call import RollCall
 from bt_actions.recovery.sweep import CannotStart, LeftBehind, Swept, cleanup
 from bt_actions.ros import action_view
-from bt_actions.servers.stalls import OUT_OF_SIGHT, Standstill
+from bt_actions.servers.stalls import OUT_OF_SIGHT, Stalls
 from tests.support.processes import HostFactory, Journal, Process
 
 SEND = (
@@ -175,7 +175,7 @@ def test_its_own_work_is_no_standstill_that_gives_it_more_time(
     monkeypatch.setattr(module, "LOOK_LONGEST", 2.0)
     turns: list[None] = []
 
-    def slow_turn(self: Any, still: Standstill) -> None:
+    def slow_turn(self: Any, still: Stalls) -> None:
         time.sleep(0.2)
         still.lives(time.monotonic())
         time.sleep(0.2)

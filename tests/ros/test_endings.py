@@ -10,8 +10,8 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions import End, MoveRobot, Outcome
 from bt_actions.goals.terms import Now, State
-from bt_actions.ros.draining import drain
-from bt_actions.ros.shared import lock
+from bt_actions.traffic.drain import drain
+from bt_actions.traffic.shared import lock
 from tests.support.processes import Host
 from tests.support.waiting import until
 
@@ -58,7 +58,7 @@ def test_a_process_that_ends_begins_nothing_any_more(
     leaf = MoveRobot("m", 0.1, action_name=name)
     tree = BehaviourTree(leaf)
     tree.setup(node=node)
-    monkeypatch.setattr("bt_actions.ros.traffic._closing", True)
+    monkeypatch.setattr("bt_actions.traffic.traffic._closing", True)
     until(lambda: bool(tree.tick() or leaf.outcome), what="the leaf ends")
     assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.NEVER_STARTED)
     assert journal.count("received") == 0
@@ -86,14 +86,14 @@ def test_a_goal_that_cannot_be_minded_keeps_no_other_from_its_deadline(
     def fails(now: Any) -> None:
         raise AssertionError("a mistake")
 
-    (ticket,) = broken.open_tickets()
+    (handle,) = broken.open_handles()
     with monkeypatch.context() as patched:
-        patched.setattr(ticket.goal, "poll", fails)
+        patched.setattr(handle.goal, "poll", fails)
         until(lambda: sound.drained, what="the other's deadline takes effect")
     assert journal.count("canceled") == 1
     for leaf in leaves:
         leaf.stop(Status.INVALID)
-    drain(broken.open_tickets())
+    drain(broken.open_handles())
     assert journal.count("canceled") == 2
     for leaf in leaves:
         leaf.shutdown()
@@ -108,15 +108,15 @@ def test_a_deadline_that_passes_while_it_is_looked_at_is_judged_at_the_next_look
     leaf = MoveRobot("m", 50.0, action_name=name, timeout=30.0)
     leaf.setup(node=node)
     until(lambda: leaf.progress().state == "EXECUTING", 20.0, meanwhile=leaf.tick_once)
-    (ticket,) = leaf.open_tickets()
+    (handle,) = leaf.open_handles()
     with lock:  # the alarm does not look meanwhile
-        now = ticket.traffic.clocks.now()
+        now = handle.traffic.clocks.now()
         due = Now(now.steady + 31.0, now.ros + 31.0)
         moments = [now]
         with monkeypatch.context() as patched:
-            patched.setattr(ticket.traffic.clocks, "now", lambda: moments.pop() if moments else due)
-            ticket.line.poll(ticket)
-        assert ticket.goal.state is State.EXECUTING
+            patched.setattr(handle.traffic.clocks, "now", lambda: moments.pop() if moments else due)
+            handle.line.poll(handle)
+        assert handle.goal.state is State.EXECUTING
     leaf.stop(Status.INVALID)
     leaf.shutdown()
     host.close_server(name)

@@ -33,9 +33,9 @@ from bt_actions.behaviours.variables import read, write
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import Busy
 from bt_actions.goals.terms import Event
-from bt_actions.ros import traffic
-from bt_actions.ros.shared import lock
-from bt_actions.ros.traffic import Traffic
+from bt_actions.traffic import traffic
+from bt_actions.traffic.shared import lock
+from bt_actions.traffic.traffic import Traffic
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.waiting import until
@@ -250,9 +250,11 @@ class TestNoServer:
         leaf = MoveRobot("m", 0.1, action_name=name)
         with TreeRunner(leaf, node=node) as runner:
             runner.start()
-            ticket = until(lambda: leaf._line and next(iter(leaf._line.goals.values()), None))
+            handle = until(
+                lambda: leaf._endpoint and next(iter(leaf._endpoint.goals.values()), None)
+            )
             assert runner.wait(9.0) is Status.SUCCESS
-            line, goal_id = leaf._line, ticket.goal.id
+            line, goal_id = leaf._endpoint, handle.goal.id
             line.goal_answered(goal_id, (True, True))
             assert not line.goals
             line.goal_answered(goal_id, (True,))
@@ -264,9 +266,9 @@ class TestNoServer:
             with lock:
                 line.goal_answered(goal_id, (True, True))
                 assert goal_id in line.goals, (line.past._ended, line.watch.gids)
-                twin = line.goals[goal_id]
-                line.tell(ticket, Event.INTERRUPTED)
-                assert line.goals == {goal_id: twin}, "the goal that has ended is not its twin"
+                duplicate = line.goals[goal_id]
+                line.tell(handle, Event.INTERRUPTED)
+                assert line.goals == {goal_id: duplicate}, "the goal that has ended is not its twin"
             until(lambda: not line.goals)
 
     @pytest.mark.parametrize("is_news", [True, False])
@@ -275,18 +277,18 @@ class TestNoServer:
     ) -> None:
         """The leaf has gone; behind the result lies a second server's acceptance, or feedback."""
         traffic = Traffic.of(node)
-        line = traffic.line(MoveRobotAction, name)
+        line = traffic.endpoint(MoveRobotAction, name)
         shown = [frozenset({b"one", b"other"})]
-        monkeypatch.setattr(line.way, "shown", lambda: shown[-1])
+        monkeypatch.setattr(line.route, "shown", lambda: shown[-1])
         monkeypatch.setattr(line.client, "server_is_ready", lambda: True)
         gone = MoveRobot("gone", 0.1, action_name=name)
         with lock:
             line.see()
-            ticket = traffic.begin(line, gone, Timeouts(), frozenset({"base"}), Busy.WAIT)
-            line.tell(ticket, Event.SERVER_READY, message=MoveRobotAction.Goal())
-            line.tell(ticket, Event.ACCEPTED)
+            handle = traffic.begin(line, gone, Timeouts(), frozenset({"base"}), Busy.WAIT)
+            line.tell(handle, Event.SERVER_READY, message=MoveRobotAction.Goal())
+            line.tell(handle, Event.ACCEPTED)
             traffic.leave(line)
-            asked, goal_id = time.monotonic(), ticket.goal.id
+            asked, goal_id = time.monotonic(), handle.goal.id
             ended = (asked, ((5, MoveRobotAction.Result()), (0, None)))
             line.client._inbox.append(("result", goal_id, ended))
             if is_news:
@@ -294,15 +296,15 @@ class TestNoServer:
             else:
                 line.client._inbox.append(("feedback", b"somebody's", None))
             line.client._deliver()
-            assert ticket.goal.end is End.CANCELED
+            assert handle.goal.end is End.CANCELED
             assert line.client.closed is not is_news
             if not is_news:
                 return
-            twin = line.goals[goal_id]
+            duplicate = line.goals[goal_id]
             shown.append(frozenset())
-        until(lambda: twin.goal.end is End.SERVER_GONE)
+        until(lambda: duplicate.goal.end is End.SERVER_GONE)
         with lock:
-            line.tell(twin, Event.CLOSED)
+            line.tell(duplicate, Event.PROCESS_EXITING)
             assert line.client.closed, "when there is nothing more to hear"
 
     def test_two_servers_are_ambiguous_and_neither_gets_the_goal(

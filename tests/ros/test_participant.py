@@ -14,8 +14,8 @@ from std_msgs.msg import String
 from bt_actions import TreeRunner
 from bt_actions.recovery.sweep import cleanup
 from bt_actions.ros import participant
-from bt_actions.ros.lookout import Sight
 from bt_actions.ros.parameters import parameters_in
+from bt_actions.ros.rediscovery import SecondParticipant
 from tests.support.trees import Gate
 from tests.support.waiting import holds_for, until
 
@@ -74,7 +74,7 @@ def of_a_runner(_: int) -> None:
 
 
 def of_a_lookout(domain: int) -> None:
-    sight = Sight(domain, "/")
+    sight = SecondParticipant(domain, "/")
     sight.looking = False
     sight.close()
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.goals.ids import Author, new_goal_id
-from bt_actions.ros import predecessors as module
-from bt_actions.ros.predecessors import TOLD_AT_MOST, Predecessors
+from bt_actions.traffic import predecessors as module
+from bt_actions.traffic.predecessors import TOLD_AT_MOST, Predecessors
 
 
 def of_the_dead() -> bytes:

@@ -12,9 +12,9 @@ import pytest
 from bt_actions import MoveRobot, TreeRunner
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import Event
-from bt_actions.ros import line as module
-from bt_actions.ros.shared import lock
-from bt_actions.ros.traffic import Traffic
+from bt_actions.traffic import endpoint as module
+from bt_actions.traffic.shared import lock
+from bt_actions.traffic.traffic import Traffic
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import state
 from tests.support.waiting import until
@@ -129,8 +129,8 @@ def test_what_is_not_accounted_for_stays(
         runner.start()
         goal = journal.wait_for("received").goal
         with lock:
-            [ticket] = Traffic.of(node).line(leaf.action_type, name).goals.values()
-            ticket.line.tell(ticket, Event.CLOSED)
+            [handle] = Traffic.of(node).endpoint(leaf.action_type, name).goals.values()
+            handle.endpoint.tell(handle, Event.PROCESS_EXITING)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
 
 
@@ -141,8 +141,8 @@ def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
         [(*_, lost)] = ledger.open.values()
         assert lost
         with lock:
-            [ticket] = Traffic.of(node).line(leaf.action_type, name).goals.values()
-            ticket.line.tell(ticket, Event.SERVER_RETURNED)
+            [handle] = Traffic.of(node).endpoint(leaf.action_type, name).goals.values()
+            handle.endpoint.tell(handle, Event.SERVER_RETURNED)
             [(*_, lost)] = ledger.open.values()
             assert not lost
 
@@ -162,12 +162,12 @@ def test_when_it_need_not_be_on_record(
     servers: int, accepted: bool, accounted_for: bool, lost: bool, is_answered: bool
 ) -> None:
     end = End.SERVER_GONE if lost else End.NEVER_STARTED if accounted_for else End.UNKNOWN
-    ticket: Any = SimpleNamespace(
+    handle: Any = SimpleNamespace(
         goal=SimpleNamespace(accepted=accepted, end=end),
-        testimony=SimpleNamespace(sent_to=[b"gid"] * servers),
+        replies=SimpleNamespace(sent_to=[b"gid"] * servers),
         accounted_for=accounted_for,
     )
-    assert module._is_answered(ticket) is is_answered
+    assert module._is_answered(handle) is is_answered
 
 
 def test_when_the_node_goes_what_is_not_accounted_for_stays(
@@ -180,10 +180,10 @@ def test_when_the_node_goes_what_is_not_accounted_for_stays(
         runner.start()
         goal = journal.wait_for("received").goal
         with lock:
-            line = Traffic.of(node).line(leaf.action_type, name)
-            [ticket] = line.goals.values()
-            line.put_away(all_of_them=True)
-            ticket.line.tell(ticket, Event.CLOSED)
+            line = Traffic.of(node).endpoint(leaf.action_type, name)
+            [handle] = line.goals.values()
+            line.park(all_of_them=True)
+            handle.endpoint.tell(handle, Event.PROCESS_EXITING)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
 
 

@@ -11,7 +11,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bt_actions.ros import signals, traffic
+from bt_actions.ros import signals
+from bt_actions.traffic import traffic
 from tests.support.processes import Process
 
 Start = Callable[..., Process]

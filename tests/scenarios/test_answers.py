@@ -25,9 +25,9 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.goals.goal import ASK_AGAIN
 from bt_actions.ros.action_client import TAKE_AT_MOST
-from bt_actions.ros.line import Line
-from bt_actions.ros.shared import FEEDBACK_KEPT
 from bt_actions.simulation.journal import live_intervals
+from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.shared import FEEDBACK_KEPT
 from tests.support.accounts import Report, compare
 from tests.support.processes import HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -52,13 +52,13 @@ measured)."""
 def noted(monkeypatch: pytest.MonkeyPatch, what: str) -> list[float]:
     """Return a list of when the lines of this process were told `what`, which grows."""
     told: list[float] = []
-    real = getattr(Line, what)
+    real = getattr(ActionEndpoint, what)
 
-    def note(line: Line, *given: Any) -> None:
+    def note(line: ActionEndpoint, *given: Any) -> None:
         told.append(time.monotonic())
         real(line, *given)
 
-    monkeypatch.setattr(Line, what, note)
+    monkeypatch.setattr(ActionEndpoint, what, note)
     return told
 
 
@@ -612,10 +612,10 @@ def test_who_gives_up_waiting_has_asked_for_each_goal(
     host = new_host()
     journal = host.open(name)
     program = start_program("-c", GIVES_UP, name)
-    program.line("all run")
+    program.endpoint("all run")
     host.freeze()
     program.tell("")
-    assert program.line("left: ") == "left: 10"
+    assert program.endpoint("left: ") == "left: 10"
     program.wait()
     host.thaw()
     journal.wait_for("canceled", 10)
@@ -650,7 +650,7 @@ def test_who_will_not_wait_has_asked_for_more_goals_than_a_queue_holds(
     """Sixty goals; SIGINT, and 20 ms later another, which ends the wait for the answers"""
     journal = new_host().open(name)
     program = start_program("-c", INSISTS, name)
-    program.line("all run", 60.0)
+    program.endpoint("all run", 60.0)
     program.send(signal.SIGINT)
     time.sleep(0.02)  # less than the sixty answers take
     program.send(signal.SIGINT)

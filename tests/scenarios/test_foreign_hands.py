@@ -21,10 +21,10 @@ import pytest
 from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
-from bt_actions.ros import alarm, shared
-from bt_actions.ros.shared import lock
-from bt_actions.ros.traffic import IN_FLIGHT
 from bt_actions.servers.presence import Server
+from bt_actions.traffic import alarm, shared
+from bt_actions.traffic.shared import lock
+from bt_actions.traffic.traffic import IN_FLIGHT
 from tests.support.foreign import PROGRAMS
 from tests.support.processes import PATIENCE, Host, Journal, Process
 from tests.support.reliability import Record, first_paragraph
@@ -122,9 +122,9 @@ def test_a_program_that_ends_leaves_no_goal(
 ) -> None:
     taken = program(name)
     process, journal = taken.process, taken.journal
-    process.line("executing", within=60.0)
+    process.endpoint("executing", within=60.0)
     if name in TELL:
-        assert process.line("end") == "end CANCELED CANCELED", process
+        assert process.endpoint("end") == "end CANCELED CANCELED", process
     code = process.wait()
     assert journal.ends() == ["canceled"], process
     assert journal.events().count("cancel_requested") >= 1
@@ -140,7 +140,7 @@ def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
 ) -> None:
     taken = program(name, number)
     process, journal = taken.process, taken.journal
-    process.line("executing", within=60.0)
+    process.endpoint("executing", within=60.0)
     sent = process.send(signal.Signals[f"SIG{number}"])
     journal.wait_for("canceled", within=10.0)
     record.took(time.monotonic() - sent)
@@ -157,7 +157,7 @@ def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
 ) -> None:
     taken = program(name, number)
     process, journal = taken.process, taken.journal
-    process.line("executing", within=60.0)
+    process.endpoint("executing", within=60.0)
     sent = process.send(signal.Signals[f"SIG{number}"])
     code = process.wait()
     record.took(time.monotonic() - sent)
@@ -168,7 +168,7 @@ def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
 
 def test_a_program_may_just_succeed(program: Callable[..., Program], record: Record) -> None:
     taken = program(TO_SUCCEED[0])
-    assert taken.process.line("end") == "end SUCCEEDED SUCCEEDED"
+    assert taken.process.endpoint("end") == "end SUCCEEDED SUCCEEDED"
     assert taken.process.wait() == 0, taken.process
     assert taken.journal.events() == ["received", "accepted", "succeeded"]
     assert taken.process.errors == []
@@ -179,7 +179,7 @@ def test_a_goal_that_cannot_be_canceled_at_exit_is_reported(
     program: Callable[..., Program], record: Record
 ) -> None:
     taken = program("just_end_soon")
-    taken.process.line("executing", within=60.0)
+    taken.process.endpoint("executing", within=60.0)
     assert taken.process.wait() == 0
     assert "not accounted for" in str(taken.process)
     assert "cannot account for it" in str(taken.process)
@@ -319,11 +319,11 @@ def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
     host: Host, name: str, node: Any, spin: Any, monkeypatch: pytest.MonkeyPatch, record: Record
 ) -> None:
     """The exit hook's wait for a goal that cannot be canceled is replaced by a KeyboardInterrupt"""
-    from bt_actions.ros import traffic
+    from bt_actions.traffic import traffic
 
     said: list[str] = []
 
-    def interrupted(tickets: Any, hurry: Any) -> None:
+    def interrupted(handles: Any, hurry: Any) -> None:
         raise KeyboardInterrupt
 
     host.open(name, "1:reject_cancel")
@@ -467,8 +467,8 @@ def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_no
 
     def sees(leaf: MoveRobot) -> bool:
         with lock:
-            assert leaf._line is not None
-            return leaf._line.look(time.monotonic()) is Server.READY
+            assert leaf._endpoint is not None
+            return leaf._endpoint.look(time.monotonic()) is Server.READY
 
     def count(what: str) -> int:
         return [state(leaf) for leaf in leaves].count(what)

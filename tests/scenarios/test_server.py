@@ -21,10 +21,6 @@ from py_trees.composites import Selector
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.goals.attempts import AttemptRecord
 from bt_actions.goals.goal import State
-from bt_actions.ros.line import Line
-from bt_actions.ros.shared import Change, lock
-from bt_actions.ros.traffic import Traffic
-from bt_actions.ros.way import Way
 from bt_actions.servers.presence import (
     NOT_READY_FOR,
     PROBE_EVERY,
@@ -32,6 +28,10 @@ from bt_actions.servers.presence import (
     Server,
     ServerWatch,
 )
+from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.route import Route
+from bt_actions.traffic.shared import Change, lock
+from bt_actions.traffic.traffic import Traffic
 from tests.support.middleware import AS_IT_COMES, NOTHING_SET
 from tests.support.processes import Host, HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -64,7 +64,7 @@ def until_shown(node: Any, name: str, servers: int) -> None:
 def until_both_hear(leaf: MoveRobot, node: Any) -> None:
     """Set the leaf up, and wait until two servers answer its client, and so will hear it later."""
     leaf.setup(node=node)
-    line = leaf._line
+    line = leaf._endpoint
     assert line is not None
 
     def state_now() -> Server:
@@ -78,7 +78,7 @@ def until_both_hear(leaf: MoveRobot, node: Any) -> None:
 def until_heard(leaf: MoveRobot, node: Any) -> None:
     """Set the leaf up, and wait until its server answers its client: so neither is in any doubt."""
     leaf.setup(node=node)
-    line = leaf._line
+    line = leaf._endpoint
     assert line is not None
     asked_at = float("-inf")
 
@@ -89,13 +89,13 @@ def until_heard(leaf: MoveRobot, node: Any) -> None:
             if line.look(now) is Server.READY and now - asked_at > PROBE_EVERY:
                 asked_at = now
                 line.probe()
-            return line.client.hearing.heard
+            return line.client.reachability.heard
 
     until(is_heard, 9.0, meanwhile=line.pump)
     as_if_nothing_was_asked(line)
 
 
-def as_if_nothing_was_asked(line: Line) -> None:
+def as_if_nothing_was_asked(line: ActionEndpoint) -> None:
     """Have the line begin anew with the servers that it sees."""
     with lock:
         line.pump()
@@ -157,7 +157,7 @@ class TestKilled:
         robot, path = name.rpartition("/")[0], tmp_path / "journal"
         arguments = ("sim", "--namespace", robot, "--journal", str(path))
         victim = start_program("-m", "bt_actions.cli", *arguments, environment=NOTHING_SET)
-        victim.line("ready: ")
+        victim.endpoint("ready: ")
         journal = Journal(path, f"{robot}/move_robot")
         record.journals.append(journal)
         leaf = MoveRobot("m", 9.0, action_name=journal.server)
@@ -458,13 +458,13 @@ class TestStopped:
         second = MoveRobot("second", 0.3, action_name=f"{name}_1", resources={"arm"})
         first.timeouts = second.timeouts = timeouts
         leave(first)
-        really, began = Way.shown, time.monotonic()
+        really, began = Route.shown, time.monotonic()
 
-        def late(way: Way) -> frozenset[bytes]:
+        def late(way: Route) -> frozenset[bytes]:
             early = way.name == f"{name}_0" and time.monotonic() - began < 1.5
             return frozenset() if early else really(way)
 
-        monkeypatch.setattr(Way, "shown", late)
+        monkeypatch.setattr(Route, "shown", late)
         with TreeRunner(second) as other:
             assert other.run(30.0) is Status.SUCCESS
         canceled, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
@@ -502,8 +502,8 @@ class TestStopped:
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         """A refused cancel; SIGKILL; one runner for each job, with another server of its arm"""
-        monkeypatch.setattr("bt_actions.ros.line.LEASE", 10.0)
-        monkeypatch.setattr("bt_actions.ros.line.TOO_NEW", 0.5)
+        monkeypatch.setattr("bt_actions.traffic.endpoint.LEASE", 10.0)
+        monkeypatch.setattr("bt_actions.traffic.endpoint.TOO_NEW", 0.5)
         victim = new_host()
         victim.open(f"{name}_0", "1:reject_cancel")
         journal = host.open(f"{name}_1")
@@ -541,9 +541,9 @@ class TestStopped:
         with TreeRunner(first) as runner:
             lose(stopped, first, runner)
         stopped.send(signal.SIGCONT)
-        really, seen = Way.shown, dict[str, float]()
+        really, seen = Route.shown, dict[str, float]()
 
-        def late(way: Way) -> frozenset[bytes]:
+        def late(way: Route) -> frozenset[bytes]:
             shown = really(way)
             if way.name == f"{name}_1":
                 if shown:
@@ -554,7 +554,7 @@ class TestStopped:
 
         with TreeRunner(second) as other:
             until_shown(other.node, f"{name}_0", 1)
-            monkeypatch.setattr(Way, "shown", late)
+            monkeypatch.setattr(Route, "shown", late)
             assert other.run(30.0) is Status.SUCCESS
         ended, received = journals[0].wait_for("canceled"), journals[1].wait_for("received")
         assert ended.t <= received.t
@@ -573,12 +573,12 @@ class TestStopped:
         from rclpy.context import Context
         from rclpy.node import Node
 
-        monkeypatch.setattr("bt_actions.ros.line.SILENT_FOR", 3.0)
+        monkeypatch.setattr("bt_actions.traffic.endpoint.SILENT_FOR", 3.0)
         victim, host = new_host(), new_host()
         victim.open(f"{name}_0", "1:reject_cancel")
         Traffic.of(node)
         until_shown(node, f"{name}_0", 1)
-        monkeypatch.setattr("bt_actions.ros.line.TOO_NEW", 0.0)  # it has seen the victim
+        monkeypatch.setattr("bt_actions.traffic.endpoint.TOO_NEW", 0.0)  # it has seen the victim
         journal = host.open(f"{name}_1")
         first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
         first.timeouts = Timeouts(server=20.0, cancel=0.5)
@@ -586,7 +586,7 @@ class TestStopped:
         context.init(domain_id=domain)
         gone = Node("gone", context=context)
         first.setup(node=gone)
-        line = first._line
+        line = first._endpoint
         assert line is not None
         ticking = lambda: (line.pump(), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
@@ -621,13 +621,13 @@ class TestStopped:
         victim.open(name)
         Traffic.of(node)
         until_shown(node, name, 1)
-        monkeypatch.setattr("bt_actions.ros.line.TOO_NEW", 0.0)  # it has seen the victim
+        monkeypatch.setattr("bt_actions.traffic.endpoint.TOO_NEW", 0.0)  # it has seen the victim
         first = MoveRobot("first", 40.0, action_name=name, timeout=Timeouts(cancel=0.5))
         context = Context()
         context.init(domain_id=domain)
         gone = Node("gone", context=context)
         first.setup(node=gone)
-        line = first._line
+        line = first._endpoint
         assert line is not None
         ticking = lambda: (line.pump(), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
@@ -923,7 +923,7 @@ class TestTwice:
             runner.start()
             until(lambda: state(leaf) == "EXECUTING", 20.0)
             with lock:
-                Traffic.of(node)._lines[name].client.server_is_ready = lambda: False
+                Traffic.of(node)._endpoints[name].client.server_is_ready = lambda: False
             assert holds_for(lambda: leaf.outcome is None, 2 * NOT_READY_FOR)
             assert journal.events() == ["received", "accepted"]
         assert stood(leaf) == (Outcome.CANCELED, End.CANCELED)

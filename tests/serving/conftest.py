@@ -80,7 +80,7 @@ def fresh_context(domain: int) -> Iterator[Any]:
     """A young participant, as a client has it.
 
     That of all tests was seen to get no answers from new processes late in a whole run, which
-    bt_actions' own clients make up for (ros/way.py), and rclpy's do not.
+    bt_actions' own clients make up for (traffic/route.py), and rclpy's do not.
     """
     from rclpy.context import Context
 

@@ -11,7 +11,7 @@ from bt_actions.serving.outcome import Code, RunOutcome
 
 FAILED = RunOutcome(Code.TREE_FAILED, "Never: failed")
 HALTED = RunOutcome(Code.HALTED, "it was halted")
-LEFT = RunOutcome(Code.CANCELED, unaccounted=("Go",))
+NODE_CLOSED = RunOutcome(Code.CANCELED, unaccounted=("Go",))
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -28,9 +28,9 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
         (Standing("t", State.KEPT_LAST_GOOD), "", WARN,
          "its file does not check; the last good version is used"),
         (Standing("t", State.INVALID), "", ERROR, "its file does not check"),
-        (Standing("t", last=LEFT), "", ERROR,
+        (Standing("t", last=NODE_CLOSED), "", ERROR,
          "the last run is not settled: Go may still be running"),
-        (Standing("t", running=1, last=LEFT), "", ERROR,
+        (Standing("t", running=1, last=NODE_CLOSED), "", ERROR,
          "the last run is not settled: Go may still be running"),
         (Standing("t"), "it is inactive", ERROR, "not serving: it is inactive"),
     ],

@@ -21,7 +21,7 @@ from bt_actions.simulation.faults import KINDS, FaultKind
 PERIOD = 0.1
 
 
-class Way:
+class Route:
     """A motion of ten steps."""
 
     def __init__(self, steps: float = 10.0) -> None:
@@ -45,7 +45,7 @@ def faults(*written: str) -> GoalFaults:
 
 
 def begin(*written: str, steps: float = 10.0, limit: float | None = None) -> Execution:
-    return Execution(Way(steps), faults(*written), now=0.0, time_limit=limit)
+    return Execution(Route(steps), faults(*written), now=0.0, time_limit=limit)
 
 
 def steps_until_end(run: Execution, most: int = 200) -> list[Happened]:
@@ -208,7 +208,7 @@ class AnyOrder(RuleBasedStateMachine):
     def begin(self, kinds: set[FaultKind], length: float) -> None:
         struck = GoalFaults({kind: KINDS[kind].default for kind in kinds})
         self.now = 0.0
-        self.run = Execution(Way(length), struck, now=0.0, time_limit=2.0)
+        self.run = Execution(Route(length), struck, now=0.0, time_limit=2.0)
         self.ends = 0
         self.canceled = False
         self.dead = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.ros.cancels import ANSWERED_WITHIN, AT_MOST, Cancels
+from bt_actions.traffic.cancel_queue import ANSWERED_WITHIN, AT_MOST, Cancels
 
 GOALS = [bytes([number]) for number in range(3 * AT_MOST)]
 

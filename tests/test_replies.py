@@ -9,7 +9,7 @@ import pytest
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Timeouts
 from bt_actions.goals.terms import Event, Now
-from bt_actions.servers import replies as testimony
+from bt_actions.servers import replies as replies
 from bt_actions.servers.presence import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER = b"one", b"other"
@@ -20,7 +20,7 @@ CANCELED_END = (5, None)
 UNKNOWN = (0, None)
 
 
-def events(told: testimony.Told) -> list[Event]:
+def events(told: replies.Told) -> list[Event]:
     return [event for event, _ in told]
 
 
@@ -31,18 +31,18 @@ def watch() -> ServerWatch:
     return seen
 
 
-def sent(watch: ServerWatch) -> testimony.Testimony:
+def sent(watch: ServerWatch) -> replies.Replies:
     """Return what is believed of a goal that is sent to who is in sight."""
     goal = Goal(b"1", "move", Timeouts(), Now(0.0, 0.0))
     for event in (Event.GRANTED, Event.SERVER_READY):
         goal.on(event, Now(0.0, 0.0))
-    said = testimony.Testimony(goal)
+    said = replies.Replies(goal)
     said.sent(watch)
     return said
 
 
 @pytest.fixture
-def said(watch: ServerWatch) -> testimony.Testimony:
+def said(watch: ServerWatch) -> replies.Replies:
     """Of a goal that was sent while a second server opened."""
     watch.observe(0.0, True, BOTH)
     return sent(watch)
@@ -69,7 +69,7 @@ def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
 
 
 def test_what_was_asked_before_one_has_left_may_be_its_word(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     watch.observe(1.0, True, frozenset({ONE}))
     assert said.finished(watch, 1.1, 0.9, [SUCCEEDED]) == []
@@ -78,7 +78,7 @@ def test_what_was_asked_before_one_has_left_may_be_its_word(
 
 
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert events(said.answered(watch, 0.0, [True])) == [Event.ACCEPTED]
     assert events(said.answered(watch, 0.0, [True, True])) == [Event.SERVER_AMBIGUOUS]
@@ -86,15 +86,13 @@ def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
 
 
 def test_one_server_that_accepts_twice_is_one_server(watch: ServerWatch) -> None:
-    said = testimony.Testimony(Goal(b"1", "move", Timeouts(), Now(0.0, 0.0)))
+    said = replies.Replies(Goal(b"1", "move", Timeouts(), Now(0.0, 0.0)))
     said.sent_to = frozenset({ONE})
     assert said.answered(watch, 0.0, [True, True]) == []
     assert not watch.both_live
 
 
-def test_what_one_refuses_the_other_may_accept(
-    said: testimony.Testimony, watch: ServerWatch
-) -> None:
+def test_what_one_refuses_the_other_may_accept(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.answered(watch, 0.0, [False]) == []
     assert events(said.answered(watch, 0.0, [False, True])) == [Event.ACCEPTED]
     assert said.answered(watch, 0.0, [True, False]) == []
@@ -102,23 +100,19 @@ def test_what_one_refuses_the_other_may_accept(
 
 
 def test_a_refusal_counts_when_the_other_is_a_ghost(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert said.answered(watch, 0.0, [False]) == []
     assert said.looked(watch, 0.0) == []
     assert events(said.looked(watch, alone(watch))) == [Event.REJECTED]
 
 
-def test_what_one_has_ended_the_other_may_run(
-    said: testimony.Testimony, watch: ServerWatch
-) -> None:
+def test_what_one_has_ended_the_other_may_run(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
     assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == [(Event.RESULT, ABORTED)]
 
 
-def test_what_both_have_ended_was_at_two_servers(
-    said: testimony.Testimony, watch: ServerWatch
-) -> None:
+def test_what_both_have_ended_was_at_two_servers(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
     told = said.finished(watch, 0.0, 0.0, [ABORTED, SUCCEEDED])
     assert told == [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, SUCCEEDED)]
@@ -126,7 +120,7 @@ def test_what_both_have_ended_was_at_two_servers(
 
 
 def test_a_denial_by_a_newcomer_is_no_word_of_the_other(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     watch.observe(0.0, True, BOTH | {b"newcomer"})
     assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == []
@@ -135,16 +129,14 @@ def test_a_denial_by_a_newcomer_is_no_word_of_the_other(
     assert told == [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, SUCCEEDED)]
 
 
-def test_an_end_counts_when_the_other_is_a_ghost(
-    said: testimony.Testimony, watch: ServerWatch
-) -> None:
+def test_an_end_counts_when_the_other_is_a_ghost(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
     assert said.looked(watch, 0.0) == []
     assert said.looked(watch, alone(watch)) == [(Event.RESULT, ABORTED)]
 
 
 def test_an_end_may_be_that_of_the_one_that_has_gone_since(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert said.looked(watch, 0.0) == []
     assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
@@ -155,7 +147,7 @@ def test_an_end_may_be_that_of_the_one_that_has_gone_since(
 
 
 def test_a_refusal_may_be_that_of_the_one_that_has_gone_since(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said.looked(watch, 0.0)
     said.answered(watch, 0.0, [False])
@@ -165,7 +157,7 @@ def test_a_refusal_may_be_that_of_the_one_that_has_gone_since(
 
 
 def test_what_was_asked_before_both_had_it_does_not_count(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said.answered(watch, 1.0, [True])
     said.answered(watch, 2.0, [True, True])
@@ -174,7 +166,7 @@ def test_what_was_asked_before_both_had_it_does_not_count(
     assert said.finished(watch, 2.2, 2.1, [ABORTED, CANCELED_END]) == [(Event.RESULT, CANCELED_END)]
 
 
-def test_what_one_denies_the_other_may_have(said: testimony.Testimony, watch: ServerWatch) -> None:
+def test_what_one_denies_the_other_may_have(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.canceled(watch, 0.0, 0.0, [DENIED]) == []
     assert said.canceled(watch, 0.0, 0.0, [DENIED, CANCELED]) == [(Event.CANCEL_ANSWERED, CANCELED)]
     assert said.canceled(watch, 0.0, 0.0, [CANCELED, DENIED]) == []
@@ -184,7 +176,7 @@ def test_what_one_denies_the_other_may_have(said: testimony.Testimony, watch: Se
 
 
 def test_two_that_live_are_told_of_where_both_may_have_it(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert said.looked(watch, 0.0) == []
     watch.two_answered()
@@ -194,7 +186,7 @@ def test_two_that_live_are_told_of_where_both_may_have_it(
 
 
 def test_what_a_newcomer_denied_may_arrive_when_it_is_gone(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said.sent_to = frozenset({ONE})
     said.looked(watch, 1.0)
@@ -205,7 +197,7 @@ def test_what_a_newcomer_denied_may_arrive_when_it_is_gone(
 
 
 def test_a_lost_server_is_back_only_when_it_can_be_talked_to(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     watch.observe(1.0, False, frozenset())
     assert events(said.looked(watch, 1.0)) == [Event.SERVER_LOST]
@@ -219,7 +211,7 @@ def test_a_lost_server_is_back_only_when_it_can_be_talked_to(
 
 
 def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_restarted(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
@@ -230,7 +222,7 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
 
 @pytest.mark.parametrize("how", ["both answer", "two of three, and no ghost", "the other has gone"])
 def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
-    said: testimony.Testimony, watch: ServerWatch, how: str
+    said: replies.Replies, watch: ServerWatch, how: str
 ) -> None:
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
@@ -258,9 +250,7 @@ def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
     assert Event.SERVER_LOST not in events(said.looked(watch, now))
 
 
-def test_the_status_of_one_of_two_shows_no_end(
-    said: testimony.Testimony, watch: ServerWatch
-) -> None:
+def test_the_status_of_one_of_two_shows_no_end(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 2)]
     said.looked(watch, 0.0)
     watch.observe(1.0, True, frozenset({ONE}))
@@ -273,7 +263,7 @@ def test_the_status_of_one_of_two_shows_no_end(
 
 
 def test_who_gives_feedback_lives_whoever_denies_the_goal(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
@@ -284,7 +274,7 @@ def test_who_gives_feedback_lives_whoever_denies_the_goal(
 
 
 def test_what_ended_at_one_may_run_at_the_other_that_has_gone(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert not said.may_run_at(watch)
     said.answered(watch, 0.1, [True, True])
@@ -293,7 +283,7 @@ def test_what_ended_at_one_may_run_at_the_other_that_has_gone(
     assert said.may_run_at(watch) == {OTHER}
 
 
-def test_all_three_in_sight_have_to_tell(said: testimony.Testimony, watch: ServerWatch) -> None:
+def test_all_three_in_sight_have_to_tell(said: replies.Replies, watch: ServerWatch) -> None:
     watch.observe(0.0, True, BOTH | {b"third"})
     said.sent(watch)
     said.answered(watch, 0.1, [True, True, True])
@@ -307,7 +297,7 @@ def test_all_three_in_sight_have_to_tell(said: testimony.Testimony, watch: Serve
 
 
 def test_it_is_refused_when_all_that_it_was_sent_to_have_refused_it(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     watch.observe(0.0, True, BOTH | {b"third"})
     said.sent(watch)
@@ -320,7 +310,7 @@ def test_it_is_refused_when_all_that_it_was_sent_to_have_refused_it(
 
 
 def test_who_is_back_is_asked_and_what_was_asked_before_is_not_all(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     watch.observe(1.0, True, frozenset({ONE}))
     said.looked(watch, 1.0)
@@ -342,15 +332,13 @@ def test_who_is_back_is_asked_and_what_was_asked_before_is_not_all(
     ids=["refused", "denied to cancel", "denied", "ended"],
 )
 def test_what_comes_when_one_has_just_left_may_be_its_word(
-    said: testimony.Testimony, watch: ServerWatch, word: Any, told: list[Event]
+    said: replies.Replies, watch: ServerWatch, word: Any, told: list[Event]
 ) -> None:
     watch.observe(1.0, True, frozenset({ONE}))
     assert events(word(said, watch)) == told
 
 
-def test_one_in_place_of_the_other_is_a_change(
-    said: testimony.Testimony, watch: ServerWatch
-) -> None:
+def test_one_in_place_of_the_other_is_a_change(said: replies.Replies, watch: ServerWatch) -> None:
     watch.observe(1.0, True, frozenset({ONE}))
     said.looked(watch, 1.0)
     watch.observe(2.0, True, frozenset({OTHER}))
@@ -369,7 +357,7 @@ def test_a_newcomer_is_not_one_that_is_back(watch: ServerWatch) -> None:
 
 
 def test_what_was_said_before_a_loss_is_of_no_account_after_it(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == []
     watch.observe(1.0, False, frozenset())
@@ -381,21 +369,21 @@ def test_what_was_said_before_a_loss_is_of_no_account_after_it(
 
 
 def test_an_acceptance_that_follows_a_status_may_be_the_others(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said._goal.on(Event.STATUS, Now(0.0, 0.0), 2)
     assert events(said.answered(watch, 1.0, [True])) == [Event.SERVER_CHANGED]
     assert said.finished(watch, 1.1, 0.5, [UNKNOWN, ABORTED]) == [], "asked before it accepted"
 
 
-def told(said: testimony.Testimony, what: testimony.Told, now: float) -> list[Event]:
+def told(said: replies.Replies, what: replies.Told, now: float) -> list[Event]:
     """Tell the goal, too; return the events."""
     for event, detail in what:
         said._goal.on(event, Now(now, now), detail)
     return events(what)
 
 
-def beside_a_newcomer(watch: ServerWatch) -> testimony.Testimony:
+def beside_a_newcomer(watch: ServerWatch) -> replies.Replies:
     """Of a goal that one server has; a second one came when it was on its way."""
     said = sent(watch)
     watch.observe(0.0, True, BOTH)
@@ -447,7 +435,7 @@ def test_any_word_of_the_server_tells_it_from_who_was_in_sight(
 def test_a_word_may_be_older_than_the_newcomer_that_it_comes_in_beside(watch: ServerWatch) -> None:
     said = beside_a_newcomer(watch)
     told(said, said.answered(watch, 0.1, [True]), 0.1)
-    said.lives(watch, testimony.OVERTAKEN / 2)
+    said.lives(watch, replies.OVERTAKEN / 2)
     said.finished(watch, 1.0, 1.0, [UNKNOWN])
     watch.probe_sent(1.0, 1)
     watch.probe_answered(1.0, 1)
@@ -476,7 +464,7 @@ def test_what_both_deny_neither_has(watch: ServerWatch) -> None:
 
 
 def test_where_one_says_that_it_runs_it_has_not_ended(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert said.finished(watch, 0.1, 0.0, [ABORTED]) == []
     for answers in ([ABORTED, (2, None)], [(2, None), ABORTED]):
@@ -502,7 +490,7 @@ def test_a_request_went_to_all_that_were_shown_before_and_after(watch: ServerWat
     assert said.sent_to == BOTH
 
 
-def test_a_ghost_that_leaves_runs_nothing(said: testimony.Testimony, watch: ServerWatch) -> None:
+def test_a_ghost_that_leaves_runs_nothing(said: replies.Replies, watch: ServerWatch) -> None:
     now = alone(watch)
     said.looked(watch, now)
     watch.observe(now, True, frozenset({ONE}))
@@ -511,7 +499,7 @@ def test_a_ghost_that_leaves_runs_nothing(said: testimony.Testimony, watch: Serv
 
 
 def test_who_refused_does_not_matter_where_the_other_has_accepted(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said.answered(watch, 0.0, [False])
     told(said, said.answered(watch, 0.0, [False, True]), 0.0)
@@ -525,7 +513,7 @@ def test_where_one_was_asked_its_acceptance_may_follow_its_status(watch: ServerW
     assert events(said.answered(watch, 0.1, [True])) == [Event.ACCEPTED]
 
 
-def test_a_success_counts_most(said: testimony.Testimony, watch: ServerWatch) -> None:
+def test_a_success_counts_most(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.finished(watch, 0.0, 0.0, [SUCCEEDED, ABORTED])[-1] == (Event.RESULT, SUCCEEDED)
 
 
@@ -537,7 +525,7 @@ def test_a_denial_counts_from_the_first(watch: ServerWatch) -> None:
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
 
 
-def test_that_there_are_two_is_told_once(said: testimony.Testimony, watch: ServerWatch) -> None:
+def test_that_there_are_two_is_told_once(said: replies.Replies, watch: ServerWatch) -> None:
     watch.two_answered()
     assert events(said.looked(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
     assert said.looked(watch, 0.2) == []
@@ -552,7 +540,7 @@ def test_a_newcomer_that_lives_beside_it_is_not_asked_about(watch: ServerWatch) 
 
 
 def test_one_of_three_that_was_away_between_two_looks_was_away(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     third = BOTH | {b"third"}
     watch.observe(0.0, True, third)
@@ -565,7 +553,7 @@ def test_one_of_three_that_was_away_between_two_looks_was_away(
 
 
 def test_a_refusal_of_one_that_has_gone_is_told_as_no_end_ever(
-    said: testimony.Testimony, watch: ServerWatch
+    said: replies.Replies, watch: ServerWatch
 ) -> None:
     said.answered(watch, 0.0, [False])
     watch.observe(1.0, True, frozenset({ONE}))

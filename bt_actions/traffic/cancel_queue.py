@@ -20,7 +20,7 @@ Send = Callable[[bytes], bool]
 
 
 class Cancels:
-    """Whom to ask a server to cancel, of all lines to it, first come first served."""
+    """Whom to ask a server to cancel, of all endpoints to it, first come first served."""
 
     def __init__(self) -> None:
         self._waiting: dict[bytes, Send] = {}

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable
 
 from bt_actions.goals.goal import ASK_AGAIN
 from bt_actions.goals.terms import Event, State
-from bt_actions.ros import alarm
-from bt_actions.ros.shared import Ticket, changed, lock
 from bt_actions.servers.stalls import AT_MOST
+from bt_actions.traffic import alarm
+from bt_actions.traffic.shared import GoalHandle, changed, lock
 
 JUST_PAST = 0.1
 """Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
@@ -25,7 +25,9 @@ LOOK = 0.005
 """Seconds between two looks, where nothing wakes it."""
 
 
-def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) -> list[Ticket]:
+def drain(
+    handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
+) -> list[GoalHandle]:
     """Cancel these goals and wait until each is accounted for, under one deadline.
 
     The deadline is the largest `timeout.cancel` among them, plus `timeout.accept` (twice, if that
@@ -39,69 +41,69 @@ def drain(tickets: Iterable[Ticket], hurry: Callable[[], bool] = lambda: False) 
     """
     with lock:
         wanted = [
-            ticket
-            for ticket in tickets
-            if ticket.goal.state is not State.DONE and not ticket.line.is_parents
+            handle
+            for handle in handles
+            if handle.goal.state is not State.DONE and not handle.endpoint.is_parents
         ]
-        for ticket in wanted:
-            ticket.line.tell(ticket, Event.INTERRUPTED)
+        for handle in wanted:
+            handle.endpoint.tell(handle, Event.INTERRUPTED)
         waits = [t for t in wanted if not t.is_over and not t.goal.waited_for]
         patience = _Patience(waits)
     while waits and not hurry():
         with lock:
             if patience.is_over(waits):
                 break
-            for line in {ticket.line for ticket in waits}:
-                line.pump()
-            for ticket in waits:
-                ticket.line.mind(ticket)
-            waits = [ticket for ticket in waits if not ticket.is_over]
+            for endpoint in {handle.endpoint for handle in waits}:
+                endpoint.pump()
+            for handle in waits:
+                handle.endpoint.mind(handle)
+            waits = [handle for handle in waits if not handle.is_over]
             if waits:
                 changed.wait(LOOK)
     _send_what_waits(waits)
     with lock:
-        for ticket in waits:
-            if ticket.looked_out_for:
-                ticket.goal.waited_for = True
+        for handle in waits:
+            if handle.looked_out_for:
+                handle.goal.waited_for = True
             else:
-                ticket.line.tell(ticket, Event.DRAINED)
-    return [ticket for ticket in wanted if not ticket.is_over]
+                handle.endpoint.tell(handle, Event.DRAINED)
+    return [handle for handle in wanted if not handle.is_over]
 
 
 class _Patience:
     """The deadline of a drain; the caller holds the lock."""
 
-    def __init__(self, waits: list[Ticket]) -> None:
+    def __init__(self, waits: list[GoalHandle]) -> None:
         self._deadline = 0.0
-        self._first, self._began = alarm.standstill.times, time.monotonic()
-        self._lost: set[Ticket] = set()
-        self._were_back: set[Ticket] = set()
-        self._allow({ticket for ticket in waits if not ticket.looked_out_for})
+        self._first, self._began = alarm.stalls.times, time.monotonic()
+        self._lost: set[GoalHandle] = set()
+        self._were_back: set[GoalHandle] = set()
+        self._allow({handle for handle in waits if not handle.looked_out_for})
 
-    def is_over(self, waits: list[Ticket]) -> bool:
+    def is_over(self, waits: list[GoalHandle]) -> bool:
         """Whether nobody waits any longer for these goals."""
-        still, now = alarm.standstill, time.monotonic()
-        doubts = (ticket.line.way.in_doubt(now) for ticket in waits)
+        still, now = alarm.stalls, time.monotonic()
+        doubts = (handle.endpoint.route.in_doubt(now) for handle in waits)
         held = max(still.answers_take(now), *doubts)
         if held > 0.0 and still.times - self._first <= AT_MOST:
             self._deadline = max(self._deadline, now + ASK_AGAIN)
-        self._lost.update(ticket for ticket in waits if ticket.goal.lost)
-        back = {ticket for ticket in self._lost if not ticket.goal.lost}
+        self._lost.update(handle for handle in waits if handle.goal.lost)
+        back = {handle for handle in self._lost if not handle.goal.lost}
         self._allow(back - self._were_back)  # once: else one that comes and goes had no end
         self._lost, self._were_back = self._lost - back, self._were_back | back
-        looks_out = any(ticket.looked_out_for for ticket in waits)
+        looks_out = any(handle.looked_out_for for handle in waits)
         if looks_out and now < self._began + LOOKS_OUT_AT_MOST:
             return False
         return now >= self._deadline
 
-    def _allow(self, tickets: set[Ticket]) -> None:
+    def _allow(self, handles: set[GoalHandle]) -> None:
         """Give these goals the time that their cancel may take."""
-        if tickets:
-            within = max(ticket.goal.drains_within for ticket in tickets)
+        if handles:
+            within = max(handle.goal.drains_within for handle in handles)
             self._deadline = max(self._deadline, time.monotonic() + within + JUST_PAST)
 
 
-def _send_what_waits(waits: list[Ticket]) -> None:
+def _send_what_waits(waits: list[GoalHandle]) -> None:
     """Send the cancel requests that still wait for room: whoever drains may end the process now.
 
     As fast as answers make room for them, as long as that takes no time worth mentioning; then all
@@ -110,12 +112,12 @@ def _send_what_waits(waits: list[Ticket]) -> None:
     until = time.monotonic() + LAST_REQUESTS
     with lock:
         while _has_requests(waits) and time.monotonic() < until:
-            for line in {ticket.line for ticket in waits}:
-                line.pump()
+            for endpoint in {handle.endpoint for handle in waits}:
+                endpoint.pump()
             changed.wait(LOOK)
-        for ticket in waits:
-            ticket.line.cancels.send_now(ticket.goal.id)
+        for handle in waits:
+            handle.endpoint.cancels.send_now(handle.goal.id)
 
 
-def _has_requests(waits: list[Ticket]) -> bool:
-    return any(ticket.line.cancels.has_request(ticket.goal.id) for ticket in waits)
+def _has_requests(waits: list[GoalHandle]) -> bool:
+    return any(handle.endpoint.cancels.has_request(handle.goal.id) for handle in waits)

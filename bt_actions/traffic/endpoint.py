@@ -25,24 +25,24 @@ from bt_actions.goals.terms import (
     State,
 )
 from bt_actions.messages.interfaces import interface_name
-from bt_actions.ros import alarm, shared
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.log import log
-from bt_actions.ros.past import Past
-from bt_actions.ros.predecessors import Predecessors
-from bt_actions.ros.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, Ticket, ledger, lock
-from bt_actions.ros.way import TOO_NEW, Way, ask
 from bt_actions.servers.presence import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.servers.replies import Told
 from bt_actions.servers.stalls import ANSWERS_TAKE_IN_ALL
+from bt_actions.traffic import alarm, shared
+from bt_actions.traffic.ended import Past
+from bt_actions.traffic.predecessors import Predecessors
+from bt_actions.traffic.route import TOO_NEW, Route, ask
+from bt_actions.traffic.shared import LOOKED_OUT_FOR, LOST_KEPT, NEVER, GoalHandle, ledger, lock
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
     from bt_actions.goals.goal import Goal
-    from bt_actions.ros.traffic import Traffic
+    from bt_actions.traffic.traffic import Traffic
 
 LOOK_WHILE_WAITING = 0.05
 LOOK_WHILE_RUNNING = 0.2
@@ -63,7 +63,7 @@ FEEDBACK = "/_action/feedback"
 _probes = itertools.count(1)
 
 
-class Line:
+class ActionEndpoint:
     """One action as one node sees it: the shared client, the watch, and the goals on it."""
 
     def __init__(self, traffic: Traffic, action_type: Any, name: str) -> None:
@@ -72,19 +72,19 @@ class Line:
         self.name = name
         self.users = 0
         self._generation = shared.generation
-        self.goals: dict[bytes, Ticket] = {}
+        self.goals: dict[bytes, GoalHandle] = {}
         self.watch = ServerWatch()
         self.client = ActionClient(traffic.node, action_type, name, self)
         self.cancels = traffic.domain.cancels_at(name, action_type)
         self.orphaned = False
         self._heard_at = time.monotonic()  # of an orphan: when its servers were last heard of
-        self.way = Way(self)
+        self.route = Route(self)
         self._look_at = 0.0
         self._looked_like = Server.ABSENT  # at the last look
         self._was_away = False  # seen between two looks
         self.in_sight_since = time.monotonic()
         """Since when a server of this name has been shown without a break that was seen."""
-        self._held_up = (True, True)  # by a server that has just come; by `Way.keeps`
+        self._held_up = (True, True)  # by a server that has just come; by `Route.holds_back`
         self._looked_out_at = time.monotonic()
         self._last_probes: deque[int] = deque()
         self.past = Past(self)
@@ -101,26 +101,26 @@ class Line:
     def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
         """Pass on an answer to a goal request; see to one that has ended and is accepted again."""
         with lock:
-            ticket = self._heard_of(goal_id)
-            if ticket is not None:
-                now, said = time.monotonic(), ticket.testimony
-                self._pass_on(ticket, said.answered(self.watch, now, answers))
+            handle = self._heard_of(goal_id)
+            if handle is not None:
+                now, said = time.monotonic(), handle.replies
+                self._pass_on(handle, said.answered(self.watch, now, answers))
             elif answers[-1]:
                 self.past.accepted(goal_id, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
         with lock:
-            ticket = self.goals.get(goal_id)
-            if ticket is None:
+            handle = self.goals.get(goal_id)
+            if handle is None:
                 self.past.runs(goal_id)
                 return
             now = self._heard_at = time.monotonic()
             self.watch.heard(now)
-            self._pass_on(ticket, ticket.testimony.lives(self.watch, now))
-            self.tell(ticket, Event.FEEDBACK, feedback)
-            if ticket.keeps_feedback and ticket.goal.outcome is None:
-                ticket.feedback.append(feedback)
+            self._pass_on(handle, handle.replies.lives(self.watch, now))
+            self.tell(handle, Event.FEEDBACK, feedback)
+            if handle.keeps_feedback and handle.goal.outcome is None:
+                handle.feedback.append(feedback)
                 self.traffic.notify(None)
 
     def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
@@ -129,10 +129,10 @@ class Line:
             if self.is_parents:
                 return
             self.cancels.answered(goal_id, time.monotonic())
-            ticket = self._heard_of(goal_id, denies=answers[-1] == CANCEL_UNKNOWN_GOAL)
-            if ticket is not None:
-                now, said = time.monotonic(), ticket.testimony
-                self._pass_on(ticket, said.canceled(self.watch, now, asked, answers))
+            handle = self._heard_of(goal_id, denies=answers[-1] == CANCEL_UNKNOWN_GOAL)
+            if handle is not None:
+                now, said = time.monotonic(), handle.replies
+                self._pass_on(handle, said.canceled(self.watch, now, asked, answers))
             else:
                 self.past.cancel_answered(goal_id, asked, answers[-1])
 
@@ -141,24 +141,24 @@ class Line:
     ) -> None:
         """Pass on a result."""
         with lock:
-            ticket = self._heard_of(goal_id, denies=answers[-1][0] == 0)
-            if ticket is not None:
-                now, said = time.monotonic(), ticket.testimony
-                self._pass_on(ticket, said.finished(self.watch, now, asked, answers))
+            handle = self._heard_of(goal_id, denies=answers[-1][0] == 0)
+            if handle is not None:
+                now, said = time.monotonic(), handle.replies
+                self._pass_on(handle, said.finished(self.watch, now, asked, answers))
 
-    def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> Ticket | None:
+    def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight.
 
         One that denies it may be the word of another server than the goal's.
         """
-        ticket = self.goals.get(goal_id)
-        if ticket is not None:
+        handle = self.goals.get(goal_id)
+        if handle is not None:
             self.watch.heard(time.monotonic())
-            if not (denies and self.watch.changed(ticket.testimony.sent_to)):
+            if not (denies and self.watch.changed(handle.replies.sent_to)):
                 self._heard_at = time.monotonic()
-            if len(ticket.testimony.servers) > 1:
+            if len(handle.replies.servers) > 1:
                 self.see()
-        return ticket
+        return handle
 
     def see(self) -> None:
         """Observe now who is in sight; what follows for the server is for the next look to say."""
@@ -167,16 +167,16 @@ class Line:
             self._observe(now, concludes=False)
             self._was_away |= self.watch.state(now) is Server.ABSENT
 
-    def _pass_on(self, ticket: Ticket, told: Told) -> None:
+    def _pass_on(self, handle: GoalHandle, told: Told) -> None:
         for event, detail in told:
-            if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(ticket):
-                self.tell(ticket, Event.REPLACED)  # this has overtaken the rival's acceptance
-            self.tell(ticket, event, detail)
+            if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(handle):
+                self.tell(handle, Event.REPLACED)  # this has overtaken the rival's acceptance
+            self.tell(handle, event, detail)
 
-    def _rival_sent(self, ticket: Ticket) -> bool:
+    def _rival_sent(self, handle: GoalHandle) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
-        holders = self.traffic.domain.resources.holders(ticket.goal.resources)
-        newer = holders[holders.index(ticket) + 1 :] if ticket in holders else []
+        holders = self.traffic.domain.resources.holders(handle.goal.resources)
+        newer = holders[holders.index(handle) + 1 :] if handle in holders else []
         return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
 
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
@@ -189,10 +189,10 @@ class Line:
             self.predecessors.see(running)
             for goal_id in self.goals.keys() & statuses.keys():
                 status = statuses[goal_id]
-                ticket = self._heard_of(goal_id) if status > 0 else None
-                if ticket is not None:
-                    now, said = time.monotonic(), ticket.testimony
-                    self._pass_on(ticket, said.shown(self.watch, now, status))
+                handle = self._heard_of(goal_id) if status > 0 else None
+                if handle is not None:
+                    now, said = time.monotonic(), handle.replies
+                    self._pass_on(handle, said.shown(self.watch, now, status))
 
     def probe_answered(self, probe: int) -> None:
         """Pass on the answer to a probe."""
@@ -212,16 +212,18 @@ class Line:
         """Whether this was made before a fork, and we are the child: the goals are not ours."""
         return self._generation != shared.generation
 
-    def tell(self, ticket: Ticket, event: Event, detail: Any = None, message: Any = None) -> None:
+    def tell(
+        self, handle: GoalHandle, event: Event, detail: Any = None, message: Any = None
+    ) -> None:
         """Tell a goal what happened and do what it says; `message` is the goal to be sent."""
         with lock:
             if self.is_parents:
                 return
-            if event is Event.GRANTED and ticket.paused_at is not None:
-                ticket.paused_at = time.monotonic()  # its next deadline begins in the pause
-            self._apply(ticket, lambda now: ticket.goal.on(event, now, detail), message)
+            if event is Event.GRANTED and handle.paused_at is not None:
+                handle.paused_at = time.monotonic()  # its next deadline begins in the pause
+            self._apply(handle, lambda now: handle.goal.on(event, now, detail), message)
 
-    def poll(self, ticket: Ticket) -> None:
+    def poll(self, handle: GoalHandle) -> None:
         """Let the goal's deadlines take effect, unless its tree is paused before sending.
 
         What has arrived by now is taken in first: an answer that came in time is in time, though
@@ -229,111 +231,111 @@ class Line:
         arrive. One moment decides whether to do so, and what is due.
         """
         with lock:
-            goal, now = ticket.goal, self.traffic.clocks.now()
+            goal, now = handle.goal, self.traffic.clocks.now()
             if self.is_parents:
                 return
-            if ticket.paused_at is not None and not goal.sent:
-                ticket.kept_since = None
+            if handle.paused_at is not None and not goal.sent:
+                handle.kept_since = None
             else:
-                self._give_back_time(ticket, now.steady)
+                self._give_back_time(handle, now.steady)
                 if goal.due_in(now) == 0.0:
                     self.pump()
                     now = self.traffic.clocks.now()
                     self._bear_with(goal, now)
-                self._apply(ticket, lambda _: goal.poll(now), None)
+                self._apply(handle, lambda _: goal.poll(now), None)
 
-    def _give_back_time(self, ticket: Ticket, now: float) -> None:
+    def _give_back_time(self, handle: GoalHandle, now: float) -> None:
         """See to it that no deadline counts the time in which a goal is not sent on our account."""
-        waits = ticket.goal.state is State.WAITING_FOR_SERVER
-        if waits and ticket.kept_since is not None:
-            more = min(now - ticket.kept_since, HELD_AT_MOST - ticket.kept_for)
-            ticket.goal.postpone(more)
-            ticket.kept_for += more
-        ticket.kept_since = now if waits and self.way.keeps(now) else None
+        waits = handle.goal.state is State.WAITING_FOR_SERVER
+        if waits and handle.kept_since is not None:
+            more = min(now - handle.kept_since, HELD_AT_MOST - handle.kept_for)
+            handle.goal.postpone(more)
+            handle.kept_for += more
+        handle.kept_since = now if waits and self.route.holds_back(now) else None
 
     def _bear_with(self, goal: Goal, now: Now) -> None:
-        """Hold deadlines that have passed while a standstill may be why nothing has come in."""
-        answers = alarm.standstill.answers_take(now.steady)
+        """Hold deadlines that have passed while a stall may be why nothing has come in."""
+        answers = alarm.stalls.answers_take(now.steady)
         waits = goal.state is State.WAITING_FOR_SERVER
-        open_question = self.way.keeps if waits else self.way.in_doubt
+        open_question = self.route.holds_back if waits else self.route.in_doubt
         in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
         if waits:
-            in_doubt = max(in_doubt, alarm.standstill.servers_take(now.steady))
+            in_doubt = max(in_doubt, alarm.stalls.servers_take(now.steady))
         in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
         goal.hold(max(answers, in_doubt), now, in_all)
 
     @staticmethod
-    def given_up(ticket: Ticket) -> bool:
+    def given_up(handle: GoalHandle) -> bool:
         """Whether whoever began it has given it up; not where all stood still: a tick may return.
 
         In this order: to ask is to give up.
         """
-        still = alarm.standstill
+        still = alarm.stalls
         cause = still.answers_take(time.monotonic()) > 0.0
-        return not ticket.spared.bears(still, cause=cause) and ticket.given_up
+        return not handle.spared.bears(still, cause=cause) and handle.given_up
 
-    def mind(self, ticket: Ticket) -> None:
+    def mind(self, handle: GoalHandle) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""
         try:
-            if self.given_up(ticket):
-                self.tell(ticket, Event.INTERRUPTED)
-            self.poll(ticket)
+            if self.given_up(handle):
+                self.tell(handle, Event.INTERRUPTED)
+            self.poll(handle)
         except Exception as error:  # noqa: BLE001 - a mistake of ours: any
             self._warn_once("a goal could not be minded", error)
 
     def _apply(
-        self, ticket: Ticket, step: Callable[[Any], tuple[Command, ...]], message: Any
+        self, handle: GoalHandle, step: Callable[[Any], tuple[Command, ...]], message: Any
     ) -> None:
-        goal = ticket.goal
+        goal = handle.goal
         before = (goal.state, goal.outcome, goal.end)
         was_accepted, was_in_the_way, was_lost = goal.accepted, _in_the_way(goal), goal.lost
         now = self.traffic.clocks.now()
         commands = step(now)
         if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
-            goal.reason += self._instead(ticket)
+            goal.reason += self._instead(handle)
         elif goal.outcome is Outcome.SERVER_BUSY and before[0] is State.QUEUED:
-            goal.reason += self._in_use(ticket)
+            goal.reason += self._in_use(handle)
         newly_gone = goal.lost and not was_lost and goal.end is End.SERVER_GONE
-        if newly_gone and ticket.look_out_left is None:
-            ticket.look_out_left = LOOKED_OUT_FOR
+        if newly_gone and handle.look_out_left is None:
+            handle.look_out_left = LOOKED_OUT_FOR
         if before != (goal.state, goal.outcome, goal.end):
-            ticket.traffic.note(ticket)
+            handle.traffic.note(handle)
         if _in_the_way(goal) != was_in_the_way:
             self._tell_who_waits()
         for command in commands:
-            self._carry_out(ticket, command, message)
-        if _is_answered(ticket):
+            self._carry_out(handle, command, message)
+        if _is_answered(handle):
             ledger.strike(goal.id)
         elif goal.lost != was_lost and goal.id in ledger:
-            self._put_on_record(ticket)
+            self._put_on_record(handle)
         if goal.state is State.DONE:
-            self.close_book(ticket)
+            self.retire(handle)
         due = goal.due_in(now)
         if due is not None:
             alarm.wake_by(now.steady + due)
         newly = goal.accepted and not was_accepted and goal.state is State.EXECUTING
         if newly and goal.busy is Busy.REPLACE:
             for older in self.traffic.domain.resources.holders(goal.resources):
-                if older is ticket:
+                if older is handle:
                     break
-                older.line.tell(older, Event.REPLACED, goal.server)
+                older.endpoint.tell(older, Event.REPLACED, goal.server)
 
-    def _carry_out(self, ticket: Ticket, command: Command, message: Any) -> None:
-        goal = ticket.goal
+    def _carry_out(self, handle: GoalHandle, command: Command, message: Any) -> None:
+        goal = handle.goal
         if command is Command.RELEASE:
-            for next_one in self.traffic.domain.resources.release(ticket):
-                next_one.line.tell(next_one, Event.GRANTED)
+            for next_one in self.traffic.domain.resources.release(handle):
+                next_one.endpoint.tell(next_one, Event.GRANTED)
             return
         try:
             if command is Command.SEND:
-                ticket.testimony.sent(self.watch)
-                self._put_on_record(ticket)
+                handle.replies.sent(self.watch)
+                self._put_on_record(handle)
                 self.client.send(goal.id, message)
-                known = ticket.testimony.sent_to
+                known = handle.replies.sent_to
                 self.see()
-                ticket.testimony.sent(self.watch)  # who opened since got it, too
-                if ticket.testimony.sent_to != known:
-                    self._put_on_record(ticket)
+                handle.replies.sent(self.watch)  # who opened since got it, too
+                if handle.replies.sent_to != known:
+                    self._put_on_record(handle)
             elif command is Command.ASK_RESULT:
                 self.client.ask_result(goal.id)
             elif goal.state is State.DONE:  # and nothing is sent after that
@@ -342,19 +344,21 @@ class Line:
                 self.ask_to_cancel(goal.id)
         except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
             if command is Command.SEND:
-                self.tell(ticket, Event.SEND_FAILED, error)
+                self.tell(handle, Event.SEND_FAILED, error)
             else:
                 self._warn_once(f"{command.name} could not be sent", error)
 
-    def _put_on_record(self, ticket: Ticket) -> None:
-        goal, sent_to = ticket.goal, ticket.testimony.sent_to
+    def _put_on_record(self, handle: GoalHandle) -> None:
+        goal, sent_to = handle.goal, handle.replies.sent_to
         domain = self.traffic.domain.number
         accept = goal.timeouts.accept
         ledger.enter(goal.id, self.name, domain, sent_to, accept=accept, lost=goal.lost)
 
     def _tell_who_waits(self) -> None:
         """Wake those of all nodes whose goals a change here may have let go on."""
-        for traffic in {line.traffic for line in self.neighbors() if line.way.is_waited_for()}:
+        for traffic in {
+            endpoint.traffic for endpoint in self.neighbors() if endpoint.route.is_waited_for()
+        }:
             traffic.notify(None)
 
     def ask_to_cancel(self, goal_id: bytes) -> None:
@@ -384,25 +388,25 @@ class Line:
             self._warned_of.add(what)
             log.error(f"{self.name}: {what}: {raised(error)}")
 
-    def close_book(self, ticket: Ticket) -> None:
+    def retire(self, handle: GoalHandle) -> None:
         """Know nothing of this goal any more, and mind only what is left."""
-        goal = ticket.goal
-        if self.goals.get(goal.id) is ticket:  # and not its twin
+        goal = handle.goal
+        if self.goals.get(goal.id) is handle:  # and not its duplicate
             del self.goals[goal.id]
             self.client.forget(goal.id)
             if goal.end is End.UNKNOWN:
                 self.cancels.send_now(goal.id)  # nobody will ask again
             self.cancels.forget(goal.id)
             if goal.sent and goal.state is State.DONE:
-                self.past.keep(ticket)
+                self.past.keep(handle)
         if not self.goals:
             alarm.forget(self)
             self._look_at = 0.0  # no look is due any more, and none will be late
             self.traffic.drop_if_unused(self)
 
-    def _in_use(self, ticket: Ticket) -> str:
+    def _in_use(self, handle: GoalHandle) -> str:
         """Say who has what the goal waited for, where that is not a goal that just runs."""
-        for other in self.traffic.domain.resources.holders(ticket.goal.resources):
+        for other in self.traffic.domain.resources.holders(handle.goal.resources):
             if other.paused_at is not None and not other.goal.sent:
                 return f": it is the turn of {other.name}, whose tree is paused"
             if other.goal.outcome is not None and not other.accounted_for:
@@ -410,11 +414,11 @@ class Line:
                 return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
         return ""
 
-    def _instead(self, ticket: Ticket) -> str:
+    def _instead(self, handle: GoalHandle) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
-        if any(line.in_the_way_of(ticket) for line in self.neighbors()):
+        if any(endpoint.conflicts_with(handle) for endpoint in self.neighbors()):
             return ": what it would use still has a goal that was given up, and would run both"
-        if self.may_overtake(ticket):
+        if self.may_overtake(handle):
             return ": it has not answered another goal's request, and might run that one last"
         node, actions = self.traffic.node, dict[str, str]()
         try:
@@ -451,130 +455,142 @@ class Line:
     def close(self) -> None:
         """Let go of the client; answers that are still under way are lost."""
         self.client.destroy()
-        self.way.leave()
+        self.route.leave()
 
-    def neighbors(self) -> list[Line]:
-        """Return the lines with goals in our ROS domain, of all nodes of this process."""
+    def neighbors(self) -> list[ActionEndpoint]:
+        """Return the endpoints with goals in our ROS domain, of all nodes of this process."""
         domain = self.traffic.domain
-        lines = [line for line in alarm.minded() if isinstance(line, Line)]
-        return [line for line in lines if line.traffic.domain is domain]
+        endpoints = [
+            endpoint for endpoint in alarm.minded() if isinstance(endpoint, ActionEndpoint)
+        ]
+        return [endpoint for endpoint in endpoints if endpoint.traffic.domain is domain]
 
-    def has_lost(self, ticket: Ticket) -> bool:
+    def has_lost(self, handle: GoalHandle) -> bool:
         """Whether goals were lost here that `ticket` might run beside."""
-        return any(other.goal.lost for other in self._near(ticket))
+        return any(other.goal.lost for other in self._near(handle))
 
-    def in_the_way_of(self, ticket: Ticket) -> bool:
+    def conflicts_with(self, handle: GoalHandle) -> bool:
         """Whether a goal that was given up here may still run where `ticket` wants to."""
-        same = self.shares_server_with(ticket.line)
-        return any(other.goal.bars(ticket.goal, same_server=same) for other in self._near(ticket))
+        same = self.shares_server_with(handle.endpoint)
+        return any(other.goal.blocks(handle.goal, same_server=same) for other in self._near(handle))
 
-    def may_overtake(self, ticket: Ticket) -> bool:
+    def may_overtake(self, handle: GoalHandle) -> bool:
         """Whether the request of a goal that `ticket` replaces, or that replaces it, is under way.
 
         From two nodes they arrive in any order, and the server runs the last one.
         """
-        holders = self.traffic.domain.resources.holders(ticket.goal.resources)
-        at = holders.index(ticket)
-        rivals = holders[:at] if ticket.goal.busy is Busy.REPLACE else []
+        holders = self.traffic.domain.resources.holders(handle.goal.resources)
+        at = holders.index(handle)
+        rivals = holders[:at] if handle.goal.busy is Busy.REPLACE else []
         rivals += [other for other in holders[at + 1 :] if other.goal.busy is Busy.REPLACE]
         return any(
-            other.goal.unanswered and other.line.shares_server_with(self) for other in rivals
+            other.goal.unanswered and other.endpoint.shares_server_with(self) for other in rivals
         )
 
-    def may_come_back_for(self, ticket: Ticket, now: float) -> bool:
+    def may_come_back_for(self, handle: GoalHandle, now: float) -> bool:
         """Whether a goal was lost here whose server may only be shown later than that of `ticket`.
 
         It shares a resource with `ticket`, and is canceled first where its server is seen in time.
         """
-        if ticket.goal.busy not in (Busy.WAIT, Busy.FAIL) or self.shares_server_with(ticket.line):
+        if handle.goal.busy not in (Busy.WAIT, Busy.FAIL) or self.shares_server_with(
+            handle.endpoint
+        ):
             return False
-        return self.has_lost(ticket) and now - ticket.line.in_sight_since < BESIDE
+        return self.has_lost(handle) and now - handle.endpoint.in_sight_since < BESIDE
 
-    def _near(self, ticket: Ticket) -> list[Ticket]:
-        same, wanted = self.shares_server_with(ticket.line), ticket.goal.resources
+    def _near(self, handle: GoalHandle) -> list[GoalHandle]:
+        same, wanted = self.shares_server_with(handle.endpoint), handle.goal.resources
         return [t for t in self.goals.values() if same or t.goal.resources & wanted]
 
     def in_flight(self) -> int:
         """Count the goal requests at the server that wait for their answer, of all nodes."""
-        lines = [line for line in self.neighbors() if line.shares_server_with(self)]
-        return sum(ticket.goal.in_flight for line in lines for ticket in line.goals.values())
+        endpoints = [endpoint for endpoint in self.neighbors() if endpoint.shares_server_with(self)]
+        return sum(
+            handle.goal.in_flight for endpoint in endpoints for handle in endpoint.goals.values()
+        )
 
-    def goals_of(self, owner: Any) -> list[Ticket]:
+    def goals_of(self, owner: Any) -> list[GoalHandle]:
         """Return the goals of a leaf that are open here, also what a second server took."""
         with lock:
-            return [ticket for ticket in self.goals.values() if ticket.owner is owner]
+            return [handle for handle in self.goals.values() if handle.owner is owner]
 
     def _take_over(self, now: float) -> None:
         """Take lost goals of other nodes whose server is in sight here: it is to cancel them first.
 
         Each node discovers for itself; theirs may see the server later, or in part, or never again.
         """
-        for line in alarm.minded():
-            if not isinstance(line, Line) or line is self or not line.shares_server_with(self):
+        for endpoint in alarm.minded():
+            if (
+                not isinstance(endpoint, ActionEndpoint)
+                or endpoint is self
+                or not endpoint.shares_server_with(self)
+            ):
                 continue
-            for ticket in list(line.goals.values()):
-                if ticket.goal.lost and self._sees_more_than(line, ticket.testimony.sent_to, now):
-                    ticket.line = self
-                    ticket.testimony.taken_over()
-                    self.goals[ticket.goal.id] = ticket
-                    line.close_book(ticket)
+            for handle in list(endpoint.goals.values()):
+                if handle.goal.lost and self._sees_more_than(endpoint, handle.replies.sent_to, now):
+                    handle.endpoint = self
+                    handle.replies.taken_over()
+                    self.goals[handle.goal.id] = handle
+                    endpoint.retire(handle)
                     alarm.mind(self)
 
-    def _sees_more_than(self, line: Line, servers: frozenset[bytes], now: float) -> bool:
+    def _sees_more_than(
+        self, endpoint: ActionEndpoint, servers: frozenset[bytes], now: float
+    ) -> bool:
         """Whether one of `servers` is here that has gone for `line`, or that it takes for a ghost.
 
         What both see is left where it is: a ghost would be handed to and fro.
         """
         if not servers & self.watch.gids or self.watch.state(now) is Server.ABSENT:
             return False
-        ghost_there = self.watch.all_live(now) and not line.watch.all_live(now)
-        return line.orphaned or line.watch.gone(now, servers) or ghost_there
+        ghost_there = self.watch.all_live(now) and not endpoint.watch.all_live(now)
+        return endpoint.orphaned or endpoint.watch.gone(now, servers) or ghost_there
 
-    def shares_server_with(self, other: Line) -> bool:
+    def shares_server_with(self, other: ActionEndpoint) -> bool:
         """Whether both, which belong to two nodes, mean the same action."""
         same_domain = self.traffic.domain is other.traffic.domain
         return same_domain and self.name == other.name and self.action_type is other.action_type
 
-    def put_away(self, *, all_of_them: bool = False) -> None:
+    def park(self, *, all_of_them: bool = False) -> None:
         """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
-        for ticket in list(self.goals.values()):
-            goal = ticket.goal
+        for handle in list(self.goals.values()):
+            goal = handle.goal
             if all_of_them or (goal.outcome is not None and not goal.holding):
-                self.tell(ticket, Event.LEFT)
+                self.tell(handle, Event.NODE_CLOSED)
             if goal.lost:
-                ticket.look_out_left = 0.0  # nobody does from now on
-                self.traffic.domain.keep_lost(self.name, self.action_type, ticket)
-                self.close_book(ticket)
+                handle.look_out_left = 0.0  # nobody does from now on
+                self.traffic.domain.keep_lost(self.name, self.action_type, handle)
+                self.retire(handle)
 
     def _adopt(self) -> None:
         """Take over what was lost, or left, at this action before, to cancel it first."""
-        for ticket in self.traffic.domain.take_lost(self.name, self.action_type):
-            saw_it = self.traffic.made_at + TOO_NEW < ticket.begun_at
-            if ticket.traffic is not self.traffic and not saw_it:
-                first = ticket.not_gone_before == NEVER  # a later node need only have discovered
+        for handle in self.traffic.domain.take_lost(self.name, self.action_type):
+            saw_it = self.traffic.made_at + TOO_NEW < handle.begun_at
+            if handle.traffic is not self.traffic and not saw_it:
+                first = handle.not_gone_before == NEVER  # a later node need only have discovered
                 until = time.monotonic() + (LEASE if first else TOO_NEW)
-                ticket.not_gone_before = max(ticket.not_gone_before, until)
-            ticket.line, ticket.traffic = self, self.traffic
-            ticket.testimony.taken_over()
-            self.goals[ticket.goal.id] = ticket
+                handle.not_gone_before = max(handle.not_gone_before, until)
+            handle.endpoint, handle.traffic = self, self.traffic
+            handle.replies.taken_over()
+            self.goals[handle.goal.id] = handle
             alarm.mind(self)
 
     def _bound_the_lost(self) -> None:
         settled = [
-            ticket
-            for ticket in self.goals.values()
-            if ticket.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
-            and ticket.goal.outcome is not None
-            and not ticket.goal.suspect
+            handle
+            for handle in self.goals.values()
+            if handle.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
+            and handle.goal.outcome is not None
+            and not handle.goal.suspect
         ]
-        for ticket in settled[:-LOST_KEPT]:
-            self.tell(ticket, Event.CLOSED)
-            ledger.strike(ticket.goal.id)
+        for handle in settled[:-LOST_KEPT]:
+            self.tell(handle, Event.PROCESS_EXITING)
+            ledger.strike(handle.goal.id)
 
     def _observe(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""
         self.watch.observe(
-            now, self.client.server_is_ready(), self.way.shown(), concludes=concludes
+            now, self.client.server_is_ready(), self.route.shown(), concludes=concludes
         )
 
     def look(self, now: float) -> Server:
@@ -584,35 +600,35 @@ class Line:
             self._look_blindly(now)
             return Server.ABSENT
         self._take_in(now)
-        if self.client.closed:  # by what came, and nobody used the line
+        if self.client.closed:  # by what came, and nobody used the endpoint
             return Server.ABSENT
         before = self._looked_like
         try:
             self._observe(now)
         except Exception:  # noqa: BLE001 - InvalidHandle: it was destroyed since
-            if not self.way.come_home():
+            if not self.route.fall_back():
                 self._orphan()
             return Server.ABSENT
         self._adopt()
         self._take_over(now)
-        runs = any(ticket.goal.sent and not ticket.goal.lost for ticket in self.goals.values())
-        if self.way.wants_question(now) or self.watch.wants_probe(now, runs=runs):
+        runs = any(handle.goal.sent and not handle.goal.lost for handle in self.goals.values())
+        if self.route.wants_question(now) or self.watch.wants_probe(now, runs=runs):
             self.probe()
-        for ticket in list(self.goals.values()):
-            gone = self.watch.gone(now, ticket.testimony.sent_to)
+        for handle in list(self.goals.values()):
+            gone = self.watch.gone(now, handle.replies.sent_to)
             if not gone:
-                ticket.not_gone_before = NEVER  # it has been discovered
-            if (gone and now < ticket.not_gone_before) or self._is_hidden(ticket):
+                handle.not_gone_before = NEVER  # it has been discovered
+            if (gone and now < handle.not_gone_before) or self._is_hidden(handle):
                 continue  # it has not been discovered yet, though its status may have come already
-            if ticket.goal.sent:
-                if gone and not ticket.goal.lost:
+            if handle.goal.sent:
+                if gone and not handle.goal.lost:
                     self.pump()  # its last words
-                self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
+                self._pass_on(handle, handle.replies.looked(self.watch, now))
         state = self._looked_like = self.watch.state(now)
         if before is Server.ABSENT or self._was_away:
             self.in_sight_since = now
         self._was_away = False
-        held_up = (now - self.in_sight_since < BESIDE, self.way.keeps(now))
+        held_up = (now - self.in_sight_since < BESIDE, self.route.holds_back(now))
         if any(was and not still for was, still in zip(self._held_up, held_up, strict=True)):
             self.traffic.notify(None)  # what was held up for it may be sent
         self._held_up = held_up
@@ -620,7 +636,7 @@ class Line:
             self.traffic.notify(None)
             self.traffic.domain.lost_sight |= state is Server.ABSENT
             self.traffic.domain.known.add((self.name, self.action_type))
-        self.way.seek(now)
+        self.route.seek(now)
         if state is Server.AMBIGUOUS and not self._warned_crowd:
             self._warned_crowd = True
             log.warning(f"{self.name}: two action servers answer to this name; no more is sent")
@@ -629,23 +645,23 @@ class Line:
         return state
 
     def _look_out(self, now: float) -> None:
-        """Count the time for which servers are looked out for; not that of a standstill.
+        """Count the time for which servers are looked out for; not that of a stall.
 
         Nor that after one, in which a server that is there may be out of sight.
         """
         passed = min(now - self._looked_out_at, 2 * LOOK_WHILE_RUNNING)
         self._looked_out_at = now
-        if alarm.standstill.servers_take(now) > 0.0:
+        if alarm.stalls.servers_take(now) > 0.0:
             return
-        for ticket in self.goals.values():
-            if ticket.goal.lost and ticket.look_out_left:
-                ticket.look_out_left = max(0.0, ticket.look_out_left - passed)
+        for handle in self.goals.values():
+            if handle.goal.lost and handle.look_out_left:
+                handle.look_out_left = max(0.0, handle.look_out_left - passed)
 
     def _take_in(self, now: float) -> None:
         """What answers of several came in time count, though nobody spun the node."""
         if self.watch.is_crowded:
             late = self._look_at and now - self._look_at > LATE
-            if late or alarm.standstill.answers_take(time.monotonic()):
+            if late or alarm.stalls.answers_take(time.monotonic()):
                 self.watch.stood_still(now)
             self.pump()
 
@@ -657,19 +673,19 @@ class Line:
         self.watch.observe(now, True, self.watch.gids)
         if self.watch.wants_probe(now):
             self.probe()
-        for ticket in list(self.goals.values()):
-            if ticket.goal.sent:
-                self._pass_on(ticket, ticket.testimony.looked(self.watch, now))
+        for handle in list(self.goals.values()):
+            if handle.goal.sent:
+                self._pass_on(handle, handle.replies.looked(self.watch, now))
 
-    def _is_hidden(self, ticket: Ticket) -> bool:
+    def _is_hidden(self, handle: GoalHandle) -> bool:
         """Whether a server of this goal may be out of sight because this process stood still.
 
         Not for ever, where it does so again and again and the server is not seen in between.
         """
-        still, sent_to, now = alarm.standstill, ticket.testimony.sent_to, time.monotonic()
+        still, sent_to, now = alarm.stalls, handle.replies.sent_to, time.monotonic()
         in_sight = sent_to <= self.watch.gids and not self.watch.gone(now, sent_to)
         cause = not in_sight and still.servers_take(now) > 0.0
-        return ticket.hidden.bears(still, cause=cause)
+        return handle.hidden.bears(still, cause=cause)
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
@@ -684,55 +700,55 @@ class Line:
         """Our node is gone, or its context: nobody can want these goals any more."""
         if not self.orphaned:
             self.orphaned, self._heard_at = True, time.monotonic()
-            if any(not ticket.accounted_for for ticket in self.goals.values()):
+            if any(not handle.accounted_for for handle in self.goals.values()):
                 log.warning(f"{self.name}: the node is gone; canceling what it left")
-        for ticket in list(self.goals.values()):  # also one that was begun since
-            ticket.look_out_left = 0.0  # from here nobody sees it come back
-            if ticket.goal.outcome is None:
-                self.tell(ticket, Event.INTERRUPTED)
+        for handle in list(self.goals.values()):  # also one that was begun since
+            handle.look_out_left = 0.0  # from here nobody sees it come back
+            if handle.goal.outcome is None:
+                self.tell(handle, Event.INTERRUPTED)
         patience = max((each.goal.drains_within for each in self.goals.values()), default=0.0)
         silent = time.monotonic() - self._heard_at > max(SILENT_FOR, patience)
-        if silent and not alarm.standstill.answers_take(time.monotonic()):
-            self.put_away(all_of_them=True)  # from here nobody can see whether the server is gone
+        if silent and not alarm.stalls.answers_take(time.monotonic()):
+            self.park(all_of_them=True)  # from here nobody can see whether the server is gone
 
     def attend(self, now: float) -> float:
-        """Do what is due at this line, on the alarm; return the seconds until it wants to again."""
+        """Do what is due here, on the alarm; return the seconds until it wants to again."""
         self._look_out(now)
         if now >= self._look_at:
             self.look(now)
             settling = self.watch.state(now) is Server.SETTLING
-            if settling or self.way.is_waited_for():
+            if settling or self.route.is_waited_for():
                 self._look_at = now + LOOK_WHILE_WAITING
-            elif any(not ticket.is_over for ticket in self.goals.values()):
+            elif any(not handle.is_over for handle in self.goals.values()):
                 self._look_at = now + LOOK_WHILE_RUNNING
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
         self.cancels.go_on(now)
-        if self.orphaned or self.way.sight is not None:
+        if self.orphaned or self.route.second is not None:
             self.pump()
-            if not all(ticket.accounted_for for ticket in self.goals.values()):
+            if not all(handle.accounted_for for handle in self.goals.values()):
                 wait = min(wait, PUMP_EVERY)
-        for ticket in list(self.goals.values()):
-            self.mind(ticket)
-            due = ticket.goal.due_in(self.traffic.clocks.now())
-            if due is not None and ticket.paused_at is None:
+        for handle in list(self.goals.values()):
+            self.mind(handle)
+            due = handle.goal.due_in(self.traffic.clocks.now())
+            if due is not None and handle.paused_at is None:
                 wait = min(wait, due)
         self._bound_the_lost()
         return max(wait, 0.001)
 
 
-def _is_answered(ticket: Ticket) -> bool:
+def _is_answered(handle: GoalHandle) -> bool:
     """Whether it need not be on record any more: whoever got it shows it, or will not run it.
 
     One that two servers got is accepted by one of them first. And a server that has gone may only
     stand still, for longer than this process is there.
     """
-    goal = ticket.goal
-    shown = goal.accepted and len(ticket.testimony.sent_to) <= 1
-    return shown or (ticket.accounted_for and goal.end is not End.SERVER_GONE)
+    goal = handle.goal
+    shown = goal.accepted and len(handle.replies.sent_to) <= 1
+    return shown or (handle.accounted_for and goal.end is not End.SERVER_GONE)
 
 
 def _in_the_way(goal: Goal) -> tuple[bool, ...]:
     """What of a goal others may wait for: room at its server, or its end."""
-    return goal.in_flight, goal.unanswered, goal.owed, goal.lost, goal.holding
+    return goal.in_flight, goal.unanswered, goal.outstanding, goal.lost, goal.holding

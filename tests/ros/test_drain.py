@@ -10,8 +10,8 @@ import pytest
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome, Timeouts
 from bt_actions.goals.terms import Now, State
-from bt_actions.ros import draining
-from bt_actions.ros.shared import Ticket
+from bt_actions.traffic import drain as draining
+from bt_actions.traffic.shared import GoalHandle
 
 LIMITS = Timeouts(accept=1.0, cancel=2.0)
 
@@ -23,16 +23,16 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Any:
     clock.monotonic = lambda: clock.now
     monkeypatch.setattr(draining, "time", clock)
     still = SimpleNamespace(times=0, answers_take=lambda _: 0.0)
-    monkeypatch.setattr(draining.alarm, "standstill", still)
+    monkeypatch.setattr(draining.alarm, "stalls", still)
     return clock
 
 
-def ticket(end: End, look_out_left: float | None, state: State = State.CANCELING) -> Ticket:
+def handle(end: End, look_out_left: float | None, state: State = State.CANCELING) -> GoalHandle:
     """One whose server has gone."""
     goal = Goal(b"1" * 16, "/move", LIMITS, Now(0.0, 0.0))
     goal.outcome, goal.end, goal.state, goal.lost = Outcome.SERVER_LOST, end, state, True
     line: Any = SimpleNamespace(way=SimpleNamespace(in_doubt=lambda _: 0.0))
-    made = Ticket(goal, line, line, None, "m")
+    made = GoalHandle(goal, line, line, None, "m")
     made.look_out_left = look_out_left
     return made
 
@@ -51,11 +51,11 @@ def ticket(end: End, look_out_left: float | None, state: State = State.CANCELING
 def test_a_goal_is_over_when_nothing_of_it_is_waited_for(
     end: End, look_out_left: float | None, state: State, over: bool
 ) -> None:
-    assert ticket(end, look_out_left, state).is_over is over
+    assert handle(end, look_out_left, state).is_over is over
 
 
 def test_who_is_looked_out_for_is_waited_for_but_not_without_end(clock: Any) -> None:
-    lost = ticket(End.SERVER_GONE, 2.0)
+    lost = handle(End.SERVER_GONE, 2.0)
     patience = draining._Patience([lost])
     clock.now += 10.0
     assert not patience.is_over([lost]), "looks count, not time: the process may stand still"
@@ -64,7 +64,7 @@ def test_who_is_looked_out_for_is_waited_for_but_not_without_end(clock: Any) -> 
 
 
 def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal(clock: Any) -> None:
-    left = ticket(End.UNKNOWN, 0.0)
+    left = handle(End.UNKNOWN, 0.0)
     patience = draining._Patience([left])
     clock.now += left.goal.drains_within
     assert not patience.is_over([left])
@@ -73,7 +73,7 @@ def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal(clock: An
 
 
 def test_who_is_back_has_the_time_of_a_cancel_but_only_once(clock: Any) -> None:
-    goal = ticket(End.SERVER_GONE, 2.0)
+    goal = handle(End.SERVER_GONE, 2.0)
     patience = draining._Patience([goal])
     for back_again in (False, True):
         goal.goal.lost = True

@@ -1,10 +1,10 @@
-"""How one line reaches its server: in its node's participant or, where that fails, in another.
+"""How one endpoint reaches its server: in its node's participant or, where that fails, in another.
 
-Our participant may be blind to a server that runs (ros/lookout.py), or that server deaf to it
-(servers/reachability.py). This tells the lookout when, tries a client in the participant that it
-makes, and has the line go on with that one, and come home again when it is gone. Of goals it
-decides nothing: they are told that their server is to be asked anew, and given time for that. All
-under the one lock.
+Our participant may be blind to a server that runs (ros/rediscovery.py), or that server deaf to it
+(servers/reachability.py). This tells the rediscovery when, tries a client in the
+participant that it makes, and has the endpoint go on with that one, and fall back when it is gone.
+Of goals it decides nothing: they are told that their server is to be asked anew, and given time for
+that. All under the one lock.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ import uuid
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goals.terms import Event, State
-from bt_actions.ros import alarm
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.graph import enclave, servers
 from bt_actions.ros.log import log
-from bt_actions.ros.lookout import Sight, look_for
+from bt_actions.ros.rediscovery import SecondParticipant, look_for
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.servers.reachability import NEVER, TWICE, Hearing
+from bt_actions.servers.reachability import NEVER, TWICE, Reachability
 from bt_actions.servers.stalls import ANSWERS_TAKE
+from bt_actions.traffic import alarm
 
 if TYPE_CHECKING:
-    from bt_actions.ros.line import Line
+    from bt_actions.traffic.endpoint import ActionEndpoint
 
 LAST_WORD = 0.5
 """Seconds within which a server that is not busy answers."""
@@ -42,28 +42,28 @@ ON_TRIAL = 0
 """The number of a trial's probe, of which nobody is told."""
 
 
-class Way:
-    """The way of one line to its server (lookout.Seeker)."""
+class Route:
+    """The way of one endpoint to its server (rediscovery.Seeker)."""
 
-    def __init__(self, line: Line) -> None:
-        self._line = line
-        self.name = line.name
-        self.sight: Sight | None = None
-        """Where the line's client lives, if not in its node's participant."""
-        self._remapped = _remapped(line.traffic.node, line.name)
-        self._long_standstills = line.traffic.long_standstills
+    def __init__(self, endpoint: ActionEndpoint) -> None:
+        self._endpoint = endpoint
+        self.name = endpoint.name
+        self.second: SecondParticipant | None = None
+        """Where the endpoint's client lives, if not in its node's participant."""
+        self._remapped = _remapped(endpoint.traffic.node, endpoint.name)
+        self._long_stalls = endpoint.traffic.long_stalls
         self._last_question_at = NEVER  # to a server that has answered another client
 
     def __repr__(self) -> str:
-        return f"<Way to {self.name}, {'its own' if self.sight is None else 'another'}>"
+        return f"<Route to {self.name}, {'its own' if self.second is None else 'another'}>"
 
     def shown(self) -> frozenset[bytes]:
         """Return the GIDs of the servers in sight; raises where the participant is gone."""
-        if self.sight is not None:
-            return self.sight.shows(self.name)
-        return servers(self._line.traffic.node, self.name)
+        if self.second is not None:
+            return self.second.shows(self.name)
+        return servers(self._endpoint.traffic.node, self.name)
 
-    def keeps(self, now: float) -> bool:
+    def holds_back(self, now: float) -> bool:
         """Whether nothing is sent though a server is in sight: it may not be heard, or be two."""
         return self.in_doubt(now) > 0.0 or self._discovers(now)
 
@@ -72,8 +72,8 @@ class Way:
 
         The first one may be the wrong one, or both may move.
         """
-        made_at = self._line.traffic.seen_since if self.sight is None else self.sight.made_at
-        came_at = max(made_at, self._line.in_sight_since)
+        made_at = self._endpoint.traffic.seen_since if self.second is None else self.second.made_at
+        came_at = max(made_at, self._endpoint.in_sight_since)
         is_new = came_at - made_at < TOO_NEW and now - came_at < DISCOVERS
         return is_new and not self._is_absent(now)
 
@@ -81,34 +81,34 @@ class Way:
 
     def in_doubt(self, now: float) -> float:
         """Return for how many seconds a server that is silent may not have heard us; or 0."""
-        if self._line.orphaned or self._is_absent(now):
+        if self._endpoint.orphaned or self._is_absent(now):
             return 0.0  # there is no other way
         return self._hearing(now).in_doubt(now)
 
     def wants_question(self, now: float) -> bool:
         """Whether to ask the server something now, just in order to be answered."""
-        hearing = self._hearing(now)
-        return not self._is_absent(now) and hearing.take_question(now)
+        reachability = self._hearing(now)
+        return not self._is_absent(now) and reachability.take_question(now)
 
-    def _hearing(self, now: float) -> Hearing:
-        """Return that of our client, which knows of all standstills by now."""
-        hearing = self._line.client.hearing
-        if alarm.standstill.long_times != self._long_standstills:
-            self._long_standstills = alarm.standstill.long_times
-            hearing.doubt(now)
-        return hearing
+    def _hearing(self, now: float) -> Reachability:
+        """Return that of our client, which knows of all stalls by now."""
+        reachability = self._endpoint.client.reachability
+        if alarm.stalls.long_times != self._long_stalls:
+            self._long_stalls = alarm.stalls.long_times
+            reachability.doubt(now)
+        return reachability
 
     def seek(self, now: float) -> None:
         """Have another way looked for, where this one fails."""
         if self.misses():
-            domain = self._line.traffic.domain
+            domain = self._endpoint.traffic.domain
             look_for(self, domain.number, self._enclave, at_once=self.in_doubt(now) > 0.0)
 
     @functools.cached_property
     def _enclave(self) -> str:
-        return enclave(self._line.traffic.node)
+        return enclave(self._endpoint.traffic.node)
 
-    # What the lookout asks, and does
+    # What the rediscovery asks, and does
 
     def misses(self) -> bool:
         """Whether a server is wanted that may be there, though nothing shows all of it.
@@ -117,45 +117,45 @@ class Way:
         runs on an absent server is lost. And not where remapping rules give our node another server
         than a new participant would find.
         """
-        line, now = self._line, time.monotonic()
-        if line.orphaned or not line.goals or self._remapped:
+        endpoint, now = self._endpoint, time.monotonic()
+        if endpoint.orphaned or not endpoint.goals or self._remapped:
             return False
-        if now - line.traffic.seen_since < TOO_NEW:
+        if now - endpoint.traffic.seen_since < TOO_NEW:
             return False
-        if line.users <= 0 and all(ticket.goal.lost for ticket in line.goals.values()):
+        if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.goals.values()):
             return False  # nobody here wants it; it is remembered, as what is put away is
-        domain = line.traffic.domain
-        known = domain.lost_sight or (self.name, line.action_type) in domain.known
+        domain = endpoint.traffic.domain
+        known = domain.lost_sight or (self.name, endpoint.action_type) in domain.known
         running = (State.SENDING, State.EXECUTING)
-        still = all(ticket.goal.state not in running for ticket in line.goals.values())
-        return (known and self._is_absent(now) and still) or self._is_mute(now)
+        still = all(handle.goal.state not in running for handle in endpoint.goals.values())
+        return (known and self._is_absent(now) and still) or self._is_unresponsive(now)
 
     def _is_absent(self, now: float) -> bool:
-        return self._line.watch.state(now) is Server.ABSENT
+        return self._endpoint.watch.state(now) is Server.ABSENT
 
-    def _is_mute(self, now: float) -> bool:
+    def _is_unresponsive(self, now: float) -> bool:
         """Whether a server is in sight that has not answered for long.
 
         Not where nobody has taken its answers.
         """
-        line = self._line
-        if self._is_absent(now) or not line.client.hearing.is_mute(now):
+        endpoint = self._endpoint
+        if self._is_absent(now) or not endpoint.client.reachability.is_unresponsive(now):
             return False
-        line.pump()
-        return line.client.hearing.is_mute(now)
+        endpoint.pump()
+        return endpoint.client.reachability.is_unresponsive(now)
 
     def is_waited_for(self) -> bool:
         """Whether a goal is still to be sent."""
-        return any(not ticket.goal.sent for ticket in self._line.goals.values())
+        return any(not handle.goal.sent for handle in self._endpoint.goals.values())
 
-    def client_in(self, sight: Sight) -> ActionClient:
+    def client_in(self, second: SecondParticipant) -> ActionClient:
         """Return a client like our own in another participant, on trial."""
-        line, now = self._line, time.monotonic()
-        client = ActionClient(sight.node, line.action_type, self.name, line)
+        endpoint, now = self._endpoint, time.monotonic()
+        client = ActionClient(second.node, endpoint.action_type, self.name, endpoint)
         client.on_trial = True
         if not self._is_absent(now):
-            line.client.hearing.tried(now)
-            client.hearing.doubt(now, TWICE)
+            endpoint.client.reachability.tried(now)
+            client.reachability.doubt(now, TWICE)
             self._last_question_at = NEVER
         return client
 
@@ -168,67 +168,67 @@ class Way:
         now = time.monotonic()
         if self._is_absent(now):
             return True
-        if not self._is_mute(now):
+        if not self._is_unresponsive(now):
             return False
         client.pump()
-        if not client.hearing.heard:
-            if client.hearing.take_question(now):
+        if not client.reachability.heard:
+            if client.reachability.take_question(now):
                 ask(client, ON_TRIAL)
             return False
         if self._last_question_at == NEVER:
             self._last_question_at = now
-            self._line.probe()
+            self._endpoint.probe()
         return now - self._last_question_at >= LAST_WORD
 
-    def move_to(self, sight: Sight, client: ActionClient) -> None:
+    def move_to(self, second: SecondParticipant, client: ActionClient) -> None:
         """Go on with a client in a participant that sees the server; the alarm takes its answers.
 
         What is under way in the old one is not heard there. A question for a result, or a cancel,
         is asked anew; of a goal request nobody knows whether it has arrived.
         """
-        line, now = self._line, time.monotonic()
-        blind, seen = self._is_absent(now), line.watch.gids
-        line.pump()
-        if line.client.closed:  # by what came, and nobody used the line
+        endpoint, now = self._endpoint, time.monotonic()
+        blind, seen = self._is_absent(now), endpoint.watch.gids
+        endpoint.pump()
+        if endpoint.client.closed:  # by what came, and nobody used the endpoint
             client.destroy()
             return
-        sight.users.add(self)
+        second.users.add(self)
         client.on_trial = False
-        self._go_on_with(client, sight)
+        self._go_on_with(client, second)
         if blind:
             log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
             return
         log.info(f"{self.name}: does not hear this node any more; a new one is heard")
-        for ticket in list(line.goals.values()):
-            if ticket.testimony.sent_to & seen:  # it may be shown later than another of its name
-                ticket.not_gone_before = max(ticket.not_gone_before, now + LEASE)
-            ticket.goal.hold(ANSWERS_TAKE, line.traffic.clocks.now())
-            line.tell(ticket, Event.SERVER_CHANGED)
+        for handle in list(endpoint.goals.values()):
+            if handle.replies.sent_to & seen:  # it may be shown later than another of its name
+                handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
+            handle.goal.hold(ANSWERS_TAKE, endpoint.traffic.clocks.now())
+            endpoint.tell(handle, Event.SERVER_CHANGED)
 
     # There, and back
 
-    def come_home(self) -> bool:
+    def fall_back(self) -> bool:
         """Go on in our node's participant, as the other is gone; return whether that is there."""
-        line = self._line
-        if self.sight is None:
-            return is_valid(line.traffic.node)  # the next look may see more
+        endpoint = self._endpoint
+        if self.second is None:
+            return is_valid(endpoint.traffic.node)  # the next look may see more
         try:
-            client = ActionClient(line.traffic.node, line.action_type, self.name, line)
+            client = ActionClient(endpoint.traffic.node, endpoint.action_type, self.name, endpoint)
         except Exception:  # noqa: BLE001 - or it is gone by now, too
             return False
         self._go_on_with(client, None)
         return True
 
-    def _go_on_with(self, client: ActionClient, sight: Sight | None) -> None:
-        self._line.close()
-        self.sight = sight
-        self._line.open(client)
+    def _go_on_with(self, client: ActionClient, second: SecondParticipant | None) -> None:
+        self._endpoint.close()
+        self.second = second
+        self._endpoint.open(client)
 
     def leave(self) -> None:
         """Need the other participant no more."""
-        if self.sight is not None:
-            self.sight.left_by(self)
-            self.sight = None
+        if self.second is not None:
+            self.second.left_by(self)
+            self.second = None
 
 
 def ask(client: ActionClient, probe: int) -> None:

@@ -6,9 +6,9 @@ announcements that are not sent again: the process runs, and stays invisible. A 
 made after the process is back sees it within a second (docs/reliability-settings.md).
 
 So while a server that was in sight is wanted and is not, a new participant looks for it every now
-and then, on a thread of its own. Where a client is ready there, and ours is not, the line goes on
-with that one (`Way.move_to`); a participant that finds nothing is closed. Nothing is sent here,
-and nothing decided about goals.
+and then, on a thread of its own. Where a client is ready there, and ours is not, the endpoint goes
+on with that one (`Route.move_to`); a participant that finds nothing is closed. Nothing is sent
+here, and nothing decided about goals.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from bt_actions.ros import participant
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.graph import servers
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import lock
+from bt_actions.traffic.shared import lock
 from bt_actions.utilities.plain_text import raised
 
 FIRST_AFTER = 1.5
@@ -48,14 +48,14 @@ AHEAD = 0.7
 """Seconds by which a new participant may be ahead of one that is not blind (0.1 measured)."""
 
 _number = itertools.count(1)
-_sights: set[Sight] = set()
+_participants: set[SecondParticipant] = set()
 _threads: set[threading.Thread] = set()
-_lookouts: dict[tuple[int, str], Lookout] = {}
+_lookouts: dict[tuple[int, str], Rediscovery] = {}
 _closing = False  # the process ends
 
 
 class Seeker(Protocol):
-    """Who has lost sight of a server, or is not heard by it any more (ros/way.py)."""
+    """Who has lost sight of a server, or is not heard by it any more (traffic/route.py)."""
 
     name: str
     """Of the action."""
@@ -66,17 +66,17 @@ class Seeker(Protocol):
     def is_waited_for(self) -> bool:
         """Whether somebody wants to send a goal."""
 
-    def client_in(self, sight: Sight) -> ActionClient:
+    def client_in(self, second: SecondParticipant) -> ActionClient:
         """A client like its own in another participant."""
 
     def prefers(self, client: ActionClient) -> bool:
         """Whether this client, which is ready, does what its own does not."""
 
-    def move_to(self, sight: Sight, client: ActionClient) -> None:
+    def move_to(self, second: SecondParticipant, client: ActionClient) -> None:
         """Go on with this client."""
 
 
-class Sight:
+class SecondParticipant:
     """A participant of our own, and who uses it."""
 
     def __init__(self, domain: int, enclave: str) -> None:
@@ -102,7 +102,7 @@ class Sight:
         self.closed = False
         self._context = context
         with lock:
-            _sights.add(self)
+            _participants.add(self)
 
     def shows(self, action: str) -> frozenset[bytes]:
         """The GIDs of the servers of an action."""
@@ -120,24 +120,24 @@ class Sight:
             if self.closed or ((self.users or self.looking) and not _closing):
                 return
             self.closed = True
-            _sights.discard(self)
+            _participants.discard(self)
         participant.close(self.node, self._context)
 
 
-def look_for(line: Seeker, domain: int, enclave: str, *, at_once: bool = False) -> None:
-    """Look for what this line misses, until it misses nothing; the caller holds the lock.
+def look_for(endpoint: Seeker, domain: int, enclave: str, *, at_once: bool = False) -> None:
+    """Look for what this endpoint misses, until it misses nothing; the caller holds the lock.
 
     In the enclave of its node, which may be allowed to look where others are not.
     With `at_once`, whatever pause between two looks for others has been reached begins anew.
     """
-    lookout = _lookouts.get((domain, enclave))
-    if lookout is None:
-        lookout = _lookouts[domain, enclave] = Lookout(domain, enclave)
-    lookout.add(line, at_once=at_once)
+    rediscovery = _lookouts.get((domain, enclave))
+    if rediscovery is None:
+        rediscovery = _lookouts[domain, enclave] = Rediscovery(domain, enclave)
+    rediscovery.add(endpoint, at_once=at_once)
 
 
-class Lookout:
-    """Looks for the servers that lines of one ROS domain, and one enclave, miss.
+class Rediscovery:
+    """Looks for the servers that endpoints of one ROS domain, and one enclave, miss.
 
     On one thread, which waits from then on for the next to be missed: looks on threads of their own
     would each leave another megabyte behind, because glibc keeps what a thread took for the threads
@@ -154,10 +154,10 @@ class Lookout:
         self._told = False
         self._begins_anew = False
 
-    def add(self, line: Seeker, *, at_once: bool = False) -> None:
-        """Look for what this line misses, too."""
-        if line not in self._missing:
-            self._missing.add(line)
+    def add(self, endpoint: Seeker, *, at_once: bool = False) -> None:
+        """Look for what this endpoint misses, too."""
+        if endpoint not in self._missing:
+            self._missing.add(endpoint)
             self._begins_anew |= at_once
             self._bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
@@ -208,65 +208,67 @@ class Lookout:
 
     def _is_urgent(self) -> bool:
         now = time.monotonic()
-        if not any(line.is_waited_for() for line in self._missing):
+        if not any(endpoint.is_waited_for() for endpoint in self._missing):
             self._urgent_since = None
         elif self._urgent_since is None:
             self._urgent_since = now
         return self._urgent_since is not None and now - self._urgent_since < URGENT_FOR
 
     def _still_missing(self) -> bool:
-        self._missing = {line for line in self._missing if not _closing and line.misses()}
+        self._missing = {
+            endpoint for endpoint in self._missing if not _closing and endpoint.misses()
+        }
         return bool(self._missing)
 
     def _look(self) -> bool:
         """Make a participant, and wait until clients in it are ready that ours are missing."""
-        sight = Sight(self._domain, self._enclave)
-        look = _Look(sight)
+        second = SecondParticipant(self._domain, self._enclave)
+        look = _Look(second)
         try:
             until = time.monotonic() + LASTS
             while time.monotonic() < until:
                 with lock:
-                    lines = set(self._missing) if self._still_missing() else set()
-                    look.go_on(lines)
-                if not lines:
+                    endpoints = set(self._missing) if self._still_missing() else set()
+                    look.go_on(endpoints)
+                if not endpoints:
                     break
                 time.sleep(GLANCE)
         finally:
             with lock:
                 look.clear_up()
-                sight.looking = False
-                found = bool(sight.users)
-            sight.close()
+                second.looking = False
+                found = bool(second.users)
+            second.close()
         return found
 
 
 class _Look:
     """One look: clients on trial in a new participant. All of it under the lock."""
 
-    def __init__(self, sight: Sight) -> None:
-        self._sight = sight
+    def __init__(self, second: SecondParticipant) -> None:
+        self._sight = second
         self._clients: dict[Seeker, ActionClient] = {}
         self._ready_since: dict[Seeker, float] = {}
 
-    def go_on(self, lines: set[Seeker]) -> None:
-        """Try clients where a server is shown; move all lines that one is ready for, together.
+    def go_on(self, endpoints: set[Seeker]) -> None:
+        """Try clients where a server is shown; move all endpoints that one is ready for, together.
 
         Together, because what one of them has lost may be in the way of another's next goal.
         """
         now = time.monotonic()
-        for line in lines:
-            if line not in self._clients and self._sight.shows(line.name):
-                self._clients[line] = line.client_in(self._sight)
-            if line in self._clients and self._clients[line].server_is_ready():
-                self._ready_since.setdefault(line, now)
+        for endpoint in endpoints:
+            if endpoint not in self._clients and self._sight.shows(endpoint.name):
+                self._clients[endpoint] = endpoint.client_in(self._sight)
+            if endpoint in self._clients and self._clients[endpoint].server_is_ready():
+                self._ready_since.setdefault(endpoint, now)
         ready = [
-            line
-            for line in lines
-            if line in self._ready_since and line.prefers(self._clients[line])
+            endpoint
+            for endpoint in endpoints
+            if endpoint in self._ready_since and endpoint.prefers(self._clients[endpoint])
         ]
-        if any(now - self._ready_since[line] >= AHEAD for line in ready):
-            for line in ready:
-                line.move_to(self._sight, self._clients.pop(line))
+        if any(now - self._ready_since[endpoint] >= AHEAD for endpoint in ready):
+            for endpoint in ready:
+                endpoint.move_to(self._sight, self._clients.pop(endpoint))
 
     def clear_up(self) -> None:
         """Destroy the clients that nobody took."""
@@ -294,15 +296,15 @@ def _close_at_exit() -> None:
     global _closing
     with lock:
         _closing = True
-        for lookout in _lookouts.values():
-            lookout.wake()
+        for rediscovery in _lookouts.values():
+            rediscovery.wake()
         threads = list(_threads)
     for thread in threads:
         thread.join(LASTS)
     with lock:
-        sights = list(_sights)
-    for sight in sights:
-        sight.close()
+        sights = list(_participants)
+    for second in sights:
+        second.close()
 
 
 os.register_at_fork(after_in_child=lambda: atexit.unregister(_close_at_exit))

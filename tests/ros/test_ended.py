@@ -16,16 +16,16 @@ from action_msgs.msg import GoalStatus
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Timeouts
 from bt_actions.goals.terms import Event, Now
-from bt_actions.ros import line as line_module
-from bt_actions.ros import past as module
-from bt_actions.ros import shared
 from bt_actions.ros.action_client import GOALS_KEPT
-from bt_actions.ros.cancels import Cancels
-from bt_actions.ros.line import Line
-from bt_actions.ros.past import QUESTIONS, STALE, Ended, Past
-from bt_actions.ros.predecessors import Predecessors
-from bt_actions.ros.shared import Ticket
 from bt_actions.servers.presence import ServerWatch
+from bt_actions.traffic import ended as module
+from bt_actions.traffic import endpoint as line_module
+from bt_actions.traffic import shared
+from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic.ended import QUESTIONS, STALE, Ended, Past
+from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.predecessors import Predecessors
+from bt_actions.traffic.shared import GoalHandle
 
 GOAL, ONE, OTHER = b"goal", b"one", b"other"
 AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3
@@ -33,17 +33,17 @@ AGREED, REFUSED, DENIED, ENDED = 0, 1, 2, 3
 EXECUTING, SUCCEEDED = GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_SUCCEEDED
 
 
-class OfPast(Line):
+class OfPast(ActionEndpoint):
     """A line with a goal that ended at 10.0, and was sent to `sent_to`."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, *sent_to: bytes) -> None:
         said: Any = SimpleNamespace(servers=frozenset(sent_to), is_at_another=lambda *_: None)
         shown: Any = SimpleNamespace(servers=frozenset({ONE}), shown=lambda *_: [])
-        twin: Any = SimpleNamespace(goal=SimpleNamespace(id=GOAL), testimony=shown)
+        duplicate: Any = SimpleNamespace(goal=SimpleNamespace(id=GOAL), replies=shown)
         self.goals = {}
         self.past = Past(self)
         self.predecessors = Predecessors("m")
-        self.past._ended[GOAL] = Ended(lambda: None, True, 10.0, twin, said)
+        self.past._ended[GOAL] = Ended(lambda: None, True, 10.0, duplicate, said)
         self.watch: Any = SimpleNamespace(gids=frozenset({ONE}), two_answered=lambda: None)
         self.watch.heard = lambda _: None
         self.asked: list[bytes] = []
@@ -62,7 +62,7 @@ class OfPast(Line):
     def ask_to_cancel(self, goal_id: bytes) -> None:
         self.asked.append(goal_id)
 
-    def tell(self, ticket: Any, event: Event, detail: Any = None, message: Any = None) -> None:
+    def tell(self, handle: Any, event: Event, detail: Any = None, message: Any = None) -> None:
         self.found.append(event)
 
 
@@ -177,18 +177,18 @@ class Leaf:
 NOW = Now(0.0, 0.0)
 
 
-def ended(line: OfPast, goal_id: bytes, *events: Any, owner: Any = None) -> Ticket:
+def ended(line: OfPast, goal_id: bytes, *events: Any, owner: Any = None) -> GoalHandle:
     """Let a goal that was sent have these events, and its line close the book on it."""
     goal = Goal(goal_id, "m", Timeouts(), NOW)
     for event in (Event.GRANTED, Event.SERVER_READY):
         goal.on(event, NOW)
-    ticket = Ticket(goal, line, line.traffic, owner, "leaf")
-    ticket.testimony.sent_to = frozenset({ONE})
+    handle = GoalHandle(goal, line, line.traffic, owner, "leaf")
+    handle.replies.sent_to = frozenset({ONE})
     for event, detail in events:
         goal.on(event, NOW, detail)
-    line.goals[goal_id] = ticket
-    line.close_book(ticket)
-    return ticket
+    line.goals[goal_id] = handle
+    line.retire(handle)
+    return handle
 
 
 @pytest.fixture
@@ -233,11 +233,11 @@ def test_what_is_kept_in_mind_keeps_no_leaf_alive_and_finds_it_if_it_lives(keepe
 
 
 def test_of_a_lost_goal_that_is_given_up_nothing_is_waited_for(keeper: OfPast) -> None:
-    ticket = ended(keeper, GOAL, (Event.SERVER_LOST, "gone"))
-    ticket.testimony.sent_to = frozenset({ONE, OTHER})
-    ticket.testimony._fresh_since = 1.0
-    ticket.goal.on(Event.CLOSED, NOW)
-    assert ticket.testimony.may_run_at(keeper.watch), "one of them is out of sight"
-    keeper.goals[GOAL] = ticket
-    keeper.close_book(ticket)
+    handle = ended(keeper, GOAL, (Event.SERVER_LOST, "gone"))
+    handle.replies.sent_to = frozenset({ONE, OTHER})
+    handle.replies._fresh_since = 1.0
+    handle.goal.on(Event.PROCESS_EXITING, NOW)
+    assert handle.replies.may_run_at(keeper.watch), "one of them is out of sight"
+    keeper.goals[GOAL] = handle
+    keeper.retire(handle)
     assert not keeper.goals

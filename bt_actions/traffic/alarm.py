@@ -2,7 +2,7 @@
 
 It sleeps until the earliest deadline, ends when no goal has been open for a while, and starts again
 with the next. As it never sleeps for long, it notices when the whole process stood still; whether
-it did while no goal was open, nobody knows. It knows lines only by their `attend`.
+it did while no goal was open, nobody knows. It knows endpoints only by their `attend`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Protocol
 
 from bt_actions.ros.collector import Collector
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import lock
 from bt_actions.ros.suspended import Suspended
-from bt_actions.servers.stalls import Standstill
+from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic.shared import lock
 from bt_actions.utilities.plain_text import raised
 
 AT_LEAST_EVERY = 0.2
@@ -35,7 +35,7 @@ class Attended(Protocol):
 
 
 _collector = Collector()
-standstill = Standstill(_collector.take, Suspended().take)
+stalls = Stalls(_collector.take, Suspended().take)
 """Of this process while a goal is open; under the lock."""
 _open: set[Attended] = set()
 _bell = threading.Condition(lock)
@@ -43,23 +43,23 @@ _thread: threading.Thread | None = None
 _wakes_at = 0.0
 
 
-def mind(line: Attended) -> None:
-    """Mind this line until it is forgotten; the caller holds the lock."""
+def mind(endpoint: Attended) -> None:
+    """Mind this endpoint until it is forgotten; the caller holds the lock."""
     global _thread
-    _open.add(line)
+    _open.add(endpoint)
     if _thread is None or not _thread.is_alive():
-        standstill.lives(time.monotonic())
+        stalls.lives(time.monotonic())
         _thread = threading.Thread(target=_attend, name="bt_actions-alarm", daemon=True)
         _thread.start()
 
 
-def forget(line: Attended) -> None:
-    """Stop minding this line; the caller holds the lock."""
-    _open.discard(line)
+def forget(endpoint: Attended) -> None:
+    """Stop minding this endpoint; the caller holds the lock."""
+    _open.discard(endpoint)
 
 
 def minded() -> list[Attended]:
-    """Return the lines with open goals."""
+    """Return the endpoints with open goals."""
     with lock:
         return list(_open)
 
@@ -70,14 +70,14 @@ def disown() -> None:
     _open.clear()
     _thread = None
     _collector.unwatch()
-    standstill.rests(time.monotonic())
+    stalls.rests(time.monotonic())
 
 
 def appears() -> None:
     """Take note that this process begins to see others now; the caller holds the lock."""
     if _thread is None:
-        standstill.lives(time.monotonic())  # who was there before has rested until now
-        standstill.rests(time.monotonic())
+        stalls.lives(time.monotonic())  # who was there before has rested until now
+        stalls.rests(time.monotonic())
 
 
 def wake_by(moment: float) -> None:
@@ -104,16 +104,16 @@ def _attend_until_idle() -> None:
             wait, _wakes_at = AT_LEAST_EVERY, math.inf  # who asks to be woken meanwhile is heard
             if _open:
                 busy_at = time.monotonic()
-            for line in list(_open):
-                standstill.lives(time.monotonic())  # each look takes its time
+            for endpoint in list(_open):
+                stalls.lives(time.monotonic())  # each look takes its time
                 try:
-                    wait = min(wait, line.attend(time.monotonic()))
+                    wait = min(wait, endpoint.attend(time.monotonic()))
                 except Exception as error:  # noqa: BLE001 - the last guard of every deadline
-                    log.error(f"{line!r}: {raised(error)}")
+                    log.error(f"{endpoint!r}: {raised(error)}")
             now = time.monotonic()
             _wakes_at = min(now + wait, _wakes_at)
-            standstill.lives(now)
+            stalls.lives(now)
             _bell.wait(max(SHORTEST, _wakes_at - now))
-            standstill.lives(time.monotonic())
-        standstill.rests(time.monotonic())
+            stalls.lives(time.monotonic())
+        stalls.rests(time.monotonic())
         _thread = None

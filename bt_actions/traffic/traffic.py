@@ -29,24 +29,24 @@ from bt_actions.goals.ids import new_goal_id
 from bt_actions.goals.policy import Busy, End, Timeouts
 from bt_actions.goals.resources import Answer
 from bt_actions.goals.terms import Event, State
-from bt_actions.ros import alarm, shared
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
-from bt_actions.ros.draining import drain
-from bt_actions.ros.line import Line
 from bt_actions.ros.log import log
-from bt_actions.ros.shared import (
+from bt_actions.ros.signals import ended_by_signals, insists
+from bt_actions.servers.presence import Server
+from bt_actions.traffic import alarm, shared
+from bt_actions.traffic.drain import drain
+from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.shared import (
     Beginner,
     Change,
+    GoalHandle,
     Observer,
-    Ticket,
     changed,
     domain_of,
     ledger,
     lock,
 )
-from bt_actions.ros.signals import ended_by_signals, insists
-from bt_actions.servers.presence import Server
 from bt_actions.utilities.plain_text import in_words, raised
 
 IN_FLIGHT = 8
@@ -67,10 +67,10 @@ class _Participant:
     def __init__(self, before: _Participant | None) -> None:
         self.since = time.monotonic()
         """Since when it is known here; a new one is blind to nothing."""
-        now = alarm.standstill.long_times
-        self.long_standstills: int = now if before is None else before.long_standstills
-        """How often this process had stood still for long by then: it may be deaf where a line is
-        made after more of them."""
+        now = alarm.stalls.long_times
+        self.long_stalls: int = now if before is None else before.long_stalls
+        """How often this process had stood still for long by then: it may be deaf where an endpoint
+        is made after more of them."""
         self.nodes: weakref.WeakSet[Node] = weakref.WeakSet()
 
 
@@ -86,11 +86,11 @@ class Traffic:
             alarm.appears()
             seen = _contexts[node.context] = _Participant(seen)
         seen.nodes.add(node)
-        self.seen_since, self.long_standstills = seen.since, seen.long_standstills
+        self.seen_since, self.long_stalls = seen.since, seen.long_stalls
         self.made_at = time.monotonic()
         self._namespace = node.get_namespace().rstrip("/")
         self._name = node.get_name()
-        self._lines: dict[str, Line] = {}
+        self._endpoints: dict[str, ActionEndpoint] = {}
         self._warned_of: set[str] = set()
         self._observers: list[Observer] = []
 
@@ -104,26 +104,26 @@ class Traffic:
                 setattr(node, _ON_NODE, traffic)  # lives as long as the node does
             return traffic
 
-    def line(self, action_type: Any, action_name: str) -> Line:
-        """Return the shared line to an action, and count its user.
+    def endpoint(self, action_type: Any, action_name: str) -> ActionEndpoint:
+        """Return the shared endpoint to an action, and count its user.
 
         A remapping rule for the action's name has no effect, and is warned of. Raises ValueError
         for a name that ROS refuses, and TypeError when it is in use with another type.
         """
         name = expand_topic_name(action_name, self.node.get_name(), self.node.get_namespace())
         with lock:
-            line = self._lines.get(name)
-            if line is None:
+            endpoint = self._endpoints.get(name)
+            if endpoint is None:
                 self._warn_of_remapping(name)
-                line = self._lines[name] = Line(self, action_type, name)
-            elif line.action_type is not action_type:
+                endpoint = self._endpoints[name] = ActionEndpoint(self, action_type, name)
+            elif endpoint.action_type is not action_type:
                 raise TypeError(
-                    f"{name} is used with two types: {line.action_type.__module__}."
-                    f"{line.action_type.__name__} and {action_type.__module__}."
+                    f"{name} is used with two types: {endpoint.action_type.__module__}."
+                    f"{endpoint.action_type.__name__} and {action_type.__module__}."
                     f"{action_type.__name__}"
                 )
-            line.users += 1
-            return line
+            endpoint.users += 1
+            return endpoint
 
     def _warn_of_remapping(self, name: str) -> None:
         """Say it, once for a name, where a rule would have it another: ROS remaps no action."""
@@ -137,30 +137,30 @@ class Traffic:
                 f"its parts: {part}, cancel_goal, get_result, feedback and status"
             )
 
-    def leave(self, line: Line) -> None:
+    def leave(self, endpoint: ActionEndpoint) -> None:
         """Count a user of `line` off; with the last one, and no goal open, its client goes too."""
         with lock:
-            line.users -= 1
-            if line.users <= 0:
-                line.put_away()
-            self.drop_if_unused(line)
+            endpoint.users -= 1
+            if endpoint.users <= 0:
+                endpoint.park()
+            self.drop_if_unused(endpoint)
 
-    def drop_if_unused(self, line: Line) -> None:
-        """Destroy the client of a line that has no user and no open goal.
+    def drop_if_unused(self, endpoint: ActionEndpoint) -> None:
+        """Destroy the client of an endpoint that has no user and no open goal.
 
         Not before it has delivered all: a second server may have taken the last goal, too.
         """
-        unused = line.users <= 0 and not line.goals and not line.client.has_more
-        if unused and self._lines.get(line.name) is line:
-            del self._lines[line.name]
-            line.close()
+        unused = endpoint.users <= 0 and not endpoint.goals and not endpoint.client.has_more
+        if unused and self._endpoints.get(endpoint.name) is endpoint:
+            del self._endpoints[endpoint.name]
+            endpoint.close()
 
     # A leaf's calls
 
     @staticmethod
     @contextlib.contextmanager
     def begun_by(who: Beginner) -> Iterator[None]:
-        """Have what this thread begins meanwhile known as begun by `who` (Ticket.begun_by)."""
+        """Have what this thread begins meanwhile known as begun by `who` (GoalHandle.begun_by)."""
         before = _who_begins()
         _begins.who = who
         try:
@@ -170,7 +170,7 @@ class Traffic:
 
     def begin(
         self,
-        line: Line,
+        endpoint: ActionEndpoint,
         owner: Any,
         timeouts: Timeouts,
         resources: frozenset[str],
@@ -179,7 +179,7 @@ class Traffic:
         attempt: int = 1,
         keeps_feedback: bool = False,
         settles: Callable[[Any], bool] = lambda result: True,
-    ) -> Ticket:
+    ) -> GoalHandle:
         """Begin a goal: it queues for its resources. It is sent by `advance`.
 
         A resource is named as an action is: what is relative is in the node's namespace. `settles`
@@ -189,22 +189,24 @@ class Traffic:
             now = self.clocks.now()
             held = frozenset(self._full_name(each) for each in resources)
             goal = Goal(
-                new_goal_id(), line.name, timeouts, now,
+                new_goal_id(), endpoint.name, timeouts, now,
                 resources=held, busy=busy, settles=settles,
             )  # fmt: skip
             who = _who_begins()
-            ticket = Ticket(goal, line, self, owner, owner.name, who, attempt, keeps_feedback)
-            ticket.begun_at = time.monotonic()
-            line.goals[goal.id] = ticket
-            alarm.mind(line)
-            answer = self.domain.resources.request(ticket, goal.resources, busy)
+            handle = GoalHandle(
+                goal, endpoint, self, owner, owner.name, who, attempt, keeps_feedback
+            )
+            handle.begun_at = time.monotonic()
+            endpoint.goals[goal.id] = handle
+            alarm.mind(endpoint)
+            answer = self.domain.resources.request(handle, goal.resources, busy)
             if answer is Answer.GRANTED:
-                line.tell(ticket, Event.GRANTED)
+                endpoint.tell(handle, Event.GRANTED)
             elif answer is Answer.TAKEN:
-                line.tell(ticket, Event.TAKEN)
+                endpoint.tell(handle, Event.TAKEN)
             else:
-                self.note(ticket)
-            return ticket
+                self.note(handle)
+            return handle
 
     def _full_name(self, name: str) -> str:
         """Expand the name of a resource, which may be what ROS would refuse as a name."""
@@ -215,95 +217,107 @@ class Traffic:
             return f"{self._namespace}/{self._name}{name[1:]}"
         return f"{self._namespace}/{name}"
 
-    def advance(self, ticket: Ticket, make_message: Callable[[], Any]) -> None:
+    def advance(self, handle: GoalHandle, make_message: Callable[[], Any]) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
 
         `make_message` is called without the lock, on the caller's thread, at most once a call (the
         server may go meanwhile); what it raises makes the goal INVALID_GOAL.
         """
-        line = ticket.line
+        endpoint = handle.endpoint
         with lock:
-            if ticket.goal.state is State.DONE:
+            if handle.goal.state is State.DONE:
                 return
-            line.poll(ticket)
-            if _closing or line.given_up(ticket):
-                line.tell(ticket, Event.INTERRUPTED)
-            if ticket.goal.state is not State.WAITING_FOR_SERVER:
+            endpoint.poll(handle)
+            if _closing or endpoint.given_up(handle):
+                endpoint.tell(handle, Event.INTERRUPTED)
+            if handle.goal.state is not State.WAITING_FOR_SERVER:
                 return
-            if line.look(time.monotonic()) is Server.AMBIGUOUS:
-                line.tell(ticket, Event.SERVER_AMBIGUOUS)
-            if not self._may_send(ticket):
+            if endpoint.look(time.monotonic()) is Server.AMBIGUOUS:
+                endpoint.tell(handle, Event.SERVER_AMBIGUOUS)
+            if not self._may_send(handle):
                 return
         try:
             message = make_message()
         except Exception as error:  # noqa: BLE001 - the user's: any
-            line.tell(ticket, Event.INVALID, in_words(error))  # which may run code of the user's
+            endpoint.tell(
+                handle, Event.INVALID, in_words(error)
+            )  # which may run code of the user's
             return
         with lock:
-            if self._may_send(ticket):
-                line.tell(ticket, Event.SERVER_READY, message=message)
+            if self._may_send(handle):
+                endpoint.tell(handle, Event.SERVER_READY, message=message)
 
     @staticmethod
-    def is_settled(ticket: Ticket) -> bool:
+    def is_settled(handle: GoalHandle) -> bool:
         """Whether its outcome is decided, and what is known of its end then is, too."""
         with lock:  # a goal takes one step at a time
-            return ticket.goal.outcome is not None
+            return handle.goal.outcome is not None
 
-    def _may_send(self, ticket: Ticket) -> bool:
-        line = ticket.line
+    def _may_send(self, handle: GoalHandle) -> bool:
+        endpoint = handle.endpoint
         return (
-            ticket.goal.state is State.WAITING_FOR_SERVER
-            and not (_closing or line.given_up(ticket))
-            and not line.way.keeps(time.monotonic())
-            and not line.orphaned
+            handle.goal.state is State.WAITING_FOR_SERVER
+            and not (_closing or endpoint.given_up(handle))
+            and not endpoint.route.holds_back(time.monotonic())
+            and not endpoint.orphaned
             and is_valid(self.node)
-            and line.watch.state(time.monotonic()) is Server.READY
-            and not line.may_overtake(ticket)
-            and not self._in_the_way_of(ticket)
-            and line.in_flight() < IN_FLIGHT
+            and endpoint.watch.state(time.monotonic()) is Server.READY
+            and not endpoint.may_overtake(handle)
+            and not self._conflicts(handle)
+            and endpoint.in_flight() < IN_FLIGHT
         )
 
-    def _in_the_way_of(self, ticket: Ticket) -> bool:
+    def _conflicts(self, handle: GoalHandle) -> bool:
         """Whether a goal that any node of this process gave up must be canceled first.
 
         One that was lost holds nothing any more; should its server be back, it is canceled first.
         """
-        lines = ticket.line.neighbors()
-        left = {(line.name, line.action_type) for line in lines if line.has_lost(ticket)}
-        if ticket.goal.busy in (Busy.WAIT, Busy.FAIL):
-            remembered = self.domain.lost_with(ticket.goal.resources)
+        endpoints = handle.endpoint.neighbors()
+        left = {
+            (endpoint.name, endpoint.action_type)
+            for endpoint in endpoints
+            if endpoint.has_lost(handle)
+        }
+        if handle.goal.busy in (Busy.WAIT, Busy.FAIL):
+            remembered = self.domain.lost_with(handle.goal.resources)
             left.update(remembered)
             for action, action_type in remembered:
-                if action not in self._lines:  # another's server, which nobody speaks to any more
-                    self._lines[action] = Line(self, action_type, action)
+                if (
+                    action not in self._endpoints
+                ):  # another's server, which nobody speaks to any more
+                    self._endpoints[action] = ActionEndpoint(self, action_type, action)
         now = time.monotonic()
-        ours = [line for line in self._lines.values() if (line.name, line.action_type) in left]
-        for line in {*lines, *ours}:  # all of them first: one may see what another has lost
-            if line.has_lost(ticket) or line in ours:
-                line.look(now)
+        ours = [
+            endpoint
+            for endpoint in self._endpoints.values()
+            if (endpoint.name, endpoint.action_type) in left
+        ]
+        for endpoint in {*endpoints, *ours}:  # all of them first: one may see what another has lost
+            if endpoint.has_lost(handle) or endpoint in ours:
+                endpoint.look(now)
         return any(
-            line.in_the_way_of(ticket) or line.may_come_back_for(ticket, now)
-            for line in ticket.line.neighbors()
+            endpoint.conflicts_with(handle) or endpoint.may_come_back_for(handle, now)
+            for endpoint in handle.endpoint.neighbors()
         )
 
-    def interrupt(self, ticket: Ticket) -> None:
+    def interrupt(self, handle: GoalHandle) -> None:
         """The tree no longer wants it. Returns at once; the goal is drained."""
-        ticket.line.tell(ticket, Event.INTERRUPTED)
+        handle.endpoint.tell(handle, Event.INTERRUPTED)
 
-    def pause(self, tickets: Iterable[Ticket]) -> None:
+    def pause(self, handles: Iterable[GoalHandle]) -> None:
         """Stop the deadlines of goals that were not sent yet."""
         with lock:
-            for ticket in tickets:
-                if not ticket.goal.sent and ticket.paused_at is None:
-                    ticket.paused_at = time.monotonic()
+            for handle in handles:
+                if not handle.goal.sent and handle.paused_at is None:
+                    handle.paused_at = time.monotonic()
 
-    def resume(self, tickets: Iterable[Ticket]) -> None:
+    def resume(self, handles: Iterable[GoalHandle]) -> None:
         """Let the deadlines run on, with what remained of them."""
         with lock:
-            for ticket in tickets:
-                if ticket.paused_at is not None:
-                    ticket.goal.postpone(time.monotonic() - ticket.paused_at)
-                    ticket.paused_at = None
+            for handle in handles:
+                if handle.paused_at is not None:
+                    handle.goal.postpone(time.monotonic() - handle.paused_at)
+                    handle.paused_at = None
 
     # Who watches
 
@@ -317,23 +331,23 @@ class Traffic:
         with lock, contextlib.suppress(ValueError):
             self._observers.remove(observer)
 
-    def note(self, ticket: Ticket) -> None:
+    def note(self, handle: GoalHandle) -> None:
         """Report a goal's change to the log and the observers."""
-        goal = ticket.goal
+        goal = handle.goal
         unknown = goal.outcome is not None and goal.end is End.UNKNOWN
-        if unknown and not ticket.told_unknown:
-            if ticket.told_gone:
+        if unknown and not handle.told_unknown:
+            if handle.told_gone:
                 log.warning(
                     f"{goal!r}: its server is back; canceling it, should it still run there"
                 )
             else:
                 why = f"{goal.reason}{goal.cancel_said}"
                 log.error(f"{goal!r}: not accounted for, it may still be running: {why}")
-        elif not unknown and ticket.told_unknown:
+        elif not unknown and handle.told_unknown:
             log.info(f"{goal!r}: accounted for at last")
-        ticket.told_unknown, ticket.told_gone = unknown, goal.end is End.SERVER_GONE
+        handle.told_unknown, handle.told_gone = unknown, goal.end is End.SERVER_GONE
         now = self.clocks.now().ros
-        self.notify(Change(now, ticket, goal.state, goal.outcome, goal.end, goal.reason))
+        self.notify(Change(now, handle, goal.state, goal.outcome, goal.end, goal.reason))
 
     def notify(self, change: Change | None) -> None:
         """Tell the observers, and whoever waits."""
@@ -348,16 +362,20 @@ class Traffic:
     def destroy(self) -> None:
         """Drain what is still open and destroy the clients; nobody may spin the node any more."""
         with lock:
-            left = [ticket for line in self._lines.values() for ticket in line.goals.values()]
+            left = [
+                handle
+                for endpoint in self._endpoints.values()
+                for handle in endpoint.goals.values()
+            ]
         drain(left)
         with lock:
-            lines, self._lines = list(self._lines.values()), {}
-            for line in lines:
-                line.put_away(all_of_them=True)
-                for ticket in list(line.goals.values()):
-                    line.tell(ticket, Event.CLOSED)
-                line.close()
-                alarm.forget(line)
+            endpoints, self._endpoints = list(self._endpoints.values()), {}
+            for endpoint in endpoints:
+                endpoint.park(all_of_them=True)
+                for handle in list(endpoint.goals.values()):
+                    endpoint.tell(handle, Event.PROCESS_EXITING)
+                endpoint.close()
+                alarm.forget(endpoint)
             setattr(self.node, _ON_NODE, None)
             ledger.close()
 
@@ -383,15 +401,17 @@ def close_process() -> None:
     with contextlib.suppress(KeyboardInterrupt), ended_by_signals(hurry):
         with lock:
             _closing = True
-            lines = [line for line in alarm.minded() if isinstance(line, Line)]
-            tickets = [ticket for line in lines for ticket in line.goals.values()]
-        left = [ticket for ticket in tickets if not ticket.goal.lost or ticket.looked_out_for]
+            endpoints = [
+                endpoint for endpoint in alarm.minded() if isinstance(endpoint, ActionEndpoint)
+            ]
+            handles = [handle for endpoint in endpoints for handle in endpoint.goals.values()]
+        left = [handle for handle in handles if not handle.goal.lost or handle.looked_out_for]
         try:
             drain(left, lambda: hurried or insists())
         finally:
-            for ticket in left:
-                if not ticket.is_over:
-                    log.error(f"{ticket.goal!r}: the process ends and cannot account for it")
+            for handle in left:
+                if not handle.is_over:
+                    log.error(f"{handle.goal!r}: the process ends and cannot account for it")
             with lock:
                 ledger.close()
             log.flush()

@@ -15,13 +15,15 @@ from typing import Any
 import pytest
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
-from bt_actions.ros import alarm, lookout, way
+from bt_actions.ros import rediscovery
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.graph import enclave
 from bt_actions.ros.log import log
-from bt_actions.ros.lookout import Sight
-from bt_actions.ros.shared import lock
-from bt_actions.servers.stalls import Standstill
+from bt_actions.ros.rediscovery import SecondParticipant
+from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic import alarm
+from bt_actions.traffic import route as way
+from bt_actions.traffic.shared import lock
 from tests.support.trees import in_turn
 from tests.support.waiting import holds_for, until
 
@@ -35,13 +37,13 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
     shows = way.servers
 
     def blind(leaf: MoveRobot) -> None:
-        action = leaf._line.name
+        action = leaf._endpoint.name
         monkeypatch.setattr(
             way,
             "servers",
             lambda of, about: frozenset() if of is node and about == action else shows(of, about),
         )
-        client = leaf._line.client
+        client = leaf._endpoint.client
         monkeypatch.setattr(client, "server_is_ready", lambda: False)
         monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
         monkeypatch.setattr(client, "take_data", lambda: None)
@@ -53,15 +55,15 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
 @pytest.fixture(autouse=True)
 def nothing_else_is_missed(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """What the tests before this have lost is not looked for meanwhile."""
-    misses = way.Way.misses
-    monkeypatch.setattr(way.Way, "misses", lambda self: self.name == name and misses(self))
+    misses = way.Route.misses
+    monkeypatch.setattr(way.Route, "misses", lambda self: self.name == name and misses(self))
     until(nobody_looks, 10.0)
 
 
 def nobody_looks() -> bool:
     """Nobody has anything to look for, and no participant is being closed."""
     threads = [each for each in threading.enumerate() if each.name == "bt_actions-lookout"]
-    known = lookout._lookouts.values()
+    known = rediscovery._lookouts.values()
     return len(threads) <= len(known) and not any(each._missing for each in known)
 
 
@@ -82,7 +84,7 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     assert journal.ends() == ["canceled", "succeeded"]
     assert journal.max_live == 1
     until(nobody_looks)
-    until(lambda: not lookout._sights, what="the participant is taken away with its last line")
+    until(lambda: not rediscovery._sights, what="the participant is taken away with its last line")
 
 
 @pytest.mark.parametrize("canceled", [False, True], ids=["it ends", "it is canceled"])
@@ -90,24 +92,24 @@ def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
     serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, canceled: bool
 ) -> None:
     """What the node asks gets lost, and what it is told, though the server is in sight."""
-    monkeypatch.setattr(alarm, "standstill", Standstill())  # that of the tests is none
+    monkeypatch.setattr(alarm, "stalls", Stalls())  # that of the tests is none
     journal = serve()
     leaf = MoveRobot("m", 60.0 if canceled else 4.0, action_name=name, timeout=Timeouts(cancel=2.0))
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
         until(lambda: leaf.progress().feedback is not None)
-        client = leaf._line.client
+        client = leaf._endpoint.client
         with lock:
             for request in ("cancel", "ask_result", "probe"):
-                monkeypatch.setattr(client, request, lambda *_: client.hearing.asked(now()))
+                monkeypatch.setattr(client, request, lambda *_: client.reachability.asked(now()))
             monkeypatch.setattr(client, "take_data", lambda: None)
             monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
-            monkeypatch.setattr(alarm.standstill, "_lived_at", now() - 5.0)
+            monkeypatch.setattr(alarm.stalls, "_lived_at", now() - 5.0)
         if canceled:
             runner.interrupt()
         runner.wait(40.0)
         assert leaf.end is (End.CANCELED if canceled else End.SUCCEEDED)
-        assert leaf._line.client is not client
+        assert leaf._endpoint.client is not client
     assert journal.ends() == ["canceled" if canceled else "succeeded"]
     until(nobody_looks)
 
@@ -141,15 +143,15 @@ def test_nobody_looks_where_nothing_was_ever_lost(
 def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
     name: str, node: Any, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    def refused(_domain: int, _enclave: str) -> Sight:
+    def refused(_domain: int, _enclave: str) -> SecondParticipant:
         raise OSError("no space left")
 
     monkeypatch.setattr(_domain(node), "lost_sight", True)
-    for each in lookout._lookouts.values():
+    for each in rediscovery._lookouts.values():
         monkeypatch.setattr(each, "_told", False)
-    monkeypatch.setattr(lookout, "Sight", refused)
-    monkeypatch.setattr(lookout, "FIRST_AFTER", 0.01)
-    monkeypatch.setattr(lookout, "PAUSE", 0.01)
+    monkeypatch.setattr(rediscovery, "Sight", refused)
+    monkeypatch.setattr(rediscovery, "FIRST_AFTER", 0.01)
+    monkeypatch.setattr(rediscovery, "PAUSE", 0.01)
     leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=1.5))
     with TreeRunner(leaf, node=node) as runner:
         runner.run(5.0)
@@ -160,25 +162,25 @@ def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
 
 
 def _domain(node: Any) -> Any:
-    from bt_actions.ros.traffic import Traffic
+    from bt_actions.traffic.traffic import Traffic
 
     return Traffic.of(node).domain
 
 
 class TestMoves:
-    """Lines that are moved by hand, as the lookout moves them."""
+    """Lines that are moved by hand, as the rediscovery moves them."""
 
     @pytest.fixture
     def moved(self, serve: Any, name: str, node: Any) -> Iterator[Any]:
-        """The way of a line that is in a participant of its own."""
+        """The way of an endpoint that is in a participant of its own."""
         serve()
         leaf = MoveRobot("keeps the line", 0.1, action_name=name)
         leaf.setup(node=node)
-        sight = Sight(_domain(node).number, "/")
+        sight = SecondParticipant(_domain(node).number, "/")
         sight.looking = False
         with lock:
-            leaf._line.way.move_to(sight, leaf._line.way.client_in(sight))
-        yield leaf._line.way
+            leaf._endpoint.route.move_to(sight, leaf._endpoint.route.client_in(sight))
+        yield leaf._endpoint.route
         leaf.shutdown()
         until(lambda: sight.closed)
 
@@ -195,7 +197,7 @@ class TestMoves:
     def test_a_participant_that_is_used_again_is_not_closed(
         self, moved: Any, name: str, node: Any
     ) -> None:
-        sight = moved.sight
+        sight = moved.second
         with lock:  # the thread that closes it has to wait
             sight.left_by(moved)
             sight.users.add(moved)
@@ -206,24 +208,24 @@ class TestMoves:
     def test_a_line_whose_participant_is_gone_goes_back_to_its_node(
         self, moved: Any, name: str, node: Any
     ) -> None:
-        sight = moved.sight
+        sight = moved.second
         sight.users.clear()
         sight.close()
         self.goes(name, node)
-        assert moved.sight is None
-        assert not moved._line.orphaned
+        assert moved.second is None
+        assert not moved._endpoint.orphaned
 
     def test_without_another_thread_no_resource_is_lost(
         self, moved: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        sight = moved.sight
+        sight = moved.second
 
         def no_more(_thread: threading.Thread) -> None:
             raise RuntimeError("can't start new thread")
 
         with lock, monkeypatch.context() as patch:
             patch.setattr(threading.Thread, "start", no_more)
-            line = moved._line
+            line = moved._endpoint
             moved._go_on_with(ActionClient(node, line.action_type, name, line), None)
         assert not sight.closed
         self.goes(name, node)
@@ -246,8 +248,8 @@ def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
         def is_waited_for(self) -> bool:
             return True
 
-        def client_in(self, sight: Sight) -> Any:
-            self.sight = sight
+        def client_in(self, sight: SecondParticipant) -> Any:
+            self.second = sight
             self.tried += 1
             return self
 
@@ -257,29 +259,29 @@ def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
         def prefers(self, client: Any) -> bool:
             return True
 
-        def move_to(self, sight: Sight, client: Any) -> None:
+        def move_to(self, sight: SecondParticipant, client: Any) -> None:
             sight.users.add(self)
             sight.left_by(self)
 
         def destroy(self) -> None:
-            assert not self.sight.closed
+            assert not self.second.closed
 
-    monkeypatch.setattr(lookout, "LASTS", 3.0)
+    monkeypatch.setattr(rediscovery, "LASTS", 3.0)
     service = node.create_service(Trigger, f"{name}/_action/send_goal", print)
     seeker = Seeker()
     seeker.name = name
-    looks = lookout.Lookout(_domain(node).number, "/")
+    looks = rediscovery.Rediscovery(_domain(node).number, "/")
     looks._missing = {seeker}
     assert looks._look() is False
     assert seeker.tried > 1
-    assert seeker.sight.closed
+    assert seeker.second.closed
     node.destroy_service(service)
 
 
 def test_an_action_that_had_a_server_once_is_looked_for(
     serve: Any, name: str, node: Any, blind: Blind, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also by a line that is newer than the loss, where no other line saw it."""
+    """Also by an endpoint that is newer than the loss, where no other endpoint saw it."""
     serve()
     monkeypatch.setattr(_domain(node), "lost_sight", False)
     for again in (False, True):
@@ -301,18 +303,18 @@ def test_whoever_else_reads_goal_requests_moves_nobody(
     from std_srvs.srv import Trigger
 
     monkeypatch.setattr(_domain(node), "lost_sight", True)
-    monkeypatch.setattr(lookout, "FIRST_AFTER", 0.1)
+    monkeypatch.setattr(rediscovery, "FIRST_AFTER", 0.1)
     tried: list[Any] = []
     monkeypatch.setattr(
-        way.Way,
+        way.Route,
         "client_in",
         lambda self, sight: (
             tried.append(self)
-            or ActionClient(sight.node, self._line.action_type, self.name, self._line)
+            or ActionClient(sight.node, self._endpoint.action_type, self.name, self._endpoint)
         ),
     )
     moved: list[Any] = []
-    monkeypatch.setattr(way.Way, "move_to", lambda *who: moved.append(who))
+    monkeypatch.setattr(way.Route, "move_to", lambda *who: moved.append(who))
     context = Context()  # within one participant, rmw_fastrtps refuses a second type
     context.init(domain_id=_domain(node).number)
     stranger = Node("stranger", context=context)
@@ -337,15 +339,15 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     from rclpy.node import Node
 
     enclaves = list[str]()
-    monkeypatch.setattr(way.Way, "misses", lambda self: self.name == name)
+    monkeypatch.setattr(way.Route, "misses", lambda self: self.name == name)
     monkeypatch.setattr(way, "look_for", lambda *to, at_once: enclaves.append(to[2]))
     context = Context()
     context.init(args=["--ros-args", flag, "/kitchen/robot"], domain_id=domain)
     leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
     leaf.setup(node=secure)
     with lock:
-        leaf._line.way.seek(now())
-    sight = Sight(domain, enclaves[0])
+        leaf._endpoint.route.seek(now())
+    sight = SecondParticipant(domain, enclaves[0])
     sight.looking = False
     assert {enclave(secure), enclave(sight.node)} == {"/kitchen/robot"}
     sight.close()
@@ -366,14 +368,14 @@ def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
     remapped = Node("remapped", context=context)
     leaf = MoveRobot("m", 0.1, action_name=name)
     leaf.setup(node=remapped)
-    leaf._line.traffic.domain.lost_sight = True
-    leaf._line.traffic.seen_since -= way.TOO_NEW
+    leaf._endpoint.traffic.domain.lost_sight = True
+    leaf._endpoint.traffic.seen_since -= way.TOO_NEW
     with lock:
-        leaf._line.goals[b"waits"] = SimpleNamespace(goal=SimpleNamespace(state=None))
-        assert not leaf._line.way.misses()
-        leaf._line.way._remapped = False
-        assert leaf._line.way.misses()
-        leaf._line.goals.clear()
+        leaf._endpoint.goals[b"waits"] = SimpleNamespace(goal=SimpleNamespace(state=None))
+        assert not leaf._endpoint.route.misses()
+        leaf._endpoint.route._remapped = False
+        assert leaf._endpoint.route.misses()
+        leaf._endpoint.goals.clear()
     leaf.shutdown()
     remapped.destroy_node()
     context.shutdown()
@@ -382,7 +384,7 @@ def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
 def test_without_a_pause_to_break_off_a_look_begins_as_soon_as_ever() -> None:
     """Not after the first pause, and then another."""
 
-    class Looks(lookout.Lookout):
+    class Looks(rediscovery.Rediscovery):
         def _wait(self, pause: float) -> None:
             pauses.append(pause)
 
@@ -395,11 +397,11 @@ def test_without_a_pause_to_break_off_a_look_begins_as_soon_as_ever() -> None:
         looks.add(Missing(), at_once=True)  # type: ignore[arg-type]
     with pytest.raises(StopIteration):
         looks._run()
-    assert pauses == [lookout.FIRST_AFTER]
+    assert pauses == [rediscovery.FIRST_AFTER]
 
 
 class Missing:
-    """A line that nobody waits for."""
+    """An endpoint that nobody waits for."""
 
     def misses(self) -> bool:
         return True
@@ -409,7 +411,7 @@ class Missing:
 
 
 def test_who_is_in_doubt_waits_for_no_pause_that_others_have_reached() -> None:
-    looks = lookout.Lookout(0, "/")
+    looks = rediscovery.Rediscovery(0, "/")
     first, second = Missing(), Missing()
     looks._missing = {first}  # type: ignore[arg-type]
     looks._thread = threading.current_thread()

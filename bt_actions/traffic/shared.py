@@ -1,4 +1,4 @@
-"""What all action traffic of this process shares: the one lock, the goals' tickets, the resources.
+"""What all action traffic of this process shares: the one lock, the goals' handles, the resources.
 
 Under the lock nothing waits, and no code of the user's runs. It is taken before a client's own
 lock, never after. Nothing is decided or sent here.
@@ -17,14 +17,14 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import State
 from bt_actions.recovery.ledger import Ledger
-from bt_actions.ros.cancels import Cancels
 from bt_actions.ros.log import log
-from bt_actions.servers.replies import Testimony
+from bt_actions.servers.replies import Replies
 from bt_actions.servers.stalls import Leniency
+from bt_actions.traffic.cancel_queue import Cancels
 
 if TYPE_CHECKING:
-    from bt_actions.ros.line import Line
-    from bt_actions.ros.traffic import Traffic
+    from bt_actions.traffic.endpoint import ActionEndpoint
+    from bt_actions.traffic.traffic import Traffic
 
 NEVER = float("-inf")
 FEEDBACK_KEPT = 100
@@ -46,23 +46,23 @@ class Domain:
     """What all nodes of this process in one ROS domain share."""
 
     def __init__(self, number: int) -> None:
-        self.resources: Resources[Ticket] = Resources()
+        self.resources: Resources[GoalHandle] = Resources()
         self.number = number
         self.lost_sight = False
         """A server that was in sight is not any more: what else its process serves may not be."""
         self.known: set[tuple[str, Any]] = set()
         """Names and types of the actions that had a server once."""
-        self._lost: dict[tuple[str, Any], list[Ticket]] = {}
+        self._lost: dict[tuple[str, Any], list[GoalHandle]] = {}
         self._cancels: dict[tuple[str, Any], Cancels] = {}
 
     def cancels_at(self, action: str, action_type: Any) -> Cancels:
         """Return the cancel requests of this process to an action."""
         return self._cancels.setdefault((action, action_type), Cancels())
 
-    def keep_lost(self, action: str, action_type: Any, ticket: Ticket) -> None:
-        """Remember a lost goal whose line goes: its server may be back for the next one."""
+    def keep_lost(self, action: str, action_type: Any, handle: GoalHandle) -> None:
+        """Remember a lost goal whose endpoint goes: its server may be back for the next one."""
         kept = self._lost.setdefault((action, action_type), [])
-        kept.append(ticket)
+        kept.append(handle)
         for forgotten in kept[:-LOST_KEPT]:
             ledger.strike(forgotten.goal.id)
         del kept[:-LOST_KEPT]
@@ -72,11 +72,11 @@ class Domain:
         return [
             action
             for action, kept in self._lost.items()
-            if any(ticket.goal.resources & resources for ticket in kept)
+            if any(handle.goal.resources & resources for handle in kept)
         ]
 
-    def take_lost(self, action: str, action_type: Any) -> list[Ticket]:
-        """Give them to a new line."""
+    def take_lost(self, action: str, action_type: Any) -> list[GoalHandle]:
+        """Give them to a new endpoint."""
         return self._lost.pop((action, action_type), [])
 
 
@@ -113,12 +113,12 @@ class Beginner(Protocol):
 
 
 @dataclass(eq=False, slots=True)
-class Ticket:
+class GoalHandle:
     """A goal on its way, with what its owner and its server need to know."""
 
     goal: Goal
-    line: Line
-    """Where it is sent; should it be lost, the line that sees its server again takes it over."""
+    endpoint: ActionEndpoint
+    """Where it is sent; the endpoint that sees a lost goal's server again takes it over."""
     traffic: Traffic
     """Of the node that is told of its changes: where it was begun, or was adopted later."""
     owner: Any
@@ -130,14 +130,14 @@ class Ticket:
     attempt: int = 1
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
-    testimony: Testimony = field(init=False)
+    replies: Replies = field(init=False)
     told_unknown: bool = False
     """The log says that it is not accounted for; and later, on whatever node, that it is."""
     told_gone: bool = False
     look_out_left: float | None = None
     """Seconds for which a server that went away with it is looked out for yet; None: none did."""
     kept_since: float | None = None
-    """Since when it is not sent though a server is in sight (way.Way.keeps), in steady seconds;"""
+    """Since when it is not sent though a server is in sight (Route.holds_back), steady clock;"""
     kept_for: float = 0.0
     """and for how many seconds it was kept in all, which its deadline does not count."""
     paused_at: float | None = None
@@ -150,10 +150,10 @@ class Ticket:
     """With servers that are out of sight;"""
 
     spared: Leniency = field(init=False, default_factory=Leniency)
-    """and with a run that seems to have given it up. Both after standstills of this process."""
+    """and with a run that seems to have given it up. Both after stalls of this process."""
 
     def __post_init__(self) -> None:
-        self.testimony = Testimony(self.goal)
+        self.replies = Replies(self.goal)
 
     @property
     def given_up(self) -> bool:
@@ -183,7 +183,7 @@ class Change:
     """What an observer is told: a goal has a new state, outcome or end."""
 
     time: float
-    ticket: Ticket
+    handle: GoalHandle
     state: State
     outcome: Outcome | None
     end: End

@@ -28,15 +28,21 @@ from bt_actions.goals.terms import (
     Now,
     State,
 )
-from bt_actions.ros import alarm, shared, traffic
-from bt_actions.ros import line as module
-from bt_actions.ros.cancels import Cancels
-from bt_actions.ros.line import BESIDE, LEASE, LOOK_WHILE_RUNNING, SILENT_FOR, Line
-from bt_actions.ros.predecessors import Predecessors
-from bt_actions.ros.shared import FEEDBACK_KEPT, LOST_KEPT, Ticket, lock
-from bt_actions.ros.traffic import Traffic
 from bt_actions.servers.presence import PROBES_KEPT, Server, ServerWatch
-from bt_actions.servers.stalls import ANSWERS_TAKE_IN_ALL, AT_MOST, Leniency, Standstill
+from bt_actions.servers.stalls import ANSWERS_TAKE_IN_ALL, AT_MOST, Leniency, Stalls
+from bt_actions.traffic import alarm, shared, traffic
+from bt_actions.traffic import endpoint as module
+from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic.endpoint import (
+    BESIDE,
+    LEASE,
+    LOOK_WHILE_RUNNING,
+    SILENT_FOR,
+    ActionEndpoint,
+)
+from bt_actions.traffic.predecessors import Predecessors
+from bt_actions.traffic.shared import FEEDBACK_KEPT, LOST_KEPT, GoalHandle, lock
+from bt_actions.traffic.traffic import Traffic
 
 OURS, NEW = b"ours", b"new"
 
@@ -79,7 +85,7 @@ def test_a_lost_goal_goes_to_who_sees_more_of_its_server(
 ) -> None:
     line: Any = SimpleNamespace(watch=here)
     other: Any = SimpleNamespace(watch=there, orphaned=orphaned)
-    assert Line._sees_more_than(line, other, frozenset({OURS}), 2.0) is taken
+    assert ActionEndpoint._sees_more_than(line, other, frozenset({OURS}), 2.0) is taken
 
 
 def test_a_goal_that_was_left_is_waited_for_as_long_whoever_adopts_it(
@@ -87,20 +93,20 @@ def test_a_goal_that_was_left_is_waited_for_as_long_whoever_adopts_it(
 ) -> None:
     """Runners that are made one after the other, each of which ends before the lease does."""
     monkeypatch.setattr(alarm, "mind", lambda _: None)
-    ticket: Any = SimpleNamespace(
+    handle: Any = SimpleNamespace(
         traffic=None,
         begun_at=time.monotonic(),
         not_gone_before=module.NEVER,
         goal=SimpleNamespace(id=b"1"),
-        testimony=SimpleNamespace(taken_over=lambda: None),
+        replies=SimpleNamespace(taken_over=lambda: None),
     )
 
     def adopt() -> float:
-        domain = SimpleNamespace(take_lost=lambda *_: [ticket])
+        domain = SimpleNamespace(take_lost=lambda *_: [handle])
         traffic = SimpleNamespace(domain=domain, made_at=time.monotonic())
         line: Any = SimpleNamespace(traffic=traffic, name="/move", action_type=None, goals={})
-        Line._adopt(line)
-        until: float = ticket.not_gone_before
+        ActionEndpoint._adopt(line)
+        until: float = handle.not_gone_before
         return until
 
     began = time.monotonic()
@@ -118,10 +124,10 @@ def look(line: Any, seen: ServerWatch, now: float) -> None:
 
     line._looked_like, line._was_away = Server.ABSENT, False
     line.watch, line._observe = seen, observe
-    line._take_in = lambda now: Line._take_in(line, now)
-    line.traffic, line.way = SimpleNamespace(node=None), SimpleNamespace(come_home=lambda: True)
+    line._take_in = lambda now: ActionEndpoint._take_in(line, now)
+    line.traffic, line.route = SimpleNamespace(node=None), SimpleNamespace(fall_back=lambda: True)
     line.client = SimpleNamespace(closed=False)
-    Line.look(line, now)
+    ActionEndpoint.look(line, now)
 
 
 def test_an_answer_that_lies_there_counts_before_a_server_is_called_the_only_one(
@@ -153,9 +159,9 @@ def test_a_look_that_comes_late_decides_nothing_about_who_is_alone(
 def test_a_break_between_two_looks_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """What else comes back with the server is waited for."""
     monkeypatch.setattr(module, "is_valid", lambda _: True)
-    monkeypatch.setattr(Line, "_adopt", lambda _: None)
-    monkeypatch.setattr(Line, "_take_over", lambda *_: None)
-    line: Any = object.__new__(Line)
+    monkeypatch.setattr(ActionEndpoint, "_adopt", lambda _: None)
+    monkeypatch.setattr(ActionEndpoint, "_take_over", lambda *_: None)
+    line: Any = object.__new__(ActionEndpoint)
     domain = SimpleNamespace(lost_sight=False, known=set(), number=1)
     line.traffic = SimpleNamespace(node=None, notify=lambda _: None, domain=domain)
     line.name, line.action_type, line.goals, line.watch = "x", None, {}, ServerWatch()
@@ -163,11 +169,11 @@ def test_a_break_between_two_looks_is_one(monkeypatch: pytest.MonkeyPatch) -> No
     line._look_at, line._warned_crowd = 0.0, False
     shown = frozenset({OURS})
     line.client = SimpleNamespace(closed=False, server_is_ready=lambda: bool(shown))
-    line.way = SimpleNamespace(
+    line.route = SimpleNamespace(
         shown=lambda: shown,
         wants_question=lambda _: False,
         seek=lambda _: None,
-        keeps=lambda _: False,
+        holds_back=lambda _: False,
     )
     for now in (1.0, 1.2):
         line.look(now)
@@ -186,20 +192,20 @@ def test_a_line_without_goals_is_not_late(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(alarm, "forget", lambda _: None)
     traffic: Any = SimpleNamespace(drop_if_unused=lambda _: None)
     line: Any = SimpleNamespace(goals={}, _look_at=1.0, traffic=traffic, pump=lambda: None)
-    Line.close_book(line, SimpleNamespace(goal=SimpleNamespace(id=b"1")))  # type: ignore[arg-type]
+    ActionEndpoint.retire(line, SimpleNamespace(goal=SimpleNamespace(id=b"1")))  # type: ignore[arg-type]
     seen = watch(OURS, NEW)
     seen.probe_answered(0.5, 1)
     look(line, seen, 4.0)
     assert seen.alone
 
 
-STILL = Standstill()
+STILL = Stalls()
 """Of 1 s, which hides no server."""
 STILL.lives(0.0)
 STILL.lives(1.0)
 
 
-LONG = Standstill()
+LONG = Stalls()
 """Of 3 s, which may hide servers for 4."""
 LONG.lives(-1.8)
 LONG.lives(1.2)
@@ -214,33 +220,33 @@ def test_a_server_is_looked_out_for_as_long_as_it_would_be_seen(
     monkeypatch: pytest.MonkeyPatch, now: float, hidden: float, left: float
 ) -> None:
     still = SimpleNamespace(servers_take=lambda _: hidden)
-    monkeypatch.setattr(alarm, "standstill", still)
-    ticket: Any = SimpleNamespace(goal=SimpleNamespace(lost=True), look_out_left=3.0)
-    line: Any = SimpleNamespace(goals={b"1": ticket}, _looked_out_at=10.0)
-    Line._look_out(line, now)
-    assert ticket.look_out_left == pytest.approx(left)
+    monkeypatch.setattr(alarm, "stalls", still)
+    handle: Any = SimpleNamespace(goal=SimpleNamespace(lost=True), look_out_left=3.0)
+    line: Any = SimpleNamespace(goals={b"1": handle}, _looked_out_at=10.0)
+    ActionEndpoint._look_out(line, now)
+    assert handle.look_out_left == pytest.approx(left)
 
 
 def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -> None:
     """Nor does it while the tree is paused, which gives that time back itself."""
     given: list[float] = []
     goal = SimpleNamespace(state=State.WAITING_FOR_SERVER, postpone=given.append)
-    ticket: Any = SimpleNamespace(goal=goal, kept_since=None, kept_for=0.0)
-    keeps = True
-    line: Any = SimpleNamespace(way=SimpleNamespace(keeps=lambda _: keeps))
+    handle: Any = SimpleNamespace(goal=goal, kept_since=None, kept_for=0.0)
+    holds_back = True
+    line: Any = SimpleNamespace(way=SimpleNamespace(holds_back=lambda _: holds_back))
     for now in (1.0, 1.2, 1.5):
-        Line._give_back_time(line, ticket, now)
-    keeps = False
-    Line._give_back_time(line, ticket, 1.6)
-    Line._give_back_time(line, ticket, 9.0)
+        ActionEndpoint._give_back_time(line, handle, now)
+    holds_back = False
+    ActionEndpoint._give_back_time(line, handle, 1.6)
+    ActionEndpoint._give_back_time(line, handle, 9.0)
     assert given == pytest.approx([0.2, 0.3, 0.1])
-    keeps = True
+    holds_back = True
     for now in (10.0, 10.1, 1000.0, 1000.1):
-        Line._give_back_time(line, ticket, now)
+        ActionEndpoint._give_back_time(line, handle, now)
     assert sum(given) == pytest.approx(HELD_AT_MOST), "and not for ever"
     goal.state = State.EXECUTING
-    Line._give_back_time(line, ticket, 9.1)
-    assert ticket.kept_since is None
+    ActionEndpoint._give_back_time(line, handle, 9.1)
+    assert handle.kept_since is None
 
 
 @pytest.mark.parametrize(
@@ -250,7 +256,7 @@ def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -
         (State.EXECUTING, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
         (State.WAITING_FOR_SERVER, LONG, 0.0, 4.0, HELD_AT_MOST),
         (State.EXECUTING, LONG, 0.0, 1.0, ANSWERS_TAKE_IN_ALL),
-        (State.EXECUTING, Standstill(), 5.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
+        (State.EXECUTING, Stalls(), 5.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
     ],
     ids=[
         "a server",
@@ -263,7 +269,7 @@ def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -
 def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
     monkeypatch: pytest.MonkeyPatch,
     state: State,
-    still: Standstill,
+    still: Stalls,
     doubt: float,
     seconds: float,
     in_all: float,
@@ -277,15 +283,15 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         is_parents=False,
         traffic=SimpleNamespace(clocks=clocks),
         pump=lambda: None,
-        way=SimpleNamespace(in_doubt=lambda _: doubt, keeps=lambda _: doubt > 0.0),
+        way=SimpleNamespace(in_doubt=lambda _: doubt, holds_back=lambda _: doubt > 0.0),
         _apply=lambda *_: None,
     )
-    line._bear_with = partial(Line._bear_with, line)
-    line._give_back_time = partial(Line._give_back_time, line)
-    ticket: Any = SimpleNamespace(goal=goal, paused_at=None, kept_since=None, kept_for=0.0)
+    line._bear_with = partial(ActionEndpoint._bear_with, line)
+    line._give_back_time = partial(ActionEndpoint._give_back_time, line)
+    handle: Any = SimpleNamespace(goal=goal, paused_at=None, kept_since=None, kept_for=0.0)
     with lock:  # an alarm that is still awake would live in it
-        monkeypatch.setattr(alarm, "standstill", copy.copy(still))
-        Line.poll(line, ticket)
+        monkeypatch.setattr(alarm, "stalls", copy.copy(still))
+        ActionEndpoint.poll(line, handle)
     assert held == [(pytest.approx(seconds), in_all)]
 
 
@@ -293,27 +299,29 @@ def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also where another one, which may have the goal too, is in sight."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
+    still = Stalls()
+    monkeypatch.setattr(alarm, "stalls", still)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
-    ticket: Any = SimpleNamespace(
-        testimony=SimpleNamespace(sent_to=frozenset({OURS, NEW})), hidden=Leniency()
+    handle: Any = SimpleNamespace(
+        replies=SimpleNamespace(sent_to=frozenset({OURS, NEW})), hidden=Leniency()
     )
     line: Any = SimpleNamespace(watch=watch(NEW))
     still.lives(moment := 10.0)
-    assert not Line._is_hidden(line, ticket)
+    assert not ActionEndpoint._is_hidden(line, handle)
     for _ in range(AT_MOST):
         still.lives(moment := moment + 3.0)
-        assert Line._is_hidden(line, ticket)
+        assert ActionEndpoint._is_hidden(line, handle)
     still.lives(moment := moment + 3.0)
-    assert not Line._is_hidden(line, ticket)
+    assert not ActionEndpoint._is_hidden(line, handle)
     for _ in range(50):
         still.lives(moment := moment + 0.1)
-    assert not Line._is_hidden(line, ticket), "a calm, in which the other may turn out a ghost"
+    assert not ActionEndpoint._is_hidden(line, handle), (
+        "a calm, in which the other may turn out a ghost"
+    )
     still.lives(moment := moment + 3.0)
-    assert Line._is_hidden(line, ticket)
+    assert ActionEndpoint._is_hidden(line, handle)
     line.watch = watch(OURS, NEW)
-    assert not Line._is_hidden(line, ticket)
+    assert not ActionEndpoint._is_hidden(line, handle)
 
 
 def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
@@ -330,34 +338,34 @@ def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
             asked.append(None)
             return True
 
-    still = Standstill()
+    still = Stalls()
     still.lives(time.monotonic() - 2.0)
-    monkeypatch.setattr(alarm, "standstill", still)
-    assert not Line.given_up(Asked())  # type: ignore[arg-type]
+    monkeypatch.setattr(alarm, "stalls", still)
+    assert not ActionEndpoint.given_up(Asked())  # type: ignore[arg-type]
     assert not asked
-    monkeypatch.setattr(alarm, "standstill", Standstill())
-    assert Line.given_up(Asked())  # type: ignore[arg-type]
+    monkeypatch.setattr(alarm, "stalls", Stalls())
+    assert ActionEndpoint.given_up(Asked())  # type: ignore[arg-type]
 
 
 def test_a_tick_that_stands_still_again_and_again_is_given_up_in_the_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It holds Python's lock for half a second at a time, say."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
+    still = Stalls()
+    monkeypatch.setattr(alarm, "stalls", still)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
-    ticket: Any = SimpleNamespace(given_up=True, spared=Leniency())
+    handle: Any = SimpleNamespace(given_up=True, spared=Leniency())
     still.lives(moment := 10.0)
     for _ in range(AT_MOST):
         still.lives(moment := moment + 0.5)
-        assert not Line.given_up(ticket)
+        assert not ActionEndpoint.given_up(handle)
     still.lives(moment := moment + 0.5)
-    assert Line.given_up(ticket)
+    assert ActionEndpoint.given_up(handle)
     for _ in range(20):
         still.lives(moment := moment + 0.1)
-    assert Line.given_up(ticket)
+    assert ActionEndpoint.given_up(handle)
     still.lives(moment := moment + 0.5)
-    assert not Line.given_up(ticket), "a new one"
+    assert not ActionEndpoint.given_up(handle), "a new one"
 
 
 def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(
@@ -374,17 +382,17 @@ def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(
     monkeypatch.setattr(traffic.log, "warning", said.append)
     goal: Any = SimpleNamespace(outcome=Outcome.CANCELED, end=End.UNKNOWN, reason="", state=None)
     goal.cancel_said = "; it refuses"
-    ticket: Any = SimpleNamespace(goal=goal, told_unknown=False, told_gone=False)
+    handle: Any = SimpleNamespace(goal=goal, told_unknown=False, told_gone=False)
     with lock:
-        first.note(ticket)
-        next_one.note(ticket)
+        first.note(handle)
+        next_one.note(handle)
         goal.end = End.CANCELED
-        next_one.note(ticket)
-        next_one.note(ticket)
+        next_one.note(handle)
+        next_one.note(handle)
         goal.end = End.SERVER_GONE
-        next_one.note(ticket)
+        next_one.note(handle)
         goal.end = End.UNKNOWN
-        next_one.note(ticket)
+        next_one.note(handle)
     first_word, last_word, of_its_return = said
     assert "not accounted for" in first_word
     assert "it refuses" in first_word
@@ -396,10 +404,10 @@ def test_a_goal_that_succeeded_was_not_replaced(monkeypatch: pytest.MonkeyPatch)
     """Any other end may be the doing of a newer goal, whose acceptance it has overtaken."""
     told = list[Event]()
     line: Any = SimpleNamespace(_rival_sent=lambda _: True)
-    line.tell = lambda _ticket, event, _detail=None: told.append(event)
-    Line._pass_on(line, SimpleNamespace(), [(Event.RESULT, (STATUS_SUCCEEDED, None))])  # type: ignore[arg-type]
+    line.tell = lambda _handle, event, _detail=None: told.append(event)
+    ActionEndpoint._pass_on(line, SimpleNamespace(), [(Event.RESULT, (STATUS_SUCCEEDED, None))])  # type: ignore[arg-type]
     assert told == [Event.RESULT]
-    Line._pass_on(line, SimpleNamespace(), [(Event.RESULT, (STATUS_ABORTED, None))])  # type: ignore[arg-type]
+    ActionEndpoint._pass_on(line, SimpleNamespace(), [(Event.RESULT, (STATUS_ABORTED, None))])  # type: ignore[arg-type]
     assert told[1:] == [Event.REPLACED, Event.RESULT]
 
 
@@ -408,18 +416,18 @@ def test_a_goal_that_is_accepted_replaces_the_older_ones_and_no_newer() -> None:
     goals = [Goal(name.encode(), "m", Timeouts(), now, busy=Busy.REPLACE) for name in "abc"]
     line: Any = SimpleNamespace(goals={}, _carry_out=lambda *_: None)
     line._tell_who_waits = lambda: None
-    line.tell = lambda ticket, _event, _detail: told.append(ticket.name)
-    tickets = []
+    line.tell = lambda handle, _event, _detail: told.append(handle.name)
+    handles = []
     for goal in goals:
         for event in (Event.GRANTED, Event.SERVER_READY):
             goal.on(event, now)
         traffic: Any = SimpleNamespace(note=lambda _: None)
-        tickets.append(Ticket(goal, line, traffic, None, goal.id.decode()))
-    holders = SimpleNamespace(holders=lambda _: tickets)
+        handles.append(GoalHandle(goal, line, traffic, None, goal.id.decode()))
+    holders = SimpleNamespace(holders=lambda _: handles)
     clocks = SimpleNamespace(now=lambda: now)
     line.traffic = SimpleNamespace(clocks=clocks, domain=SimpleNamespace(resources=holders))
     with lock:
-        Line._apply(line, tickets[1], lambda now: goals[1].on(Event.ACCEPTED, now), None)
+        ActionEndpoint._apply(line, handles[1], lambda now: goals[1].on(Event.ACCEPTED, now), None)
     assert told == ["a"]
 
 
@@ -441,7 +449,7 @@ def test_who_waits_on_another_node_is_told_when_a_goal_changes(changes: bool) ->
     ours.clocks = SimpleNamespace(now=lambda: now)
     line: Any = line_of(ours)
     line.goals, line._carry_out = {}, lambda *_: None
-    line._tell_who_waits = partial(Line._tell_who_waits, line)
+    line._tell_who_waits = partial(ActionEndpoint._tell_who_waits, line)
     line.neighbors = lambda: [line, line_of(other), line_of(idle, waits=False)]
     goal = Goal(b"1", "m", Timeouts(), now)
     events = (Event.GRANTED, Event.SERVER_READY, Event.ACCEPTED if changes else Event.REPLACED)
@@ -449,7 +457,7 @@ def test_who_waits_on_another_node_is_told_when_a_goal_changes(changes: bool) ->
         goal.on(event, now)
     with lock:
         step = partial(goal.on, events[-1], now)
-        Line._apply(line, Ticket(goal, line, ours, None, "m"), lambda _: step(), None)
+        ActionEndpoint._apply(line, GoalHandle(goal, line, ours, None, "m"), lambda _: step(), None)
     assert sorted(woken) == (["other", "ours"] if changes else [])
 
 
@@ -460,10 +468,10 @@ def test_the_oldest_of_many_lost_goals_are_given_up(suspect: bool, closed: list[
     goal = SimpleNamespace(
         end=End.NEVER_STARTED, outcome=Outcome.ACCEPT_TIMEOUT, suspect=suspect, lost=True, id=b""
     )
-    tickets = {n: SimpleNamespace(number=n, goal=goal) for n in range(LOST_KEPT + 3)}
-    line: Any = SimpleNamespace(goals=tickets)
-    line.tell = lambda ticket, _event: given_up.append(ticket.number)
-    Line._bound_the_lost(line)
+    handles = {n: SimpleNamespace(number=n, goal=goal) for n in range(LOST_KEPT + 3)}
+    line: Any = SimpleNamespace(goals=handles)
+    line.tell = lambda handle, _event: given_up.append(handle.number)
+    ActionEndpoint._bound_the_lost(line)
     assert given_up == closed
 
 
@@ -472,34 +480,34 @@ def test_probes_of_long_ago_are_forgotten() -> None:
     client = SimpleNamespace(forget=forgotten.append, probe=lambda *_: None)
     line: Any = SimpleNamespace(watch=ServerWatch(), _last_probes=deque(), client=client)
     for _ in range(PROBES_KEPT + 10):
-        Line.probe(line)
+        ActionEndpoint.probe(line)
     assert len(forgotten) == 10
 
 
 def test_a_paused_goal_whose_deadline_has_passed_does_not_keep_the_alarm_awake() -> None:
     goal = SimpleNamespace(due_in=lambda _: 0.0)
-    ticket = SimpleNamespace(goal=goal, paused_at=1.0, accounted_for=True)
+    handle = SimpleNamespace(goal=goal, paused_at=1.0, accounted_for=True)
     line: Any = SimpleNamespace(_look_at=10.0, orphaned=False, way=SimpleNamespace(sight=None))
     line._look_out = lambda _: None
-    line.goals, line.traffic = {b"1": ticket}, SimpleNamespace(clocks=SimpleNamespace(now=list))
+    line.goals, line.traffic = {b"1": handle}, SimpleNamespace(clocks=SimpleNamespace(now=list))
     line.mind, line._bound_the_lost = (lambda _: None), (lambda: None)
     line.cancels = Cancels()
-    assert Line.attend(line, 9.9) == pytest.approx(0.1)
+    assert ActionEndpoint.attend(line, 9.9) == pytest.approx(0.1)
 
 
 def test_a_pause_begins_anew_for_a_goal_whose_turn_comes_in_it() -> None:
     line: Any = SimpleNamespace(is_parents=False, _apply=lambda *_: None)
-    ticket: Any = SimpleNamespace(paused_at=1.0)
-    Line.tell(line, ticket, Event.GRANTED)
-    assert ticket.paused_at > 1.0
+    handle: Any = SimpleNamespace(paused_at=1.0)
+    ActionEndpoint.tell(line, handle, Event.GRANTED)
+    assert handle.paused_at > 1.0
 
 
 def test_what_holds_its_resource_is_not_left_to_whoever_comes_next() -> None:
     told = list[Event]()
     goal = SimpleNamespace(outcome=Outcome.CANCELED, holding=True, lost=False)
     line: Any = SimpleNamespace(goals={b"1": SimpleNamespace(goal=goal)})
-    line.tell = lambda _ticket, event: told.append(event)
-    Line.put_away(line)
+    line.tell = lambda _handle, event: told.append(event)
+    ActionEndpoint.park(line)
     assert not told
 
 
@@ -507,9 +515,9 @@ def test_who_has_just_come_in_sight_may_be_followed_by_a_server_that_was_lost() 
     line: Any = SimpleNamespace(in_sight_since=0.0)
     line.shares_server_with, line.has_lost = (lambda _: False), (lambda _: True)
     goal, of_ticket = SimpleNamespace(busy=Busy.WAIT), SimpleNamespace(in_sight_since=9.5)
-    ticket: Any = SimpleNamespace(goal=goal, line=of_ticket)
-    assert Line.may_come_back_for(line, ticket, 9.4 + BESIDE)
-    assert not Line.may_come_back_for(line, ticket, 9.6 + BESIDE)
+    handle: Any = SimpleNamespace(goal=goal, line=of_ticket)
+    assert ActionEndpoint.may_come_back_for(line, handle, 9.4 + BESIDE)
+    assert not ActionEndpoint.may_come_back_for(line, handle, 9.6 + BESIDE)
 
 
 def test_who_is_alone_is_not_settled_where_this_process_stood_still(
@@ -517,16 +525,16 @@ def test_who_is_alone_is_not_settled_where_this_process_stood_still(
 ) -> None:
     """Though the look itself is in time."""
     monkeypatch.setattr(module, "is_valid", lambda _: True)
-    still = Standstill()
+    still = Stalls()
     still.lives(time.monotonic() - 2.0)
-    monkeypatch.setattr(alarm, "standstill", still)
+    monkeypatch.setattr(alarm, "stalls", still)
     seen = watch(OURS, NEW)
     seen.probe_answered(0.5, 1)
     look(SimpleNamespace(_look_at=3.0, pump=lambda: None), seen, 3.0)
     assert not seen.alone
 
 
-class Orphan(Line):
+class Orphan(ActionEndpoint):
     """A line whose node is gone, with a goal that drains within 100 s; `put`: it was put away."""
 
     def __init__(self, silent: float, *shown: bytes) -> None:
@@ -534,17 +542,17 @@ class Orphan(Line):
         said: Any = SimpleNamespace(servers=frozenset({OURS}), sent_to=frozenset({OURS}))
         for kind in ("canceled", "finished", "shown", "lives", "answered"):
             setattr(said, kind, lambda *_: [])
-        self.goals: Any = {b"1": SimpleNamespace(goal=goal, testimony=said, keeps_feedback=False)}
+        self.goals: Any = {b"1": SimpleNamespace(goal=goal, replies=said, keeps_feedback=False)}
         self.watch = watch(OURS, *shown)
         self.cancels, self._generation = Cancels(), shared.generation
         self.orphaned, self.put = True, False
         self.predecessors = Predecessors("m")
         self._heard_at = time.monotonic() - silent
 
-    def put_away(self, *, all_of_them: bool = False) -> None:
+    def park(self, *, all_of_them: bool = False) -> None:
         self.put = all_of_them
 
-    def tell(self, ticket: Any, event: Event, detail: Any = None, message: Any = None) -> None:
+    def tell(self, handle: Any, event: Event, detail: Any = None, message: Any = None) -> None:
         pass
 
 
@@ -552,7 +560,7 @@ class Orphan(Line):
 def test_what_an_orphan_drains_it_waits_for(
     monkeypatch: pytest.MonkeyPatch, silent: float, put: bool
 ) -> None:
-    monkeypatch.setattr(alarm, "standstill", Standstill())
+    monkeypatch.setattr(alarm, "stalls", Stalls())
     line = Orphan(silent)
     line._orphan()
     assert line.put is put
@@ -572,10 +580,10 @@ def test_what_an_orphan_drains_it_waits_for(
     ids=["denies", "knows none", "agrees to cancel", "a result", "a status", "feedback", "accepts"],
 )
 def test_a_denial_does_not_make_an_orphan_wait_on(
-    monkeypatch: pytest.MonkeyPatch, word: Callable[[Line], None], runs: bool
+    monkeypatch: pytest.MonkeyPatch, word: Callable[[ActionEndpoint], None], runs: bool
 ) -> None:
     """It may be the successor's, which goes on denying what its predecessor had."""
-    monkeypatch.setattr(alarm, "standstill", Standstill())
+    monkeypatch.setattr(alarm, "stalls", Stalls())
     line = Orphan(101.0, NEW)
     word(line)
     line._orphan()
@@ -590,17 +598,17 @@ def test_of_feedback_that_no_tick_reads_the_newest_is_kept() -> None:
     line: Any = Orphan(0.0)
     line.traffic = SimpleNamespace(notify=lambda _: None)
     goal = Goal(b"1", "m", Timeouts(), Now(0.0, 0.0))
-    ticket = line.goals[b"1"] = Ticket(goal, line, line.traffic, None, "m", keeps_feedback=True)
+    handle = line.goals[b"1"] = GoalHandle(goal, line, line.traffic, None, "m", keeps_feedback=True)
     for number in range(2 * FEEDBACK_KEPT):
         line.feedback_came(b"1", number)
-    assert list(ticket.feedback) == list(range(FEEDBACK_KEPT, 2 * FEEDBACK_KEPT))
+    assert list(handle.feedback) == list(range(FEEDBACK_KEPT, 2 * FEEDBACK_KEPT))
 
 
 def test_an_orphan_finds_out_by_asking_who_lives(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was shown when its node went does not change any more."""
     monkeypatch.setattr(module, "is_valid", lambda _: False)
-    monkeypatch.setattr(alarm, "standstill", SimpleNamespace(answers_take=lambda _: 0.0))
-    line: Any = object.__new__(Line)
+    monkeypatch.setattr(alarm, "stalls", SimpleNamespace(answers_take=lambda _: 0.0))
+    line: Any = object.__new__(ActionEndpoint)
     line.watch, line.orphaned = watch(OURS), True
     line.traffic = SimpleNamespace(node=None, notify=lambda _: None)
     line.watch.observe(2.0, True, frozenset({OURS, NEW}))
@@ -609,13 +617,13 @@ def test_an_orphan_finds_out_by_asking_who_lives(monkeypatch: pytest.MonkeyPatch
     line.pump, line.cancels = (lambda: None), Cancels()
     line._generation = shared.generation
     asked, told = list[int](), list[Event]()
-    line.tell = lambda _ticket, event, _detail=None: told.append(event)
+    line.tell = lambda _handle, event, _detail=None: told.append(event)
     goal = Goal(b"1", "m", Timeouts(), Now(0.0, 0.0))
     for event in (Event.GRANTED, Event.SERVER_READY, Event.INTERRUPTED):
         goal.on(event, Now(0.0, 0.0))
-    ticket = Ticket(goal, line, line.traffic, None, "leaf")
-    ticket.testimony.sent_to = frozenset({OURS})
-    line.goals = {b"1": ticket}
+    handle = GoalHandle(goal, line, line.traffic, None, "leaf")
+    handle.replies.sent_to = frozenset({OURS})
+    line.goals = {b"1": handle}
     denied = (CANCEL_UNKNOWN_GOAL,)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now))
     now = 2.0

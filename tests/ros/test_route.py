@@ -13,16 +13,16 @@ from typing import Any
 import pytest
 
 from bt_actions.goals.terms import Event, State
-from bt_actions.ros import alarm
-from bt_actions.ros import way as module
-from bt_actions.ros.shared import Domain
-from bt_actions.ros.way import Way
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.servers.reachability import DOUBT_LASTS, MUTE_AFTER, NEVER, Hearing
-from bt_actions.servers.stalls import ANSWERS_TAKE, Standstill
+from bt_actions.servers.reachability import DOUBT_LASTS, MUTE_AFTER, NEVER, Reachability
+from bt_actions.servers.stalls import ANSWERS_TAKE, Stalls
+from bt_actions.traffic import alarm
+from bt_actions.traffic import route as module
+from bt_actions.traffic.route import Route
+from bt_actions.traffic.shared import Domain
 
 
-def way_of(client: Any, state: Server = Server.READY) -> Way:
+def way_of(client: Any, state: Server = Server.READY) -> Route:
     """The way of a line that does nothing, with this client, to a server in this state."""
     resolves = SimpleNamespace(
         resolve_topic_name=lambda name: name, resolve_service_name=lambda name: name
@@ -30,20 +30,20 @@ def way_of(client: Any, state: Server = Server.READY) -> Way:
     line: Any = SimpleNamespace(
         name="/move",
         client=client,
-        traffic=SimpleNamespace(node=resolves, long_standstills=alarm.standstill.long_times),
+        traffic=SimpleNamespace(node=resolves, long_stalls=alarm.stalls.long_times),
         watch=SimpleNamespace(state=lambda _: state),
         orphaned=False,
         pump=lambda: None,
         probe=lambda: client.probe(1, b""),
     )
-    return Way(line)
+    return Route(line)
 
 
-def after_a_standstill(monkeypatch: pytest.MonkeyPatch, state: Server = Server.READY) -> Way:
+def after_a_standstill(monkeypatch: pytest.MonkeyPatch, state: Server = Server.READY) -> Route:
     """The same, where this process has just stood still from second 10 to second 16."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
-    way = way_of(SimpleNamespace(hearing=Hearing()), state)
+    still = Stalls()
+    monkeypatch.setattr(alarm, "stalls", still)
+    way = way_of(SimpleNamespace(reachability=Reachability()), state)
     still.lives(10.0)
     still.lives(16.0)
     return way
@@ -56,17 +56,17 @@ def test_a_client_is_preferred_where_it_is_heard_and_our_own_is_not(
     """A busy server answers nobody."""
     moment = 100.0
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
-    own, trial = Hearing(), Hearing()
-    asked: list[Hearing] = []
+    own, trial = Reachability(), Reachability()
+    asked: list[Reachability] = []
 
-    def client(hearing: Hearing, hears: bool) -> Any:
+    def client(reachability: Reachability, hears: bool) -> Any:
         def probe(_: int, __: bytes) -> None:
-            asked.append(hearing)
-            hearing.asked(moment)
+            asked.append(reachability)
+            reachability.asked(moment)
             if hears:
-                hearing.answered(moment)
+                reachability.answered(moment)
 
-        return SimpleNamespace(hearing=hearing, pump=lambda: None, probe=probe)
+        return SimpleNamespace(reachability=reachability, pump=lambda: None, probe=probe)
 
     way = way_of(client(own, heard == "both"))
     own.asked(moment)
@@ -86,17 +86,17 @@ def test_who_is_not_heard_is_looked_for_at_once(monkeypatch: pytest.MonkeyPatch)
     """In a doubt; and when there is none, in its turn."""
     found: list[bool] = []
     monkeypatch.setattr(module, "look_for", lambda *_, at_once: found.append(at_once))
-    hearing = Hearing()
-    way = way_of(SimpleNamespace(hearing=hearing))
-    line: Any = way._line
+    reachability = Reachability()
+    way = way_of(SimpleNamespace(reachability=reachability))
+    line: Any = way._endpoint
     line.traffic.seen_since, line.traffic.domain = 0.0, Domain(0)
     line.name, line.action_type, line.users, line.orphaned = "/move", None, 1, False
     line.goals = {b"": SimpleNamespace(goal=SimpleNamespace(state=State.EXECUTING))}
     now = time.monotonic()
     way.seek(now)
-    hearing.doubt(now - MUTE_AFTER)
+    reachability.doubt(now - MUTE_AFTER)
     way.seek(now)
-    hearing.doubt(now - DOUBT_LASTS)
+    reachability.doubt(now - DOUBT_LASTS)
     way.seek(now)
     assert found == [True, False]
 
@@ -108,17 +108,17 @@ def test_who_moves_gives_its_goals_time_and_has_them_asked_for(
     monkeypatch.setattr(alarm, "wake_by", lambda _: None)
     told: list[Any] = []
 
-    def ticket(*sent_to: bytes) -> Any:
+    def handle(*sent_to: bytes) -> Any:
         goal = SimpleNamespace(hold=lambda seconds, _: told.append(seconds))
-        testimony = SimpleNamespace(sent_to=frozenset(sent_to))
-        return SimpleNamespace(goal=goal, testimony=testimony, not_gone_before=NEVER)
+        replies = SimpleNamespace(sent_to=frozenset(sent_to))
+        return SimpleNamespace(goal=goal, replies=replies, not_gone_before=NEVER)
 
-    here, nowhere = ticket(b"seen"), ticket()
-    way = way_of(SimpleNamespace(hearing=Hearing(), closed=False))
-    line: Any = way._line
+    here, nowhere = handle(b"seen"), handle()
+    way = way_of(SimpleNamespace(reachability=Reachability(), closed=False))
+    line: Any = way._endpoint
     line.watch.gids, line.goals = frozenset({b"seen"}), {b"1": here, b"2": nowhere}
     line.traffic.clocks = SimpleNamespace(now=lambda: None)
-    line.tell = lambda ticket, event: told.append((ticket, event))
+    line.tell = lambda handle, event: told.append((handle, event))
     line.close, line.open = way.leave, lambda client: told.append(client)
     trial: Any = SimpleNamespace(on_trial=True)
     sight: Any = SimpleNamespace(users=set())
@@ -127,20 +127,20 @@ def test_who_moves_gives_its_goals_time_and_has_them_asked_for(
     changed = Event.SERVER_CHANGED
     assert told == [trial, ANSWERS_TAKE, (here, changed), ANSWERS_TAKE, (nowhere, changed)]
     assert not trial.on_trial
-    assert (way.sight, sight.users) == (sight, {way})
+    assert (way.second, sight.users) == (sight, {way})
     assert here.not_gone_before >= now + LEASE
     assert nowhere.not_gone_before == NEVER
 
 
 def test_a_client_on_trial_tells_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     """Feedback would come twice; and its questions, of which none is the line's, are answered."""
-    made = SimpleNamespace(hearing=Hearing(), on_trial=False)
+    made = SimpleNamespace(reachability=Reachability(), on_trial=False)
     monkeypatch.setattr(module, "ActionClient", lambda *_: made)
-    way = way_of(SimpleNamespace(hearing=Hearing()))
-    way._line.action_type = None
+    way = way_of(SimpleNamespace(reachability=Reachability()))
+    way._endpoint.action_type = None
     assert way.client_in(SimpleNamespace(node=None)) is made  # type: ignore[arg-type]
     assert made.on_trial
-    assert made.hearing.in_doubt(time.monotonic())
+    assert made.reachability.in_doubt(time.monotonic())
 
 
 def test_who_has_no_node_any_more_has_no_other_way_and_no_doubt(
@@ -149,7 +149,7 @@ def test_who_has_no_node_any_more_has_no_other_way_and_no_doubt(
     """Else a drain that nobody answers would not end: there is no look that ends the doubt."""
     way = after_a_standstill(monkeypatch)
     assert way.in_doubt(16.0)
-    way._line.orphaned = True
+    way._endpoint.orphaned = True
     assert not way.in_doubt(16.0)
 
 
@@ -163,9 +163,9 @@ def test_a_standstill_that_no_look_has_seen_yet_is_a_doubt(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """In the user's callable that makes the goal, say: it is not sent before somebody has asked."""
-    still = Standstill()
-    monkeypatch.setattr(alarm, "standstill", still)
-    client: Any = SimpleNamespace(hearing=Hearing())
+    still = Stalls()
+    monkeypatch.setattr(alarm, "stalls", still)
+    client: Any = SimpleNamespace(reachability=Reachability())
     still.lives(10.0)
     way = way_of(client)
     assert not way.in_doubt(10.0)
@@ -173,18 +173,18 @@ def test_a_standstill_that_no_look_has_seen_yet_is_a_doubt(
     assert way.in_doubt(16.0)
     assert way.wants_question(16.0)
     assert way.in_doubt(16.0) == DOUBT_LASTS, "until it is answered"
-    client.hearing.answered(16.0)
+    client.reachability.answered(16.0)
     assert not way.in_doubt(16.0)
 
 
 def test_a_line_that_is_made_later_may_be_deaf_as_its_participant_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It is known since before the standstill; another node's goals kept the alarm awake."""
+    """It is known since before the stall; another node's goals kept the alarm awake."""
     way = after_a_standstill(monkeypatch)
     assert way.in_doubt(16.0)
-    way._line.client = SimpleNamespace(hearing=Hearing())  # type: ignore[assignment]
-    later = Way(way._line)
+    way._endpoint.client = SimpleNamespace(reachability=Reachability())  # type: ignore[assignment]
+    later = Route(way._endpoint)
     assert later.in_doubt(16.0)
     assert later.wants_question(16.0)
 

@@ -1,9 +1,10 @@
-"""The goals of one line that have ended, and may turn up at a second server, which is to cancel.
+"""The goals of one endpoint that have ended, and may turn up at a second server, which is to
+cancel.
 
 A word of such a goal may be older than its end, or the word of another server of the name that took
-it, too. This tells the two apart, asks where it cannot, and hands the line a twin where there is
-one. What is believed of what servers say of that is servers/duplicates.py's. All under the one
-lock.
+it, too. This tells the two apart, asks where it cannot, and hands the endpoint a duplicate where
+there is one. What is believed of what servers say of that is servers/duplicates.py's. All under the
+one lock.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
-from bt_actions.ros import alarm
 from bt_actions.ros.action_client import GOALS_KEPT
-from bt_actions.ros.shared import Ticket
-from bt_actions.servers.duplicates import TwinTestimony
+from bt_actions.servers.duplicates import DuplicateReplies
+from bt_actions.traffic import alarm
+from bt_actions.traffic.shared import GoalHandle
 
 if TYPE_CHECKING:
-    from bt_actions.ros.line import Line
+    from bt_actions.traffic.endpoint import ActionEndpoint
 
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
@@ -33,55 +34,55 @@ QUESTIONS = 5
 
 @dataclass(slots=True)
 class Ended:
-    """A goal that is DONE, and the twin that it has should a second server run it."""
+    """A goal that is DONE, and the duplicate that it has should a second server run it."""
 
     owner: Callable[[], Any]
     """A weak reference to the leaf."""
     accepted: bool
     since: float
-    twin: Ticket
-    said: TwinTestimony
+    duplicate: GoalHandle
+    said: DuplicateReplies
     questions: int = 0
     """Asked in doubt."""
 
 
 class Past:
-    """What has ended on one line, the newest goals."""
+    """What has ended on one endpoint, the newest goals."""
 
-    def __init__(self, line: Line) -> None:
-        self._line = line
+    def __init__(self, endpoint: ActionEndpoint) -> None:
+        self._endpoint = endpoint
         self._ended: dict[bytes, Ended] = {}
 
-    def keep(self, ticket: Ticket) -> None:
+    def keep(self, handle: GoalHandle) -> None:
         """Keep a goal that is DONE in mind; where one that may run it is gone, wait for that.
 
         But not where it is lost, and is given up with many others.
         """
-        line = self._line
-        twin = dataclasses.replace(
-            ticket,
-            goal=ticket.goal.twin(line.traffic.clocks.now()),
+        endpoint = self._endpoint
+        duplicate = dataclasses.replace(
+            handle,
+            goal=handle.goal.duplicate(endpoint.traffic.clocks.now()),
             keeps_feedback=False,
             feedback=deque(maxlen=1),
         )
-        line.see()
-        elsewhere = ticket.testimony.may_run_at(line.watch)
-        given_up = ticket.goal.lost and ticket.goal.end not in ENDS.values()
+        endpoint.see()
+        elsewhere = handle.replies.may_run_at(endpoint.watch)
+        given_up = handle.goal.lost and handle.goal.end not in ENDS.values()
         if elsewhere and not given_up:
-            twin.testimony = TwinTestimony(twin.goal, ticket.testimony, elsewhere)
-            twin.testimony.taken_over()
-            line.goals[twin.goal.id] = twin
+            duplicate.replies = DuplicateReplies(duplicate.goal, handle.replies, elsewhere)
+            duplicate.replies.taken_over()
+            endpoint.goals[duplicate.goal.id] = duplicate
             return
-        twin.owner = None
-        said = TwinTestimony(twin.goal, ticket.testimony, ticket.testimony.sent_to)
-        twin.testimony = said
-        owner = (lambda: None) if ticket.owner is None else weakref.ref(ticket.owner)
-        accepted, now = ticket.goal.accepted, time.monotonic()
-        self._ended[twin.goal.id] = Ended(owner, accepted, now, twin, said)
+        duplicate.owner = None
+        said = DuplicateReplies(duplicate.goal, handle.replies, handle.replies.sent_to)
+        duplicate.replies = said
+        owner = (lambda: None) if handle.owner is None else weakref.ref(handle.owner)
+        accepted, now = handle.goal.accepted, time.monotonic()
+        self._ended[duplicate.goal.id] = Ended(owner, accepted, now, duplicate, said)
         if len(self._ended) > GOALS_KEPT:
             oldest = next(iter(self._ended))
             del self._ended[oldest]
-            line.client.forget(oldest)
+            endpoint.client.forget(oldest)
 
     def accepted(self, goal_id: bytes, answers: Sequence[bool] = (True,)) -> None:
         """Take an acceptance: it may have been overtaken by the result, or have come twice."""
@@ -118,22 +119,22 @@ class Past:
         """Ask whoever has it to cancel: whoever has ended it will deny it."""
         if ended.questions < QUESTIONS:
             ended.questions += 1
-            self._line.ask_to_cancel(ended.twin.goal.id)
+            self._endpoint.ask_to_cancel(ended.duplicate.goal.id)
 
     def _get(self, goal_id: bytes) -> Ended | None:
         """Return what has ended; in the child of a fork nothing has, it is the parent's."""
-        return None if self._line.is_parents else self._ended.get(goal_id)
+        return None if self._endpoint.is_parents else self._ended.get(goal_id)
 
     def _may_be_several(self, ended: Ended) -> bool:
-        self._line.see()
-        return len(ended.said.servers | self._line.watch.gids) > 1
+        self._endpoint.see()
+        return len(ended.said.servers | self._endpoint.watch.gids) > 1
 
     def _hand_over(self, ended: Ended) -> None:
-        line, twin = self._line, ended.twin
-        del self._ended[twin.goal.id]
-        twin.owner = ended.owner()
-        line.watch.two_answered()
-        ended.said.is_at_another(line.watch, time.monotonic())
-        line.goals[twin.goal.id] = twin
-        alarm.mind(line)
-        line.tell(twin, Event.SERVER_RETURNED)
+        endpoint, duplicate = self._endpoint, ended.duplicate
+        del self._ended[duplicate.goal.id]
+        duplicate.owner = ended.owner()
+        endpoint.watch.two_answered()
+        ended.said.is_at_another(endpoint.watch, time.monotonic())
+        endpoint.goals[duplicate.goal.id] = duplicate
+        alarm.mind(endpoint)
+        endpoint.tell(duplicate, Event.SERVER_RETURNED)

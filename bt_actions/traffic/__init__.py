@@ -1,0 +1,1 @@
+"""Drives the goals of all leaves over their action servers, until each is accounted for."""

@@ -1,0 +1,119 @@
+"""When silence may mean that a server does not hear what it is asked."""
+
+from __future__ import annotations
+
+import pytest
+
+from bt_actions.servers.reachability import (
+    AT_ONCE,
+    DOUBT_LASTS,
+    MUTE_AFTER,
+    TRIES,
+    TRY_AGAIN,
+    TRY_LASTS,
+    TWICE,
+    Reachability,
+)
+
+
+@pytest.fixture
+def reachability() -> Reachability:
+    """Asked at 10 s, and answered."""
+    fresh = Reachability()
+    fresh.asked(10.0)
+    fresh.answered(10.0)
+    return fresh
+
+
+def test_who_is_asked_nothing_owes_nothing() -> None:
+    fresh = Reachability()
+    assert not fresh.heard
+    assert not fresh.take_question(99.0)
+    assert not fresh.is_unresponsive(99.0)
+    assert not fresh.in_doubt(99.0)
+
+
+def test_who_has_answered_owes_nothing(reachability: Reachability) -> None:
+    assert reachability.heard
+    assert not reachability.is_unresponsive(99.0)
+
+
+def test_who_is_silent_may_be_deaf_and_is_not_pestered(reachability: Reachability) -> None:
+    reachability.asked(20.0)
+    reachability.asked(20.0 + MUTE_AFTER - 0.1)
+    assert not reachability.is_unresponsive(20.0 + MUTE_AFTER - 0.1)
+    assert reachability.is_unresponsive(20.0 + MUTE_AFTER), (
+        "questions that get lost do not put it off"
+    )
+    assert not reachability.take_question(99.0)
+    reachability.answered(20.0 + MUTE_AFTER - 0.1)
+    assert not reachability.is_unresponsive(99.0)
+
+
+def test_an_answer_of_before_the_standstill_proves_nothing(reachability: Reachability) -> None:
+    reachability.asked(20.0)
+    reachability.doubt(30.0)
+    reachability.answered(20.0)
+    assert reachability.in_doubt(31.0) == DOUBT_LASTS - 1.0
+    assert reachability.is_unresponsive(30.0 + MUTE_AFTER)
+    reachability.answered(30.0)
+    assert not reachability.in_doubt(31.0)
+    assert not reachability.is_unresponsive(99.0)
+
+
+@pytest.mark.parametrize("ask_after", [AT_ONCE, TWICE])
+def test_in_a_doubt_it_is_asked_so_often(
+    reachability: Reachability, ask_after: tuple[float, ...]
+) -> None:
+    reachability.doubt(30.0, ask_after)
+    asked = [now / 10 for now in range(300, 1000) if reachability.take_question(now / 10)]
+    assert asked == [30.0 + seconds for seconds in ask_after]
+    reachability.doubt(100.0)
+    reachability.answered(100.0)
+    assert not reachability.take_question(199.0), "it was answered"
+
+
+def test_standstills_that_follow_each_other_are_one_doubt(reachability: Reachability) -> None:
+    for now in (30.0, 36.0, 42.0):
+        reachability.doubt(now)
+        assert reachability.take_question(now) is (now == 30.0)
+        assert reachability.in_doubt(now) == DOUBT_LASTS
+        assert reachability.is_unresponsive(now + MUTE_AFTER) is (now < 42.0)
+        reachability.tried(now + MUTE_AFTER)
+
+
+def test_an_answer_to_what_was_asked_before_is_no_proof_but_a_reason_to_ask(
+    reachability: Reachability,
+) -> None:
+    """A stall after the first question, and before its answer was taken."""
+    reachability.doubt(30.0)
+    assert reachability.take_question(30.0)
+    reachability.asked(30.0)
+    reachability.doubt(32.0)
+    assert not reachability.take_question(33.0), "a busy server is not asked twice"
+    reachability.answered(30.0)
+    assert reachability.in_doubt(33.0)
+    assert reachability.take_question(33.0)
+    reachability.answered(33.0)
+    assert not reachability.in_doubt(33.0)
+    reachability.answered(30.0)
+    assert not reachability.take_question(34.0)
+
+
+def test_another_way_is_looked_for_now_and_then(reachability: Reachability) -> None:
+    reachability.asked(20.0)
+    now = 30.0
+    for number in range(1, TRIES + 1):
+        assert reachability.is_unresponsive(now), number
+        reachability.tried(now)
+        assert reachability.is_unresponsive(now + TRY_LASTS - 0.1), "a look is not broken off"
+        now += TRY_LASTS
+    assert not reachability.is_unresponsive(now)
+    assert not reachability.is_unresponsive(now - TRY_LASTS + TRY_AGAIN - 0.1)
+    assert reachability.is_unresponsive(now - TRY_LASTS + TRY_AGAIN)
+
+
+def test_a_doubt_without_an_end_ends(reachability: Reachability) -> None:
+    reachability.doubt(30.0)
+    assert not reachability.in_doubt(30.0 + DOUBT_LASTS)
+    assert reachability.is_unresponsive(99.0)
