@@ -19,7 +19,7 @@ fi
 if grep -qE 'No matching distribution|ResolutionImpossible|ConnectionPool|ConnectionError|HTTP error|IncompleteRead|ReadTimeout|SSLError|DO NOT MATCH THE HASHES' "$log"; then
     machine=$(uname -sm)
     if [ "$machine" != "Linux x86_64" ]; then
-        echo "bt_actions: there are ROS 2 wheels for Linux on x86_64 only, and this is $machine: build it in a ROS 2 workspace instead (README.md, $log)." >&2
+        echo "bt_actions: there are ROS 2 wheels for Linux on x86_64 only, and this is $machine: build it in a ROS 2 workspace instead (docs/workspace.md, $log)." >&2
         exit 1
     fi
     echo "bt_actions: a download failed: check the network and pip's package index, then try again ($log)." >&2

@@ -28,9 +28,8 @@ HEAD = """\
 <!-- Made by scripts/python_doc.py from the docstrings. Do not edit. -->
 
 `import bt_actions` gives the names on this page, but for the two parts at its end. How a tree of
-your own is made of them and run stands in the [README](../README.md#in-your-own-py_trees-tree), a
-whole program in [examples/embed.py](../examples/embed.py), one that offers a tree as an action in
-[examples/offer.py](../examples/offer.py). Times are seconds.
+your own is made of them and run stands in the [README](../README.md#in-your-own-py_trees-tree), and
+how they live in a program of yours in [embedding.md](embedding.md). Times are seconds.
 
 What holds everywhere:
 

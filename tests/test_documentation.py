@@ -108,7 +108,30 @@ def test_the_example_of_a_tree_as_an_action_delivers_and_ends_at_a_cancel_reques
     assert robot.ends() == ["succeeded", "succeeded", "canceled"]
 
 
-def test_every_file_that_the_readme_and_the_docs_name_is_there() -> None:
-    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
-        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-            assert (page.parent / target).exists(), f"{page.name} names {target}"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def _anchors(page: Path) -> set[str]:
+    """The names by which GitHub links to the headings of a page."""
+    heads = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+def test_every_link_of_the_pages_leads_somewhere() -> None:
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for target, anchor in re.findall(r"\]\(([^)#: ]*)(?:#([^) ]*))?\)", text):
+            to = page.parent / target if target else page
+            assert to.exists(), f"{page.name} names {target}"
+            assert not anchor or anchor in _anchors(to), f"{page.name} names {target}#{anchor}"
+
+
+def test_the_index_leads_to_every_page() -> None:
+    index = ROOT / "docs" / "index.md"
+    targets = re.findall(r"\]\(([^)#:]+)", index.read_text(encoding="utf-8"))
+    named = {(index.parent / target).resolve() for target in targets}
+    assert {page for page in PAGES if page != index and page not in named} == set()
+
+
+def test_the_front_page_stays_short() -> None:
+    assert len(README.splitlines()) <= 110

@@ -64,13 +64,13 @@ def test_it_refuses_the_wrong_example_of_each_rule_of_form(code: str) -> None:
     assert complaints(PAGES[code].wrong)
 
 
-def test_the_line_for_editors_is_the_same_in_readme_and_help(
+def test_the_line_for_editors_is_the_same_in_docs_and_help(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "editors.md").read_text(encoding="utf-8")
     with pytest.raises(SystemExit):
         main(["schema", "--help"])
-    for text in (readme, capsys.readouterr().out):
+    for text in (page, capsys.readouterr().out):
         [line] = MODELINE.finditer(text)
         assert f"bt-actions schema > {line[1]}" in text
     assert main(["schema"]) == 0
