@@ -84,7 +84,7 @@ BY_PY_TREES = {"setup", "initialise", "update", "terminate", "shutdown"}
 BY_OURSELVES = {
     "ActionBehaviour.due_in",
     "ActionBehaviour.file_interrupted",
-    "ActionBehaviour.open_tickets",
+    "ActionBehaviour.open_handles",
     "Retry.pause",
     "TreeRunner.catch_up",
 }
