@@ -1,0 +1,107 @@
+"""The seam to what a process gives: its clock, its lock, ids, the log, the record, the wake-up.
+
+One host a process with rclpy (ros/host.py), or one a run that is explored. All that goals share
+beyond their endpoints hangs on it, so that nothing hangs on a module. Nothing is decided here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from contextlib import AbstractContextManager
+from typing import Any, Protocol
+
+from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic.scheduler import Scheduler
+
+
+class Log(Protocol):
+    """Takes lines from any thread, and never waits."""
+
+    def info(self, text: str) -> None:
+        """Of what happens."""
+
+    def warning(self, text: str) -> None:
+        """Of what should not."""
+
+    def error(self, text: str) -> None:
+        """Of what must not."""
+
+
+class Record(Protocol):
+    """What was sent and is not answered yet, on record should the process be killed."""
+
+    def __contains__(self, goal_id: bytes) -> bool:
+        """Whether a goal is on record."""
+
+    def enter(
+        self,
+        goal_id: bytes,
+        action: str,
+        domain: int,
+        servers: Collection[bytes],
+        *,
+        accept: float | None = None,
+        lost: bool = False,
+    ) -> None:
+        """Put a goal on record that is about to be sent, or what more is known of it."""
+
+    def strike(self, goal_id: bytes) -> None:
+        """Take a goal off the record, if it is there."""
+
+    def close(self) -> None:
+        """Remove the record, where nothing is on it; the next goal opens another."""
+
+
+class Changed(Protocol):
+    """A condition of the lock (threading.Condition)."""
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for a change, at most so many seconds; the caller holds the lock."""
+
+    def notify_all(self) -> None:
+        """Wake whoever waits; the caller holds the lock."""
+
+
+class Host(Protocol):
+    """What the goals of a process, or of one run that is explored, have in common."""
+
+    @property
+    def lock(self) -> AbstractContextManager[Any]:
+        """The one lock; whoever holds it may take it again. Nothing waits under it."""
+
+    @property
+    def changed(self) -> Changed:
+        """Notified at every change of any goal."""
+
+    @property
+    def log(self) -> Log:
+        """Where lines go."""
+
+    @property
+    def record(self) -> Record:
+        """Where a goal is put before it is sent."""
+
+    @property
+    def stalls(self) -> Stalls:
+        """When this process stood still, and what it may not conclude yet."""
+
+    @property
+    def scheduler(self) -> Scheduler:
+        """The endpoints with open goals."""
+
+    @property
+    def forks(self) -> int:
+        """Forks between the first process and this one: what an older one made is not ours."""
+
+    @property
+    def closing(self) -> bool:
+        """Whether the process ends: a tree that ticks on begins nothing any more."""
+
+    def steady(self) -> float:
+        """Return seconds that only ever go forward."""
+
+    def new_goal_id(self) -> bytes:
+        """Return 16 bytes that no goal has had."""
+
+    def random_id(self) -> bytes:
+        """Return 16 bytes that no server knows."""

@@ -1,0 +1,173 @@
+"""The seam to what carries messages: one action as one participant sees it, and the participant.
+
+`ros/` implements these protocols with rclpy, `testing/` on a network in virtual time. Both sides of
+the seam keep one contract (tests/traffic/test_transport.py). All of it is called under the host's
+lock, but for what takes messages from the middleware. Nothing is decided here.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from bt_actions.goals.terms import Now
+from bt_actions.servers.presence import GID
+from bt_actions.servers.reachability import Reachability
+
+GOALS_KEPT = 20
+"""Goal requests, of those that are forgotten, of which a further acceptance is told all the same: a
+server that wakes up has the last ten in its queue."""
+
+
+class Listener(Protocol):
+    """Who is told what the servers say: under the host's lock, from whichever thread delivers.
+
+    `answers` are all that one question has had by now, the newest last: one of each server, and
+    none says whose it is. `asked` is when it was asked (seconds, steady clock).
+    """
+
+    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
+        """The goal request was answered: accepted or not. Told of forgotten goals, too."""
+
+    def result_came(
+        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    ) -> None:
+        """Status and result came; status 0 means that the server does not know the goal."""
+
+    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
+        """A cancel request was answered, with a return code of action_msgs/srv/CancelGoal."""
+
+    def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
+        """Feedback came, of a goal that may be anybody's."""
+
+    def statuses_came(self, statuses: dict[bytes, int]) -> None:
+        """The server published the status of its goals."""
+
+    def probe_answered(self, probe: int) -> None:
+        """A server answered the probe of this number; each live server answers once."""
+
+    def all_delivered(self) -> None:
+        """Nothing that has been taken waits any more."""
+
+
+class ActionTransport(Protocol):
+    """One action as one participant sees it: requests out, answers to its listener.
+
+    A request raises whatever the middleware raises where it cannot be sent.
+    """
+
+    on_trial: bool
+    """The listener has another transport; of this one it wants to hear of statuses alone."""
+
+    @property
+    def seen_since(self) -> float:
+        """Since when its participant sees others (seconds, steady clock)."""
+
+    @property
+    def reachability(self) -> Reachability:
+        """What is known of whether a server hears these requests; told of each, and of answers."""
+
+    def send(self, goal_id: bytes, goal: Any) -> None:
+        """Send the goal request."""
+
+    def ask_result(self, goal_id: bytes) -> None:
+        """Ask for the result, which the server answers when the goal has ended."""
+
+    def cancel(self, goal_id: bytes) -> None:
+        """Ask to cancel this goal, and no other."""
+
+    def probe(self, probe: int, random_id: bytes) -> None:
+        """Ask for a goal that nobody knows: each live server answers once, with status 0."""
+
+    def forget(self, goal: bytes | int) -> None:
+        """Tell no more answers about a goal (its id) or a probe (its number).
+
+        But for further acceptances of the newest `GOALS_KEPT` goals.
+        """
+
+    def pump(self) -> bool:
+        """Deliver what has arrived, here and now; return whether there was anything."""
+
+    @property
+    def has_more(self) -> bool:
+        """Whether something has been taken, and not been delivered yet."""
+
+    def servers(self) -> frozenset[GID]:
+        """Return who is shown to take goal requests; raises where the participant is gone."""
+
+    def ready(self) -> bool:
+        """Whether a server is shown with all of its parts; raises as `servers` does."""
+
+    def close(self) -> None:
+        """Send and deliver nothing any more; what is still under way is lost. Twice: fine."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+
+
+class Seeker(Protocol):
+    """Who has lost sight of a server, or is not heard by it any more (route.py)."""
+
+    def misses(self) -> bool:
+        """Whether a server is wanted, and is not in sight, or does not answer, by now."""
+
+    def is_waited_for(self) -> bool:
+        """Whether somebody wants to send a goal."""
+
+    def try_in(self, participant: Opener) -> ActionTransport:
+        """Open a transport like its own in another participant, on trial."""
+
+    def prefers(self, transport: ActionTransport) -> bool:
+        """Whether this one, which is ready, does what its own does not."""
+
+    def move_to(self, transport: ActionTransport) -> None:
+        """Go on with this one, or close it."""
+
+
+class Opener(Protocol):
+    """What a new participant can do that was made for a Seeker."""
+
+    def open_transport(self, action_type: Any, name: str, listener: Listener) -> ActionTransport:
+        """Open one; raises what the middleware raises for a wrong name or type."""
+
+
+class Participant(Opener, Protocol):
+    """Whose eyes and ears the goals of one node have."""
+
+    @property
+    def domain(self) -> int:
+        """The ROS domain id."""
+
+    @property
+    def name(self) -> str:
+        """Of the node;"""
+
+    @property
+    def namespace(self) -> str:
+        """and its namespace, "/" or "/r1"."""
+
+    @property
+    def seen_since(self) -> float:
+        """Since when it sees others (seconds, steady clock); a new one is blind to nothing;"""
+
+    @property
+    def long_stalls(self) -> int:
+        """and how often the process had stood still for long by then (Stalls.long_times)."""
+
+    def now(self) -> Now:
+        """Return this moment, by the steady clock and by its own."""
+
+    def alive(self) -> bool:
+        """Whether it is there, and can send and hear."""
+
+    def full_name(self, action: str) -> str:
+        """Return the full name of an action; raises ValueError for one that ROS refuses."""
+
+    def instead(self, action_type: Any, name: str) -> str:
+        """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
+
+    def seek(self, seeker: Seeker, name: str, *, at_once: bool) -> None:
+        """Have another participant look for what is missed; `at_once`: do not go on pausing.
+
+        Does nothing where there can be no other, or where it would find another server than ours.
+        """
