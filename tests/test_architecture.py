@@ -58,7 +58,6 @@ LONGEST, MOST_FILES = 400, 20
 LONG = {
     "behaviours/action.py",
     "document/model.py",
-    "document/nodes.py",
     "document/pages.py",
     "document/read.py",
     "goals/goal.py",
@@ -74,13 +73,6 @@ CROWDED = {"cli", "document", "ros"}
 CIRCLES: list[set[str]] = [
     {"cli/__init__.py", "cli/completion.py"},
     {"cli/common.py", "cli/ros_arguments.py"},
-    {
-        "document/check.py",
-        "document/check_actions.py",
-        "document/check_kinds.py",
-        "document/writes.py",
-    },
-    {"document/nodes.py", "document/source.py", "document/syntax.py"},
     {"recovery/sweep.py", "recovery/unanswered.py"},
     {
         "ros/action_client.py",

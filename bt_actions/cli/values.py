@@ -28,7 +28,8 @@ def value(text: str, where: str) -> object:
 
     Raises BadInput.
     """
-    from bt_actions.document.nodes import Node, Scalar, compose, data_of
+    from bt_actions.document.compose import compose
+    from bt_actions.document.nodes import Node, Scalar, data_of
     from bt_actions.document.source import Source
 
     stripped = text.strip()

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from bt_actions.document.build_names import settings_of, when_of
+from bt_actions.document.checker import Checker
 from bt_actions.document.findings import Related
 from bt_actions.document.nodes import Mapping, span_of
 from bt_actions.document.source import Source
@@ -20,9 +20,6 @@ from bt_actions.document.values import BAD, Computed, Interpolated, locate
 from bt_actions.document.workspace import merged
 from bt_actions.document.writes import root_type
 from bt_actions.messages.fields import FieldType, Message
-
-if TYPE_CHECKING:
-    from bt_actions.document.check import Checker
 
 __all__ = ["check_actions", "check_defaults", "check_use"]
 

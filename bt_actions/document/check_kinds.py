@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
 from bt_actions.document.build_names import when_of
+from bt_actions.document.checker import Checker
 from bt_actions.document.findings import Related
 from bt_actions.document.infer import FLOAT, INTEGER, named
 from bt_actions.document.nodes import Mapping as YamlMapping
@@ -17,9 +17,6 @@ from bt_actions.document.types import TypeNameError, fits, misfits, parse_type
 from bt_actions.document.values import Computed, computed_in, constant_of, locate
 from bt_actions.messages.fields import FieldType, Listing, Message, Record, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
-
-if TYPE_CHECKING:
-    from bt_actions.document.check import Checker
 
 __all__ = ["CHECKS"]
 

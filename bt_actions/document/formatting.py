@@ -10,19 +10,12 @@ from __future__ import annotations
 from collections import Counter
 
 from bt_actions.document.comments import comments_of, scalars_of
+from bt_actions.document.compose import compose, compose_written
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.key_order import forms
 from bt_actions.document.layout import FormatError, Layout
 from bt_actions.document.model import TOP_KEYS
-from bt_actions.document.nodes import (
-    Alias,
-    Listing,
-    Mapping,
-    Node,
-    Scalar,
-    compose,
-    compose_written,
-)
+from bt_actions.document.nodes import Alias, Listing, Mapping, Node, Scalar
 from bt_actions.document.source import Source
 
 __all__ = ["FormatError", "format_source"]

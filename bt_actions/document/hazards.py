@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from bt_actions.document.build_names import resources_below, settings_of
-from bt_actions.document.check import Checker
+from bt_actions.document.checker import Checker
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.nodes import Mapping as YamlMapping
 from bt_actions.document.nodes import Node, span_of

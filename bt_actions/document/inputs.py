@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bt_actions.document.bounds import refuse_large
-from bt_actions.document.nodes import Node, compose
+from bt_actions.document.compose import compose
+from bt_actions.document.nodes import Node
 from bt_actions.document.source import Source, TooManyErrors
 from bt_actions.document.tree import Declared, Document
 from bt_actions.document.types import parse_type

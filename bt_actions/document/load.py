@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_actions.document.check import Checker
+from bt_actions.document.check import check_document
+from bt_actions.document.checker import Checker
 from bt_actions.document.find import TreeNotFoundError, find_tree, installed_trees
 from bt_actions.document.findings import LOADED, DocumentError, Finding, Severity, Span
 from bt_actions.document.hazards import find_hazards
@@ -244,7 +245,7 @@ def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> lis
     for document in sorted(workspace.documents, key=lambda one: one.root is not None):
         with contextlib.suppress(TooManyErrors):  # which are errors of this document: it is refused
             checker = Checker(document, types=types, python=python)
-            checker.check()
+            check_document(checker)
             doubts = Doubts(document)  # anew: the checker found more
             find_hazards(checker, doubts)
             has_unread = document.root is None and document.node.get("root") is not None

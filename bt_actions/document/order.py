@@ -12,7 +12,7 @@ from collections.abc import Set
 from functools import cached_property
 from typing import NamedTuple
 
-from bt_actions.document.check import Checker
+from bt_actions.document.checker import Checker
 from bt_actions.document.findings import Span
 from bt_actions.document.inner import inner_span
 from bt_actions.document.nodes import span_of

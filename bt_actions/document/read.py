@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping as MappingType
 from itertools import chain
 
+from bt_actions.document.compose import compose
 from bt_actions.document.elsewhere import kind_here
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS, Kind
-from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose, span_of
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.scalars import Name
 from bt_actions.document.shape import words_for, wrong_form
 from bt_actions.document.shapes import Key, Table, read_keys, report_unknown_key, required_in

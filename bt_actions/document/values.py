@@ -16,6 +16,7 @@ from typing import Final
 
 from bt_actions.document.bounds import MAX_ITEMS, refuse_large
 from bt_actions.document.braces import report_braces
+from bt_actions.document.compose import compose
 from bt_actions.document.cut import cut_hint, warn_cut
 from bt_actions.document.elsewhere import notation_here
 from bt_actions.document.findings import DocumentError
@@ -26,7 +27,6 @@ from bt_actions.document.nodes import (
     Node,
     Scalar,
     beyond_floats,
-    compose,
     data_of,
     span_of,
 )

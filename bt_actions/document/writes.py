@@ -2,25 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
 from bt_actions.document.infer import common_type, infer, type_of_literal
 from bt_actions.document.nodes import Mapping, Node
-from bt_actions.document.tree import Document, TreeNode
+from bt_actions.document.tree import Declared, Document, TreeNode
 from bt_actions.document.types import TypeNameError, parse_type
 from bt_actions.document.values import Computed, Interpolated
 from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
-
-if TYPE_CHECKING:
-    from bt_actions.document.check import Checker
 
 __all__ = ["Write", "infer_variables", "items_inside", "root_type", "writes_of"]
 
 _ROUNDS = 8
 """How far a type is followed from variable to variable, before none is taken for known."""
+
+
+class Known(Protocol):
+    """What has to be known of a document for the types of what its nodes write."""
+
+    types: bool
+    document: Document
+    variables: dict[str, FieldType | None]
+
+    def types_at(self, reader: object) -> Callable[[str], FieldType | None]:
+        """Gives the type of a variable as a node reads it."""
+        ...
+
+    def interface(self, name: str, kind: str, node: Node) -> type | None:
+        """The class of a type name."""
+        ...
+
+    def action_class(self, declared: Declared) -> type | None:
+        """The class of the action that a name stands for."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,38 +55,38 @@ class Write:
         """Does the type of what is written depend on those of variables?"""
         return isinstance(self.value, Computed) and bool(self.value.expression.names)
 
-    def type_in(self, checker: Checker) -> FieldType | None:
+    def type_in(self, known: Known) -> FieldType | None:
         """The type of what is written, without reporting anything."""
         if self.node.kind is not None and self.node.kind.name == "subtree":
-            return self._output_type(checker)
+            return self._output_type(known)
         if self.root == "item of":
-            return self._item_type(checker)
+            return self._item_type(known)
         if isinstance(self.value, Interpolated):
             return Scalar("string")
         if not isinstance(self.value, Computed):
             return type_of_literal(self.value)
-        roots = {} if self.root is None else {self.root: root_type(self.node, self.root, checker)}
-        return infer(self.value.expression, roots, checker.types_at(self.node), lambda *_: None,
-                     types=checker.types)  # fmt: skip
+        roots = {} if self.root is None else {self.root: root_type(self.node, self.root, known)}
+        return infer(self.value.expression, roots, known.types_at(self.node), lambda *_: None,
+                     types=known.types)  # fmt: skip
 
-    def _item_type(self, checker: Checker) -> FieldType | None:
+    def _item_type(self, known: Known) -> FieldType | None:
         """The type of what a for_each gives its child."""
         if isinstance(self.value, list):
             return common_type([type_of_literal(item) for item in self.value])
         if not isinstance(self.value, Computed):
             return None
-        kind = infer(self.value.expression, {}, checker.types_at(self.node), lambda *_: None,
-                     types=checker.types)  # fmt: skip
+        kind = infer(self.value.expression, {}, known.types_at(self.node), lambda *_: None,
+                     types=known.types)  # fmt: skip
         return kind.item if isinstance(kind, Listing) else None
 
-    def _output_type(self, checker: Checker) -> FieldType | None:
+    def _output_type(self, known: Known) -> FieldType | None:
         included = self.node.included
         declared = included.outputs.get(str(self.value)) if included is not None else None
         text = declared.values.get("type") if declared is not None else None
         if not isinstance(text, str):
             return None
         try:
-            return parse_type(text, types=checker.types)
+            return parse_type(text, types=known.types)
         except TypeNameError:
             return None
 
@@ -141,7 +158,7 @@ def items_inside(
     return inside
 
 
-def infer_variables(written: Iterable[Write], checker: Checker) -> None:
+def infer_variables(written: Iterable[Write], known: Known) -> None:
     """Give the variables that nodes write the one type that all of them write, or None.
 
     What is declared keeps its type. A value may be computed from a variable that is written further
@@ -150,40 +167,40 @@ def infer_variables(written: Iterable[Write], checker: Checker) -> None:
     """
     writers: dict[str, list[Write]] = {}
     for write in written:
-        if write.name not in checker.variables or write.name in writers:
+        if write.name not in known.variables or write.name in writers:
             writers.setdefault(write.name, []).append(write)
-            checker.variables.setdefault(write.name, None)
+            known.variables.setdefault(write.name, None)
     changed = True
     for _ in range(_ROUNDS):
         if not changed:
             break
         changed = False
         for name, writes in writers.items():
-            if checker.variables[name] is None:
-                kinds = {write.type_in(checker) for write in writes} - {None}
-                checker.variables[name] = kinds.pop() if len(kinds) == 1 else None
-                changed |= checker.variables[name] is not None
+            if known.variables[name] is None:
+                kinds = {write.type_in(known) for write in writes} - {None}
+                known.variables[name] = kinds.pop() if len(kinds) == 1 else None
+                changed |= known.variables[name] is not None
     open_still = {n: w for n, w in writers.items() if len(w) > 1 or w[0].depends}
     for _ in range(_ROUNDS):
         changed = False
         for name, writes in open_still.items():
-            known = checker.variables[name]
-            if known is not None and any(write.type_in(checker) != known for write in writes):
-                checker.variables[name] = None
+            kind = known.variables[name]
+            if kind is not None and any(write.type_in(known) != kind for write in writes):
+                known.variables[name] = None
                 changed = True
         if not changed:
             return
     for name in open_still:
-        checker.variables[name] = None
+        known.variables[name] = None
 
 
-def root_type(node: TreeNode, root: str, checker: Checker) -> FieldType | None:
+def root_type(node: TreeNode, root: str, known: Known) -> FieldType | None:
     """The type of the bare root that a node's expressions may use."""
-    if not checker.types:
+    if not known.types:
         return None
     if node.alias is not None:
-        declared = checker.document.actions.get(node.alias)
-        cls = checker.action_class(declared) if declared is not None else None
+        declared = known.document.actions.get(node.alias)
+        cls = known.action_class(declared) if declared is not None else None
         return None if cls is None else Message(cls.Result)  # type: ignore[attr-defined]
     if node.kind is None or node.kind.name not in _ANSWERS:
         return None
@@ -191,7 +208,7 @@ def root_type(node: TreeNode, root: str, checker: Checker) -> FieldType | None:
     name = RUN_TREE if node.kind.name == "run_tree" else node.values.get("type")
     if not isinstance(name, str):
         return None
-    cls = checker.interface(name, kind, node.written.get("type", node.key))
+    cls = known.interface(name, kind, node.written.get("type", node.key))
     if cls is None:
         return None
     return Message(getattr(cls, part) if part else cls)

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from bt_actions.document import DocumentError, source_of
 from bt_actions.document.bounds import refuse_large
+from bt_actions.document.compose import compose
 from bt_actions.document.nodes import Mapping as YamlMapping
-from bt_actions.document.nodes import compose, data_of
+from bt_actions.document.nodes import data_of
 from bt_actions.utilities.plain_text import clean
 
 __all__ = ["MAX_BYTES", "Refused", "inputs_of"]

@@ -385,7 +385,7 @@ def test_after_a_thousand_warnings_an_error_is_told_and_a_thousandth_says_that_t
     assert (error.code, error.hint) == ("BT201", None)
 
     *_, last = check_bytes((head + "    - sucess: A\n" * 2 * MAX_ERRORS).encode())
-    assert last.endpoint == 4 + MAX_ERRORS
+    assert last.line == 4 + MAX_ERRORS
     assert last.hint == "after 1,000 errors the rest of a file is not checked"
 
     path = tmp_path / "tree.yaml"
@@ -440,9 +440,9 @@ def test_a_long_line_is_shown_cut() -> None:
 
 def _words(findings: list[Finding]) -> None:
     for finding in findings:
-        assert finding.endpoint >= 1
+        assert finding.line >= 1
         assert finding.column >= 1
-        assert (finding.end_line, finding.end_column) > (finding.endpoint, finding.column)
+        assert (finding.end_line, finding.end_column) > (finding.line, finding.column)
         assert str(finding)
 
 

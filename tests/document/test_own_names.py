@@ -16,8 +16,8 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from bt_actions.document import DocumentError, tree_outputs
+from bt_actions.document.compose import compose
 from bt_actions.document.model import KINDS, NODE, NODES, TOP_KEYS
-from bt_actions.document.nodes import compose
 from bt_actions.document.scalars import Condition, Duration, Place, Text
 from bt_actions.document.shape import Shape
 from bt_actions.document.shapes import Key, ListOf, ListValue, OneOf, Record, Table, Values

@@ -15,7 +15,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.document.build_names import join_names
-from bt_actions.document.nodes import compose
+from bt_actions.document.compose import compose
 from bt_actions.document.ros_names import LONGEST, LONGEST_NAMESPACE, RosName
 from bt_actions.document.source import Source
 from bt_actions.document.values import BAD

@@ -12,8 +12,9 @@ import pytest
 
 from bt_actions.cli import main
 from bt_actions.document import check_file
+from bt_actions.document.compose import compose
 from bt_actions.document.model import KINDS
-from bt_actions.document.nodes import Listing, Mapping, Node, Scalar, compose
+from bt_actions.document.nodes import Listing, Mapping, Node, Scalar
 from bt_actions.document.pages import PAGES
 from bt_actions.document.schema import json_schema
 from bt_actions.document.source import Source

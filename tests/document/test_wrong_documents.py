@@ -41,7 +41,7 @@ def read_table() -> list[Case]:
 def said(finding: Finding) -> list[str]:
     """A finding as the table has it."""
     where = f"{finding.line}:{finding.column}-"
-    if finding.end_line != finding.endpoint:
+    if finding.end_line != finding.line:
         where += f"{finding.end_line}:"
     lines = [f">> {where}{finding.end_column} {finding.severity}[{finding.code}] {finding.message}"]
     if finding.hint:
