@@ -17,12 +17,15 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Access, Status
 
 from bt_actions.behaviours.conditions import condition_of, function_of, unknown_field
-from bt_actions.behaviours.node import node_in
+from bt_actions.behaviours.node import backend_in
 from bt_actions.behaviours.variables import key, resolve, variables_in, write
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.goals.terms import Event
+from bt_actions.messages.conversion import MessageError, fill
+from bt_actions.messages.interfaces import interface
+from bt_actions.traffic.backend import Backend
 from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
@@ -119,6 +122,7 @@ class ActionBehaviour(Behaviour):
         self._save = {key: function_of(place, "save") for key, place in self.save.items()}
         self._to_save: dict[str, Any] = {}
         self._shown_feedback: tuple[Any, str] = (None, "")
+        self._backend: Backend | None = None
         self._traffic: Traffic | None = None
         self._endpoint: Any = None
         self._handle: GoalHandle | None = None
@@ -218,19 +222,16 @@ class ActionBehaviour(Behaviour):
         that its result has not; UnknownInterface (a LookupError) when the action type is not
         installed.
         """
-        node = node_in(kwargs, self)
-        from bt_actions.messages.conversion import interface
-        from bt_actions.traffic.traffic import Traffic
-
+        backend = backend_in(kwargs, self)
         if isinstance(self.action_type, str):
             self.action_type = interface(self.action_type, "action")
         self._check_fields()
-        traffic = Traffic.of(node)
+        traffic = backend.traffic
         if traffic is self._traffic:
             return
         self._leave_endpoint()
         self._endpoint = traffic.endpoint(self.action_type, self.action_name)
-        self._traffic = traffic
+        self._backend, self._traffic = backend, traffic
 
     def initialise(self) -> None:
         """Begin a visit. What an earlier one left behind is drained beside it."""
@@ -385,19 +386,14 @@ class ActionBehaviour(Behaviour):
         return bool(history) and history[-1].goal is handle.goal
 
     def _make_message(self) -> Any:
-        from bt_actions.messages.conversion import fill
-
-        assert self._traffic is not None
+        assert self._backend is not None
         assert not isinstance(self.action_type, str)
         data = self.goal() if callable(self.goal) else self.goal
-        clock = self._traffic.node.get_clock()
         goal_type: type[Any] = self.action_type.Goal  # type: ignore[attr-defined]
-        return fill(goal_type, resolve(data), now=lambda: int(clock.now().nanoseconds))
+        return fill(goal_type, resolve(data), now=self._backend.clock.stamp)
 
     def _check_fields(self) -> None:
         """Find before anything moves what would be found when a goal is sent, or has ended."""
-        from bt_actions.messages.conversion import MessageError, fill
-
         action: Any = self.action_type
         if isinstance(self.goal, Mapping) and not variables_in(self.goal):
             try:

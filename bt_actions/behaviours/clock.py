@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from bt_actions.traffic.backend import Clock
+from bt_actions.wiring import backend_of
+
 __all__ = ["Countdown", "NodeTime"]
 
 
@@ -12,19 +15,14 @@ class NodeTime:
     """Seconds on the clock of the node that a tree was set up with."""
 
     def __init__(self) -> None:
-        self._clocks: Any = None
+        self._clock: Clock | None = None
 
     def setup(self, node: Any) -> None:
         """Read `node`'s clock from now on; None keeps to the steady clock."""
-        if node is None:
-            self._clocks = None
-            return
-        from bt_actions.traffic.traffic import Traffic
-
-        self._clocks = Traffic.of(node).clocks
+        self._clock = None if node is None else backend_of(node).clock
 
     def now(self) -> float:
-        return time.monotonic() if self._clocks is None else self._clocks.now().ros
+        return time.monotonic() if self._clock is None else self._clock.now().ros
 
 
 class Countdown:

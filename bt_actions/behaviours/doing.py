@@ -9,6 +9,9 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_actions.traffic.backend import Backend
+from bt_actions.wiring import backend_of
+
 __all__ = ["LEVELS", "Log", "SetValues"]
 
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
@@ -58,11 +61,11 @@ class Log(Behaviour):
             raise ValueError(f"level must be one of {', '.join(LEVELS)}, not {level!r}")
         self._text = text
         self._level = level
-        self._logger: Any = None
+        self._backend: Backend | None = None
 
     def setup(self, **kwargs: Any) -> None:
         node = kwargs.get("node")
-        self._logger = node.get_logger() if node is not None else None
+        self._backend = None if node is None else backend_of(node)
 
     def update(self) -> Status:
         try:
@@ -71,10 +74,8 @@ class Log(Behaviour):
             self.feedback_message = str(error)
             return Status.FAILURE
         self.feedback_message = line
-        if self._logger is None:
+        if self._backend is None:
             logging.getLogger("bt_actions").log(LEVELS[self._level], "%s", line)
         else:
-            from bt_actions.ros.log import log
-
-            log.by(self._logger, self._level, line)
+            self._backend.log(self._level, line)
         return Status.SUCCESS

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.conditions import condition_of
-from bt_actions.behaviours.node import node_in
+from bt_actions.behaviours.node import backend_in
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
-
-if TYPE_CHECKING:
-    from bt_actions.ros.service_client import ServiceClient
+from bt_actions.messages.conversion import fill
+from bt_actions.messages.interfaces import interface
+from bt_actions.traffic.backend import Backend, Service
 
 __all__ = ["CallService"]
 
@@ -66,20 +65,19 @@ class CallService(Behaviour):
         self._clock = NodeTime()
         self._countdown = Countdown(self._clock)
         self._pause = Countdown(self._clock)
-        self._chance = random.Random()
-        self._node: Any = None
-        self._client: ServiceClient | None = None
+        self._backend: Backend | None = None
+        self._client: Service | None = None
 
     def setup(self, **kwargs: Any) -> None:
-        node = node_in(kwargs, self)
-        if node is self._node:
+        backend = backend_in(kwargs, self)
+        if backend is self._backend:
             return
-        from bt_actions.ros.service_client import ServiceClient
-
+        if isinstance(self.service_type, str):
+            self.service_type = interface(self.service_type, "srv")
         self.shutdown()
-        self._clock.setup(node)
-        self._client = ServiceClient(node, self.service_type, self.service_name)
-        self._node = node
+        self._clock.setup(backend)
+        self._client = backend.service(self.service_type, self.service_name)
+        self._backend = backend
 
     def initialise(self) -> None:
         assert self._client is not None, "not set up"
@@ -119,7 +117,7 @@ class CallService(Behaviour):
     def shutdown(self) -> None:
         if self._client is not None:
             self._client.close()
-        self._client = self._node = None
+        self._client = self._backend = None
 
     def due_in(self) -> float | None:
         """Seconds until the next deadline or try."""
@@ -129,27 +127,33 @@ class CallService(Behaviour):
             return 0.05  # nothing announces that a service has come up
         return None if self._limits[1] is None else self._countdown.left()
 
-    def _try_to_call(self, client: ServiceClient) -> Status:
+    def _try_to_call(self, client: Service) -> Status:
         if not client.ready:
             self.feedback_message = f"waiting for the service {client.name}"
             if self._limits[0] is not None and self._countdown.left() <= 0.0:
                 why = client.why_absent()
                 return self._failed(f"no service {client.name} within {self._limits[0]:g} s{why}")
             return Status.RUNNING
+        assert self._backend is not None
+        service_type: Any = self.service_type
         try:
-            client.call(self._request())
+            request: Any = fill(
+                service_type.Request, self._request(), now=self._backend.clock.stamp
+            )
         except ValueError as error:
             self.feedback_message = str(error)
             return Status.FAILURE
+        client.call(request)
         self._countdown.start(self._limits[1] or 0.0)
         self.feedback_message = f"called {client.name}"
         return Status.RUNNING
 
     def _failed(self, reason: str) -> Status:
+        assert self._backend is not None
         self.feedback_message = reason
         if self.attempt >= self.retry.attempts or not self._worth_it():
             return Status.FAILURE
-        self._pause.start(self.retry.pause(self.attempt, self._chance))
+        self._pause.start(self.retry.pause(self.attempt, self._backend.randomness))
         self.attempt += 1
         self.response = None
         self._countdown.start((self._limits[0] or 0.0) + self._pause.left())

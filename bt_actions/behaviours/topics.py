@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.clock import Countdown, NodeTime
-from bt_actions.behaviours.node import node_in
+from bt_actions.behaviours.latest import Latest
+from bt_actions.behaviours.node import backend_in
 from bt_actions.expressions.expression import ExpressionError
-
-if TYPE_CHECKING:
-    from bt_actions.ros.topics import Latest, Speaker
+from bt_actions.messages.conversion import fill
+from bt_actions.messages.interfaces import interface
+from bt_actions.traffic.backend import Backend, Publisher
+from bt_actions.wiring import backend_of
 
 __all__ = ["Publish", "TopicValue", "WaitForMessage", "patient"]
 
@@ -23,11 +24,7 @@ LOOKS = 0.05
 
 
 def _class(message_type: type | str) -> type:
-    if isinstance(message_type, type):
-        return message_type
-    from bt_actions.messages.interfaces import interface
-
-    return interface(message_type, "msg")
+    return message_type if isinstance(message_type, type) else interface(message_type, "msg")
 
 
 class TopicValue:
@@ -41,26 +38,25 @@ class TopicValue:
         self._topic = topic
         self._qos = qos
         self._max_age = max_age
-        self._node: Any = None
+        self._backend: Backend | None = None
         self._latest: Latest | None = None
         self._said = ""
         self._look_again_at = 0.0
 
     def connect(self, node: Any) -> None:
         """Subscribe on a node; again for the same node: nothing."""
-        if node is None or node is self._node:
+        backend = None if node is None else backend_of(node)
+        if backend is None or backend is self._backend:
             return
-        from bt_actions.ros.topics import Latest
-
         self.close()
-        self._latest = Latest(node, _class(self._type), self._topic, self._qos)
-        self._node = node
+        self._latest = Latest(backend, _class(self._type), self._topic, self._qos)
+        self._backend = backend
 
     def close(self) -> None:
         """Unsubscribe."""
         if self._latest is not None:
             self._latest.close()
-        self._latest = self._node = None
+        self._latest = self._backend = None
 
     def read(self) -> object:
         """The latest message. Raises ExpressionError when there is none, or it is too old."""
@@ -78,9 +74,10 @@ class TopicValue:
 
     def _why(self) -> str:
         """Why nothing has come; looked up once a second at most, as a tree may ask at each tick."""
-        now = time.monotonic()
-        if self._latest is not None and now >= self._look_again_at:
-            self._said, self._look_again_at = self._latest.why_silent(), now + 1.0
+        if self._latest is not None and self._backend is not None:
+            now = self._backend.clock.now().steady
+            if now >= self._look_again_at:
+                self._said, self._look_again_at = self._latest.why_silent(), now + 1.0
         return self._said
 
 
@@ -148,19 +145,17 @@ class WaitForMessage(Behaviour):
         self._clock = NodeTime()
         self._countdown = Countdown(self._clock)
         self._came_before = 0
-        self._node: Any = None
+        self._backend: Backend | None = None
         self._latest: Latest | None = None
 
     def setup(self, **kwargs: Any) -> None:
-        node = node_in(kwargs, self)
-        if node is self._node:
+        backend = backend_in(kwargs, self)
+        if backend is self._backend:
             return
-        from bt_actions.ros.topics import Latest
-
         self.shutdown()
-        self._clock.setup(node)
-        self._latest = Latest(node, _class(self._type), self._topic, self._qos)
-        self._node = node
+        self._clock.setup(backend)
+        self._latest = Latest(backend, _class(self._type), self._topic, self._qos)
+        self._backend = backend
         if self.status is Status.RUNNING:  # shut down in its visit, and set up again
             self._latest.keep()
 
@@ -203,7 +198,7 @@ class WaitForMessage(Behaviour):
     def shutdown(self) -> None:
         if self._latest is not None:
             self._latest.close()
-        self._latest = self._node = None
+        self._latest = self._backend = None
 
 
 class Publish(Behaviour):
@@ -247,19 +242,17 @@ class Publish(Behaviour):
         self._timeout = timeout
         self._clock = NodeTime()
         self._countdown = Countdown(self._clock)
-        self._node: Any = None
-        self._speaker: Speaker | None = None
+        self._backend: Backend | None = None
+        self._publisher: Publisher | None = None
 
     def setup(self, **kwargs: Any) -> None:
-        node = node_in(kwargs, self)
-        if node is self._node:
+        backend = backend_in(kwargs, self)
+        if backend is self._backend:
             return
-        from bt_actions.ros.topics import Speaker
-
         self.shutdown()
-        self._clock.setup(node)
-        self._speaker = Speaker(node, _class(self._type), self._topic, self._qos)
-        self._node = node
+        self._clock.setup(backend)
+        self._publisher = backend.publisher(_class(self._type), self._topic, self._qos)
+        self._backend = backend
 
     def initialise(self) -> None:
         self.warning = ""
@@ -267,44 +260,40 @@ class Publish(Behaviour):
             self._countdown.start(self._timeout)
 
     def update(self) -> Status:
-        from bt_actions.messages.conversion import fill
-
-        assert self._speaker is not None, "not set up"
-        topic, listeners = self._speaker.topic, self._speaker.listeners
-        if listeners < (self._subscribers or self._speaker.listener_may_come() > 0.0):
-            if self._subscribers and self._is_late(self._speaker):
+        assert self._publisher is not None, "not set up"
+        assert self._backend is not None
+        topic, listeners = self._publisher.topic, self._publisher.listeners
+        if listeners < (self._subscribers or self._publisher.listener_may_come() > 0.0):
+            if self._subscribers and self._is_late(self._publisher):
                 self.feedback_message = (
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
-                    f" {self._timeout:g} s{self._speaker.why_unheard()}"
+                    f" {self._timeout:g} s{self._publisher.why_unheard()}"
                 )
                 return Status.FAILURE
             self.feedback_message = f"waiting for who listens on {topic}"
             return Status.RUNNING
-        clock = self._node.get_clock()
         try:
-            message: Any = fill(
-                _class(self._type), self._data(), now=lambda: int(clock.now().nanoseconds)
-            )
+            message: Any = fill(_class(self._type), self._data(), now=self._backend.clock.stamp)
         except ValueError as error:
             self.feedback_message = str(error)
             return Status.FAILURE
-        self._speaker.publish(message)
+        self._publisher.publish(message)
         if not listeners:
-            self.warning = f"nobody listens on {topic}{self._speaker.why_unheard()}"
+            self.warning = f"nobody listens on {topic}{self._publisher.why_unheard()}"
         self.feedback_message = self.warning
         return Status.SUCCESS
 
-    def _is_late(self, speaker: Speaker) -> bool:
+    def _is_late(self, publisher: Publisher) -> bool:
         """Whether nobody more is waited for: the time is over, and who is there is discovered."""
         if self._timeout is None or self._countdown.left() > 0.0:
             return False
-        return speaker.listener_may_come() <= 0.0
+        return publisher.listener_may_come() <= 0.0
 
     def due_in(self) -> float | None:
         """Seconds until it looks again for who listens."""
         return LOOKS
 
     def shutdown(self) -> None:
-        if self._speaker is not None:
-            self._speaker.close()
-        self._speaker = self._node = None
+        if self._publisher is not None:
+            self._publisher.close()
+        self._publisher = self._backend = None

@@ -33,6 +33,10 @@ class Clocks:
         with lock:  # two threads that find simulated time switched on must not both make up for it
             return self._now()
 
+    def stamp(self) -> int:
+        """The node's own clock in nanoseconds, as the headers of messages have it."""
+        return int(self._clock.now().nanoseconds)
+
     def _now(self) -> Now:
         steady = time.monotonic()
         simulated, reading = False, steady

@@ -5,34 +5,28 @@ Decides nothing: neither how long to wait nor whether to call again. Never block
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
-from bt_actions.messages.conversion import fill
-from bt_actions.messages.interfaces import interface, interface_name
+from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.in_sight import without_service
-from bt_actions.ros.topics import wake
 
 __all__ = ["ServiceClient"]
 
 
 class ServiceClient:
-    """A client of one service on a node, and its call under way, if any."""
+    """A client of one service on a node; the Service of traffic/backend.py."""
 
-    def __init__(self, node: Node, service_type: type | str, service_name: str) -> None:
-        """Create the client in a callback group of its own.
-
-        Raises UnknownInterface (a LookupError) when the service type is not installed.
-        """
-        if isinstance(service_type, str):
-            service_type = interface(service_type, "srv")
-        self.service_type: Any = service_type
+    def __init__(self, node: Node, service_type: type, name: str, wake: Callable[[], None]) -> None:
         self._node = node
+        self._type = service_type
+        self._wake = wake
         self._future: Any = None
         self._client = node.create_client(
-            self.service_type, service_name, callback_group=MutuallyExclusiveCallbackGroup()
+            service_type, name, callback_group=MutuallyExclusiveCallbackGroup()
         )
 
     @property
@@ -42,7 +36,7 @@ class ServiceClient:
 
     def why_absent(self) -> str:
         """What the graph shows in place of the service, behind a colon."""
-        return without_service(self._node, self.name, interface_name(self.service_type))
+        return without_service(self._node, self.name, interface_name(self._type))
 
     @property
     def ready(self) -> bool:
@@ -59,16 +53,11 @@ class ServiceClient:
         """Whether the call was answered."""
         return self._future is not None and bool(self._future.done())
 
-    def call(self, fields: object) -> None:
-        """Begin a call with these fields; what is still under way is dropped.
-
-        Raises ValueError where they do not fit the request.
-        """
+    def call(self, request: Any) -> None:
+        """Begin a call; what is still under way is dropped."""
         self.drop()
-        clock, node = self._node.get_clock(), self._node
-        request = fill(self.service_type.Request, fields, now=lambda: int(clock.now().nanoseconds))
         self._future = self._client.call_async(request)
-        self._future.add_done_callback(lambda _: wake(node))
+        self._future.add_done_callback(lambda _: self._wake())
 
     def answer(self) -> Any:
         """Return the answer of a call that was answered; the call is over."""

@@ -349,12 +349,13 @@ def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_ti
     from rclpy.executors import SingleThreadedExecutor
     from std_msgs.msg import Int32
 
+    from bt_actions.behaviours.latest import KEPT, Latest
     from bt_actions.behaviours.topics import WaitForMessage
-    from bt_actions.ros.topics import KEPT, Latest
+    from bt_actions.wiring import backend_of
 
     waits = WaitForMessage("w", Int32, name, until=lambda message: message.data == 2)
     waits.setup(node=node)
-    seen = Latest(node, Int32, name, "default")
+    seen = Latest(backend_of(node), Int32, name, "default")
     publisher = node.create_publisher(Int32, name, 10)
     until(lambda: publisher.get_subscription_count() == 2)
     executor = SingleThreadedExecutor(context=node.context)
@@ -565,9 +566,9 @@ def test_what_was_published_has_a_second_to_arrive_before_its_publisher_goes(
 ) -> None:
     from std_msgs.msg import Bool
 
-    from bt_actions.ros.topics import Speaker
+    from bt_actions.wiring import backend_of
 
-    speaker = Speaker(node, Bool, name, "default")
+    speaker: Any = backend_of(node).publisher(Bool, name, "default")
     answers = [True, False, False] if acknowledged else [False] * 1000
     monkeypatch.setattr(speaker._publisher, "wait_for_all_acked", lambda _limit: answers.pop())
     speaker.publish(Bool())
@@ -583,7 +584,7 @@ def test_a_message_that_nobody_listens_to_is_published_with_a_warning_when_the_n
     from bt_actions.ros import topics
 
     new = [0.5]
-    monkeypatch.setattr(topics, "discovers", lambda _node: new[0])
+    monkeypatch.setattr(topics._Topic, "_undiscovered", lambda _topic: new[0])
     hasty: Any = load(LAMP.format(topic=name, more=", subscribers: 1, timeout: 1 ns"))
     root: Any = load(LAMP.format(topic=name, more=""))
     hasty.setup(node=node)

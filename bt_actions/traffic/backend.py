@@ -1,0 +1,141 @@
+"""What `setup(node=...)` resolves to: all that a leaf, or a run, asks of the world, as protocols.
+
+ros/backend.py keeps them over rclpy, for one node. One that stands for no node at all is given to
+`setup` in a node's place. Nothing is decided here, and nothing of ROS is imported.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+from bt_actions.goals.terms import Now
+
+if TYPE_CHECKING:
+    from bt_actions.traffic.traffic import Traffic
+
+__all__ = ["Backend", "Clock", "Publisher", "Service", "Subscription"]
+
+
+class Clock(Protocol):
+    """A node's two clocks."""
+
+    def now(self) -> Now:
+        """This moment."""
+
+    def stamp(self) -> int:
+        """The node's own clock in nanoseconds, as the headers of messages have it."""
+
+
+class Service(Protocol):
+    """A client of one service, and its call under way, if any. Wakes the tree at the answer."""
+
+    @property
+    def name(self) -> str:
+        """The service's full name."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether the service is there."""
+
+    @property
+    def calling(self) -> bool:
+        """Whether a call was begun and neither answered nor dropped since."""
+
+    @property
+    def answered(self) -> bool:
+        """Whether the answer of the call is here, and was not taken yet."""
+
+    def why_absent(self) -> str:
+        """What is there in place of the service, behind a colon; or an empty text."""
+
+    def call(self, request: Any) -> None:
+        """Begin a call; what is still under way is dropped."""
+
+    def answer(self) -> Any:
+        """Take the answer of a call that was answered; the call is over."""
+
+    def drop(self) -> None:
+        """Take no interest in an answer any more."""
+
+    def close(self) -> None:
+        """Drop the call and let go of the service."""
+
+
+class Subscription(Protocol):
+    """One topic, listened to."""
+
+    @property
+    def topic(self) -> str:
+        """The topic's full name."""
+
+    def first_may_come(self) -> float:
+        """Seconds for which a first message may be on its way; 0 afterwards."""
+
+    def why_silent(self) -> str:
+        """What explains that nothing has come, behind a colon; or an empty text."""
+
+    def close(self) -> None:
+        """Unsubscribe."""
+
+
+class Publisher(Protocol):
+    """One topic, spoken on."""
+
+    @property
+    def topic(self) -> str:
+        """The topic's full name."""
+
+    @property
+    def listeners(self) -> int:
+        """How many subscriptions get what is published."""
+
+    def listener_may_come(self) -> float:
+        """Seconds for which one that is there may not be discovered yet; 0 afterwards."""
+
+    def why_unheard(self) -> str:
+        """What explains that nobody listens, behind a colon; or an empty text."""
+
+    def publish(self, message: Any) -> None:
+        """Publish; returns at once."""
+
+    def close(self) -> None:
+        """Go, once the listeners have all, or a second after the last message."""
+
+
+@runtime_checkable
+class Backend(Protocol):
+    """The world as one node sees it. Relative names are in the node's namespace."""
+
+    @property
+    def traffic(self) -> Traffic:
+        """The goals of this node."""
+
+    @property
+    def clock(self) -> Clock:
+        """Time."""
+
+    @property
+    def randomness(self) -> random.Random:
+        """What varies the pauses before retries."""
+
+    def service(self, service_type: type, name: str) -> Service:
+        """Become a client of a service."""
+
+    def subscription(
+        self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
+    ) -> Subscription:
+        """Listen; `take` is called with each message, on any thread, and only takes note of it.
+
+        `qos` is as the tree language calls it.
+        """
+
+    def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
+        """Become a publisher."""
+
+    def wake(self) -> None:
+        """Have whoever runs a tree here tick it soon; callable from any thread."""
+
+    def log(self, level: str, text: str) -> None:
+        """Write a line of the tree's: debug, info, warn, error or fatal."""

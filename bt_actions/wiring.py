@@ -1,0 +1,51 @@
+"""The one door to ROS: from a node, or nothing, to what leaves and runs work with.
+
+Behaviours and runs ask here. rclpy is imported with the first question, not before: trees are
+loaded, checked and drawn without it. Nothing is kept or decided here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
+
+from bt_actions.traffic.backend import Backend
+
+if TYPE_CHECKING:
+    from bt_actions.ros.log import Log
+    from bt_actions.ros.spinning import Spinner
+
+__all__ = ["backend_of", "ended_by_signals", "log", "spinner"]
+
+
+def backend_of(node: Any) -> Backend:
+    """Return what a node gives; what is a Backend itself is returned as it is."""
+    if isinstance(node, Backend):
+        return node
+    from bt_actions.ros.backend import RosBackend
+
+    return RosBackend.of(node)
+
+
+def spinner(node: Any, executor: Any, **given: Any) -> Spinner:
+    """Return a node that is spun, made here where none is given; see ros/spinning.py."""
+    from bt_actions.ros.spinning import Spinner
+
+    return Spinner(node, executor, **given)
+
+
+def ended_by_signals(
+    interrupt: Callable[[bool, bool], bool | None], last_words: Callable[[], object]
+) -> AbstractContextManager[None]:
+    """Call `interrupt` at signals that would end the process; see ros/signals.py."""
+    from bt_actions.ros.signals import ended_by_signals
+
+    return ended_by_signals(interrupt, last_words)
+
+
+def log() -> Log:
+    """Return the log of this package, which is written without holding up anybody."""
+    from bt_actions.ros.log import log
+
+    return log
