@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from bt_actions.cli import signals
+from bt_actions.cli.driving import signals
 from tests.support.processes import Host, Journal, Process
 
 _numbers = itertools.count(1)

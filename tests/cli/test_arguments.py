@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from bt_actions import cli
-from bt_actions.cli.common import BadInput
-from bt_actions.cli.values import goal_fields, nested, value
+from bt_actions.cli.arguments.values import goal_fields, nested, value
+from bt_actions.cli.exits import BadInput
+from bt_actions.cli.program import COMMANDS
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -81,7 +82,7 @@ def test_without_arguments_the_help_is_shown(capsys: pytest.CaptureFixture[str])
     assert "commands:" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("command", sorted(cli.COMMANDS))
+@pytest.mark.parametrize("command", sorted(COMMANDS))
 def test_each_command_has_a_help_text_with_an_example(
     command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from bt_actions.cli import main
-from bt_actions.cli.cleanup import _Stop, sweep
-from bt_actions.cli.signals import SAME_WISH
+from bt_actions.cli.driving.signals import SAME_WISH
+from bt_actions.cli.driving.sweep import _Stop, sweep
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.sweep import LeftBehind, Swept

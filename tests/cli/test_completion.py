@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions import cli
+from bt_actions.cli.program import COMMANDS, build_parser
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ _bt_actions; printf '%s\\n' "${{COMPREPLY[@]}}"
 @pytest.mark.parametrize("script", ["bash"], indirect=True)
 def test_bash_completes_commands_options_and_choices(script: str) -> None:
     assert bash_completes(script, "bt-actions", "re") == ["render"]
-    assert set(bash_completes(script, "bt-actions", "")) >= {*cli.COMMANDS, "--help"}
+    assert set(bash_completes(script, "bt-actions", "")) >= {*COMMANDS, "--help"}
     assert bash_completes(script, "bt-actions", "run", "--exec") == ["--executor"]
     assert bash_completes(script, "bt-actions", "run", "--executor", "m") == ["multi"]
     assert bash_completes(script, "bt-actions", "completion", "z") == ["zsh"]
@@ -68,7 +69,7 @@ def test_bash_completes_files(script: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("script", ["zsh", "fish"], indirect=True)
 def test_the_other_shells_scripts_name_every_command_and_option(script: str) -> None:
-    for name, parser in cli.build_parser().commands.items():
+    for name, parser in build_parser().commands.items():
         assert name in script
         for action in parser._actions:
             for option in action.option_strings:

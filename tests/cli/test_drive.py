@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from bt_actions.cli.common import Exit
-from bt_actions.cli.drive import Drive, Ended
-from bt_actions.cli.signals import SAME_WISH, Signals
-from bt_actions.cli.views import LineView
-from bt_actions.cli.words import Closing
+from bt_actions.cli.driving.drive import Drive, Ended
+from bt_actions.cli.driving.signals import SAME_WISH, Signals
+from bt_actions.cli.exits import Exit
+from bt_actions.cli.views.lines import LineView
+from bt_actions.cli.views.words import Closing
 from bt_actions.events import Event
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report

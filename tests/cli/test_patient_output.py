@@ -23,10 +23,10 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.cli import patient_file
-from bt_actions.cli.patient_file import PatientFile, gap_text
-from bt_actions.cli.patient_output import PatientOutput
-from bt_actions.cli.signals import SAME_WISH
+from bt_actions.cli.driving.signals import SAME_WISH
+from bt_actions.cli.streams import patient_file
+from bt_actions.cli.streams.patient_file import PatientFile, gap_text
+from bt_actions.cli.streams.patient_output import PatientOutput
 from tests.support.processes import PATIENCE, ROOT, Journal
 from tests.support.waiting import holds_for, until
 

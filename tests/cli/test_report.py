@@ -15,8 +15,8 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Inverter
 
-from bt_actions.cli.common import Exit
-from bt_actions.cli.words import Closing, goal_text, last_words
+from bt_actions.cli.exits import Exit
+from bt_actions.cli.views.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import PLACE
 from bt_actions.events import Event, NodeChanged, TreeFinished

@@ -9,8 +9,9 @@ import pytest
 
 from bt_actions import load_tree
 from bt_actions.cli import main
-from bt_actions.cli.common import BadInput, load
-from bt_actions.cli.ros_arguments import as_inputs, parameters
+from bt_actions.cli.arguments.loading import load
+from bt_actions.cli.arguments.ros_arguments import as_inputs, parameters
+from bt_actions.cli.exits import BadInput
 from bt_actions.document import tree_inputs
 from tests.cli.conftest import Start
 

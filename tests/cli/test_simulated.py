@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions import load_tree
-from bt_actions.cli.simulated import remark, wanted
+from bt_actions.cli.driving.simulated import remark, wanted
 
 FOREIGN = """\
 tree: t

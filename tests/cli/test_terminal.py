@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 import pyte
 import pytest
 
-from bt_actions.cli.signals import SAME_WISH
+from bt_actions.cli.driving.signals import SAME_WISH
 from tests.cli.conftest import marked
 from tests.support.processes import PATIENCE, ROOT
 

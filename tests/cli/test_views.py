@@ -18,11 +18,13 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from rich.console import Console
 
-from bt_actions.cli.choosing import choose
-from bt_actions.cli.common import Exit
-from bt_actions.cli.live import LiveView, suits
-from bt_actions.cli.views import JsonView, LineView, View
-from bt_actions.cli.words import Closing, fields_text, last_words, result_lines
+from bt_actions.cli.exits import Exit
+from bt_actions.cli.views.choosing import choose
+from bt_actions.cli.views.json_lines import JsonView
+from bt_actions.cli.views.lines import LineView
+from bt_actions.cli.views.live import LiveView, suits
+from bt_actions.cli.views.view import View
+from bt_actions.cli.views.words import Closing, fields_text, last_words, result_lines
 from bt_actions.document import load_tree
 from bt_actions.document.findings import LOADED
 from bt_actions.events import Event, TreeFinished

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.cli import build_parser
+from bt_actions.cli.program import build_parser
 from tests.serving.conftest import MAIN
 from tests.support.launch_stand_in import expand
 from tests.support.processes import Process

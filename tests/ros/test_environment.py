@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from bt_actions import cli
+from bt_actions.cli.program import COMMANDS
 from bt_actions.ros.environment import SHORT_LEASE, Reach, prepare
 from tests.support.middleware import on_loopback
 
@@ -50,10 +51,10 @@ def test_each_of_our_programs_has_the_short_lease_before_it_does_anything(
     given = list[str]()
     command = words.split()[0]
     does = SimpleNamespace(
-        add_parser=cli.COMMANDS[command].add_parser,
+        add_parser=COMMANDS[command].add_parser,
         run=lambda _: given.append(_get("FASTRTPS_DEFAULT_PROFILES_FILE")) or 0,
     )
-    monkeypatch.setitem(cli.COMMANDS, command, does)
+    monkeypatch.setitem(COMMANDS, command, does)
     assert cli.main(words.split()) == 0
     assert given == [profile or str(SHORT_LEASE)]
 

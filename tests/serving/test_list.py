@@ -13,7 +13,7 @@ from bt_actions_interfaces.srv import ListTrees
 from rclpy.node import Node
 
 from bt_actions.cli import main
-from bt_actions.cli.list_trees import text_of, tree_data
+from bt_actions.cli.commands.list_trees import text_of, tree_data
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Process
 

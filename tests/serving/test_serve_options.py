@@ -12,7 +12,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 
 from bt_actions.cli import main
-from bt_actions.cli.signals import SAME_WISH
+from bt_actions.cli.driving.signals import SAME_WISH
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Journal, Process
 from tests.support.tree_client import TreeClient

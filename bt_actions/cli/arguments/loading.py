@@ -1,0 +1,73 @@
+"""The tree that a command is given, with the values of its inputs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.arguments.ros_arguments import as_inputs
+from bt_actions.cli.arguments.values import split
+from bt_actions.cli.exits import BadInput
+from bt_actions.cli.streams.writing import columns, note
+
+if TYPE_CHECKING:
+    from py_trees.behaviour import Behaviour
+
+    from bt_actions.document import DocumentError
+
+
+def load(
+    tree: str,
+    settings: Iterable[str],
+    *,
+    python: bool = True,
+    parameters: Mapping[str, object] = MappingProxyType({}),
+) -> Behaviour:
+    """Load a tree by path or by the name of an installed one, with `--set` words for its inputs.
+
+    Where they say nothing, ROS parameters by the names of inputs do. With `python=False` a tree
+    with a `python:` node is refused, and nothing it names is imported.
+
+    Raises BadInput with all findings, or about the first input that does not fit.
+    """
+    from bt_actions.document import (
+        DocumentError,
+        InputError,
+        TreeNotFoundError,
+        find_tree,
+        load_tree,
+        parse_input,
+        tree_inputs,
+    )
+
+    texts: dict[str, str] = {}
+    for word in settings:
+        name, text = split(word, "--set")
+        if name in texts:
+            raise BadInput(f"--set {name} is given twice: {texts[name]!r} and {text!r}")
+        texts[name] = text
+    try:
+        found = find_tree(tree)
+        if Path(tree).suffix and found != Path(tree) and "://" not in tree:
+            note(f"bt-actions: there is no {tree} in this folder; taking the installed {found}")
+        declared = tree_inputs(tree) if texts or parameters else {}
+        inputs = as_inputs(parameters, declared, tree)
+        for name, text in texts.items():
+            kind = declared[name].type if name in declared else "string"
+            try:
+                inputs[name] = parse_input(text, kind)
+            except ValueError as error:
+                raise BadInput(f"--set {name}={text}: {error}") from error
+        return load_tree(tree, inputs, python=python)
+    except DocumentError as error:
+        raise BadInput(findings_text(error), prefixed=False) from error
+    except (InputError, TreeNotFoundError) as error:
+        raise BadInput(str(error)) from error
+
+
+def findings_text(error: DocumentError) -> str:
+    """What is wrong with a document, for standard error."""
+    return "\n".join(finding.text(columns(sys.stderr)) for finding in error.findings)

@@ -1,0 +1,76 @@
+"""The argument parser of all commands: no abbreviations, examples kept as written, suggestions.
+
+An unknown command or option is answered with the nearest known one, on one line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn, TypeAlias
+
+from bt_actions.cli.exits import Exit
+from bt_actions.cli.streams.writing import write
+from bt_actions.utilities.suggest import did_you_mean
+
+Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 - no public name
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse as this program uses it; subparsers are of the same class."""
+
+    def __init__(self, **settings: Any) -> None:  # argparse's own keyword arguments
+        settings.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        settings.setdefault("allow_abbrev", False)
+        super().__init__(**settings)
+
+    @property
+    def commands(self) -> dict[str, argparse.ArgumentParser]:
+        """Return the parser of each command; empty for a command's own parser."""
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - no public name
+                return dict(action.choices)
+        return {}
+
+    def parse(self, arguments: Sequence[str]) -> argparse.Namespace:
+        """Parse `arguments`; print one line and exit with 2 when they are wrong."""
+        command = next((word for word in arguments if not word.startswith("-")), None)
+        if command is None or command not in self.commands:
+            if command is not None:
+                self.error(f"no command {command!r}{_suggestion(command, self.commands)}")
+            args = self.parse_args(arguments)
+            self.error("which command? `bt-actions --help` lists them")
+        args, unknown = self.parse_known_args(arguments)
+        if unknown:
+            parser = self.commands[command]
+            assert isinstance(parser, Parser)
+            parser.refuse(unknown)
+        return args
+
+    def refuse(self, unknown: Sequence[str]) -> NoReturn:
+        """Report arguments that nothing takes."""
+        word = unknown[0]
+        options = [name for action in self._actions for name in action.option_strings]
+        if word.startswith("-"):
+            name = word.split("=", 1)[0]
+            self.error(f"no option {name}{_suggestion(name, options)}")
+        self.error(f"unexpected argument {word!r}")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """As argparse does it, but output that is lost is an error."""
+        if file is sys.stdout:
+            write(message)
+        else:
+            super()._print_message(message, file)
+
+    def error(self, message: str) -> NoReturn:
+        """Print `message` on one line and exit with 2."""
+        self.exit(Exit.BAD_INPUT, f"{self.prog}: {message}\n")
+
+
+def _suggestion(word: str, known: Sequence[str] | dict[str, Any]) -> str:
+    beginnings = [name for name in known if len(word) > 3 and name.startswith(word)]
+    if len(beginnings) == 1:
+        return f"; did you mean {beginnings[0]!r}?"
+    return did_you_mean(word, known) or "; there are " + ", ".join(known)

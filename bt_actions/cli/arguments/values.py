@@ -1,0 +1,79 @@
+"""The `field=value` words of `bt-actions send`, read as the tree language reads values.
+
+A value that begins with a bracket, a brace or a quote is YAML; any other is one scalar, whatever
+else it holds, so that `message=hello: world # 1` is a text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from bt_actions.cli.exits import BadInput
+
+
+def split(word: str, what: str) -> tuple[str, str]:
+    """Split `name=value`; raise BadInput, beginning with `what`, for anything else."""
+    name, equals, text = word.partition("=")
+    if not equals or not name.strip():
+        raise BadInput(f"{what} {word!r}: expected name=value, as in distance=2.0")
+    return name.strip(), text
+
+
+def goal_fields(words: Iterable[str], what: str = "field") -> dict[str, object]:
+    """Read `field=value` words, dotted names as nested fields; of two for one name the last counts.
+
+    Raises BadInput that names the word, which is called `what`.
+    """
+    values: dict[str, object] = {}
+    for word in words:
+        name, text = split(word, what)
+        values[name] = value(text, f"{what} {word!r}")
+    return nested(values)
+
+
+def value(text: str, where: str) -> object:
+    """Read one value; `where` begins the message when it cannot be read.
+
+    Raises BadInput.
+    """
+    from bt_actions.document.compose import compose
+    from bt_actions.document.nodes import Node, Scalar, data_of
+    from bt_actions.document.source import Source
+
+    stripped = text.strip()
+    if not stripped:
+        return text
+    node: Node | None
+    if stripped[0] in "[{\"'":
+        source = Source(where, text)
+        node = compose(source)
+        if source.findings or node is None:
+            why = source.findings[0].message if source.findings else "not a value"
+            raise BadInput(f"{where}: {why}")
+    else:
+        node = Scalar()
+        node.text, node.plain = stripped, True
+    try:
+        return data_of(node)
+    except ValueError as error:
+        raise BadInput(f"{where}: {error}") from error
+
+
+def nested(values: dict[str, object]) -> dict[str, object]:
+    """Turn dotted names into mappings: {"a.b": 1} into {"a": {"b": 1}}.
+
+    Raises BadInput where one name is both a value and the beginning of another name.
+    """
+    tree: dict[str, object] = {}
+    for name, given in values.items():
+        *above, last = name.split(".")
+        at = tree
+        for step in above:
+            below = at.setdefault(step, {})
+            if not isinstance(below, dict):
+                raise BadInput(f"field {name!r}: {step} has a value of its own already")
+            at = below
+        if last in at:
+            raise BadInput(f"field {name!r}: parts of it have values already")
+        at[last] = given
+    return tree

@@ -1,0 +1,115 @@
+"""`bt-actions list`: the trees that the servers of trees in sight offer, with their inputs."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from bt_actions.cli.arguments.options import namespace
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.exits import Exit, no_ros, starting_ros
+from bt_actions.cli.streams.results import keep_results_apart, results
+from bt_actions.cli.streams.writing import note
+from bt_actions.utilities.plain_text import as_json, clean
+
+if TYPE_CHECKING:
+    from bt_actions.cli.arguments.parser import Subparsers
+
+_EPILOG = """\
+examples:
+  bt-actions list
+  bt-actions list --namespace /r1
+  bt-actions list --json
+
+`bt-actions call TREE` has one run. Exit codes: 0, or 1 where no server is in sight within 5 s, or
+one does not answer.
+"""
+_STATES = ("OK", "KEPT_LAST_GOOD", "INVALID")
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "list",
+        help="show the trees that servers offer",
+        description="Show the trees that servers of trees (`bt-actions serve`) offer.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument(
+        "--namespace", metavar="NS", type=namespace, default="", help="only servers in or below it"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_ros_args(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ask all servers in sight, and print what they say."""
+    parameters(args.ros_args, args.namespace)
+    keep_results_apart()
+    try:
+        from bt_actions.serving.asking import trees_in_sight
+    except ImportError as error:
+        raise no_ros(error) from error
+    with starting_ros():
+        found = trees_in_sight(args.namespace)
+    trees = {
+        clean(name): told and [tree_data(each) for each in told] for name, told in found.items()
+    }
+    if args.json:
+        results().write(as_json(trees) + "\n")
+    else:
+        results().write("".join(f"{line}\n" for line in text_of(trees)))
+    for name in [name for name, told in trees.items() if told is None]:
+        note(f"bt-actions list: {name} does not answer")
+    if not trees:
+        note(
+            "bt-actions list: no server of trees is in sight; is `bt-actions serve` running, in "
+            "this ROS_DOMAIN_ID, and in this namespace?"
+        )
+    return Exit.FAILURE if not trees or None in trees.values() else Exit.SUCCESS
+
+
+def tree_data(tree: Any) -> dict[str, Any]:
+    """A TreeInfo as plain data; no text in it holds what a terminal obeys."""
+    return {
+        "name": clean(tree.name),
+        "description": clean(tree.description),
+        "file": clean(tree.file),
+        "digest": clean(tree.digest),
+        "state": _STATES[tree.state] if tree.state < len(_STATES) else str(tree.state),
+        "findings": [
+            {"code": clean(one.code), "message": clean(one.message), "place": clean(one.place)}
+            for one in tree.findings
+        ],
+        "running": [bytes(each.uuid).hex() for each in tree.running],
+        "inputs": [
+            {
+                "name": clean(one.name),
+                "type": clean(one.type),
+                "unit": clean(one.unit),
+                "description": clean(one.description),
+                "required": one.required,
+                "default_json": clean(one.default_json),
+            }
+            for one in tree.inputs
+        ],
+    }
+
+
+def text_of(servers: dict[str, list[dict[str, Any]] | None]) -> list[str]:
+    """The lines for people: a server, its trees, their inputs."""
+    lines: list[str] = []
+    for server, trees in servers.items():
+        lines.append(server)
+        for tree in trees or ():
+            said = [tree["description"]] if tree["description"] else []
+            said += [f"({len(tree['running'])} running)"] if tree["running"] else []
+            lines.append("  ".join([f"  {tree['name']}", *said]))
+            for each in tree["inputs"]:
+                unit = f" [{each['unit']}]" if each["unit"] else ""
+                default = "" if each["required"] else f" = {each['default_json']}"
+                about = f"  {each['description']}" if each["description"] else ""
+                lines.append(f"    {each['name']}: {each['type']}{unit}{default}{about}")
+            wrong = tree["findings"]
+            lines += [f"    {tree['state']}: {one['message']}  {one['place']}" for one in wrong]
+    return lines

@@ -1,0 +1,217 @@
+"""`bt-actions run TREE`: run a tree to its end, and see every goal to its end.
+
+Puts together what others do: loads the tree (document), starts the servers (simulation), ticks
+(runner), shows (views), and turns the end into an exit code (drive).
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.arguments.loading import load
+from bt_actions.cli.arguments.options import (
+    add_no_python,
+    add_set,
+    metres,
+    namespace,
+    node_name,
+    seconds,
+    speed,
+)
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.exits import BadInput, Exit, no_ros, starting_ros
+from bt_actions.cli.streams.results import keep_results_apart
+
+if TYPE_CHECKING:
+    from py_trees.behaviour import Behaviour
+
+    from bt_actions.cli.arguments.parser import Subparsers
+    from bt_actions.ros.naming import Outlook
+    from bt_actions.simulation.faults import Fault
+
+_EPILOG = """\
+examples:
+  bt-actions run pick_and_place --sim --speed 10
+  bt-actions run trees/pick_and_place.yaml --set pick_at=2.0 --set place_at=4.5
+  bt-actions run pick_and_place --sim --fault move_robot:2:abort
+  bt-actions run patrol --namespace /r1 --timeout 600 --json
+  bt-actions run patrol --ros-args --params-file patrol.yaml -p use_sim_time:=true
+
+Ctrl-C, Ctrl-\\, SIGTERM, SIGHUP, --timeout and a closed standard output all end a run in the same
+way: every goal is canceled and seen to its end. A second Ctrl-C leaves at once and says which
+goals are not accounted for; not one within a quarter of a second, as shells and wrappers pass the
+first one on. Exit codes: see `bt-actions --help`.
+"""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "run",
+        help="run a tree",
+        description="Run a tree. In a terminal it is drawn live; elsewhere each change is a line.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("tree", metavar="TREE", help="path of a tree, or name of an installed one")
+    add_set(parser)
+    parser.add_argument(
+        "--executor",
+        choices=("multi", "single"),
+        default="multi",
+        help="rclpy's multi-threaded (default) or single-threaded executor",
+    )
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        type=namespace,
+        default="",
+        help="namespace of the node, and thereby of every relative action name",
+    )
+    parser.add_argument(
+        "--name",
+        metavar="NAME",
+        type=node_name,
+        help="name of the node; bt_actions_ and the tree's name where not given",
+    )
+    parser.add_argument(
+        "--timeout",
+        metavar="S",
+        type=seconds,
+        help="end the run after so many seconds, with exit code 124",
+    )
+    parser.add_argument(
+        "--cleanup-first",
+        action="store_true",
+        help="cancel what a killed orchestrator of this machine left, before the tree starts; "
+        "waits 30 s for the tree's servers, and does not run where it cannot see what was left",
+    )
+    add_no_python(parser)
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object a line, the result last"
+    )
+    parser.add_argument(
+        "--plain",
+        action="store_true",
+        help="lines in a terminal, too, as in a pipe; so it is where TERM is dumb",
+    )
+    parser.add_argument(
+        "-v",
+        "--verbose",
+        action="store_true",
+        help="where the run is shown as lines: one for every state of every goal",
+    )
+    add_ros_args(
+        parser,
+        "; parameters (-p NAME:=VALUE, --params-file FILE) give inputs of the tree their values "
+        "where --set does not",
+    )
+    simulated = parser.add_argument_group("simulation")
+    simulated.add_argument(
+        "--sim", action="store_true", help="run simulated action servers in this process"
+    )
+    simulated.add_argument(
+        "--fault",
+        metavar="SPEC",
+        action="append",
+        default=[],
+        help="make a simulated server misbehave: SERVER:N|*|P%%:FAULT[=VALUE]; repeatable",
+    )
+    simulated.add_argument(
+        "--speed",
+        metavar="N",
+        type=speed,
+        help="speed of the simulation (not of the tree's deadlines); 1 where not given",
+    )
+    simulated.add_argument(
+        "--seed", metavar="N", type=int, help="seed of faults that happen by chance"
+    )
+    simulated.add_argument(
+        "--check-part",
+        metavar="METRES",
+        type=metres,
+        help="fail unless the simulated part lies there at the end",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the tree that `args` name."""
+    if args.json:
+        keep_results_apart()
+    _refuse_without_sim(args)
+    faults = _faults(args.fault)
+    given = parameters(args.ros_args, args.namespace)
+    root = load(args.tree, args.set, python=args.python, parameters=given)
+
+    outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name
+    try:
+        from bt_actions.cli.driving.session import Session, SimulationWish
+        from bt_actions.document import tree_name
+        from bt_actions.ros.naming import node_name as node_name_of
+
+        if args.cleanup_first and not args.sim:  # which is private
+            code = _clean_up(_actions(root), args.namespace)
+            if code is not Exit.SUCCESS:
+                outlook.close()
+                return code
+    except BaseException:
+        outlook.close()
+        raise
+    wish = SimulationWish(args.speed or 1.0, faults, args.seed) if args.sim else None
+    with Session(
+        root,
+        executor=args.executor,
+        namespace=args.namespace,
+        simulation=wish,
+        name=args.name or node_name_of(tree_name(root)),
+        outlook=outlook,
+    ) as session:
+        view = session.view(as_json=args.json, plain=args.plain, verbose=args.verbose)
+        return session.run(view, timeout=args.timeout, part_at=args.check_part)
+
+
+def _outlook() -> Outlook:
+    try:
+        from bt_actions.ros.naming import Outlook
+    except ImportError as error:
+        raise no_ros(error) from error
+    with starting_ros():
+        return Outlook()
+
+
+def _actions(root: Behaviour) -> set[str]:
+    """Return the names of the actions that a tree uses, as they are given."""
+    from bt_actions.behaviours.action import ActionBehaviour
+
+    return {leaf.action_name for leaf in root.iterate() if isinstance(leaf, ActionBehaviour)}
+
+
+def _clean_up(wanted: set[str], namespace: str) -> Exit:
+    """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
+    from bt_actions.cli.driving.sweep import sweep
+
+    instead = "run without --cleanup-first"
+    return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=instead)
+
+
+def _refuse_without_sim(args: argparse.Namespace) -> None:
+    if args.sim:
+        return
+    given = {
+        "--fault": bool(args.fault),
+        "--speed": args.speed is not None,
+        "--seed": args.seed is not None,
+        "--check-part": args.check_part is not None,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise BadInput(f"{option} is about the simulation; it needs --sim")
+
+
+def _faults(texts: list[str]) -> list[Fault]:
+    from bt_actions.simulation.faults import Fault, FaultError
+
+    try:
+        return [Fault.parse(text) for text in texts]
+    except FaultError as error:
+        raise BadInput(f"--fault {error}") from error

@@ -1,0 +1,108 @@
+"""`bt-actions send SERVER TYPE [FIELD=VALUE]...`: one goal from the command line.
+
+It is a tree of one leaf, so that the goal has the same life, deadlines and end as in any tree.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.arguments.options import namespace, seconds
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.values import goal_fields
+from bt_actions.cli.exits import BadInput
+
+if TYPE_CHECKING:
+    from bt_actions.behaviours.action import ActionBehaviour
+    from bt_actions.cli.arguments.parser import Subparsers
+
+_EPILOG = """\
+examples:
+  bt-actions send move_robot MoveRobot distance=2.0
+  bt-actions send /r1/gripper_control Gripper position=0 max_effort=5
+  bt-actions send navigate_to_pose nav2_msgs/NavigateToPose pose.header.frame_id=map \\
+      pose.pose.position.x=1.0 --timeout 60
+in a launch file:
+  Node(package="bt_actions", executable="bt-actions",
+       arguments=["send", "move_robot", "MoveRobot", "distance=2.0"])
+
+Values are YAML: numbers, texts, true and false, [1, 2], {x: 1.0}. Ctrl-C cancels the goal and waits
+for its end. Exit codes: see `bt-actions --help`.
+"""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "send",
+        help="send one goal to an action server",
+        description="Send one goal to an action server; show its feedback, outcome and result.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("server", metavar="SERVER", help="name of the action server")
+    parser.add_argument(
+        "type", metavar="TYPE", help="its action type: MoveRobot, pkg/MoveRobot or the full name"
+    )
+    parser.add_argument(
+        "fields",
+        metavar="FIELD=VALUE",
+        nargs="*",
+        default=[],
+        help="fields of the goal; others keep defaults",
+    )
+    parser.add_argument(
+        "--timeout", metavar="S", type=seconds, help="cancel after so many seconds, exit code 124"
+    )
+    parser.add_argument(
+        "--namespace", metavar="NS", type=namespace, default="", help="namespace of the server"
+    )
+    parser.add_argument(
+        "--feedback",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="show feedback (default), or not",
+    )
+    parser.add_argument(
+        "-q", "--quiet", action="store_true", help="show only what went wrong; the exit code tells"
+    )
+    add_ros_args(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Send the goal that `args` describe, and see it to its end."""
+    leaf = _leaf(args.server, args.type, goal_fields(args.fields))
+    parameters(args.ros_args, args.namespace)
+
+    from bt_actions.cli.driving.session import Session
+    from bt_actions.cli.views.lines import QuietView
+    from bt_actions.cli.views.one_goal import GoalView
+    from bt_actions.cli.views.view import View
+
+    with Session(leaf, namespace=args.namespace) as session:
+        view: View = GoalView(session.report, leaf, sys.stdout, feedback=args.feedback)
+        if args.quiet:
+            view = QuietView(session.report, sys.stdout)
+        return session.run(view, timeout=args.timeout)
+
+
+def _leaf(server: str, type_name: str, data: dict[str, object]) -> ActionBehaviour:
+    """Check everything that can be checked without a server."""
+    from bt_actions.document.ros_names import why_not
+    from bt_actions.messages.conversion import MessageError, UnknownInterface, fill, find_action
+
+    why = why_not(server)
+    if why:
+        raise BadInput(f"{server!r} cannot be the name of an action server: {why}")
+    try:
+        action_type = find_action(type_name)
+        goal = fill(action_type.Goal, data)  # type: ignore[attr-defined]  # made by rosidl
+    except UnknownInterface as error:
+        raise BadInput(str(error)) from error
+    except MessageError as error:
+        raise BadInput(str(error)) from error
+
+    from bt_actions.behaviours.action import ActionBehaviour
+
+    return ActionBehaviour(server, action_type, server, goal)

@@ -1,0 +1,262 @@
+"""`bt-actions serve`: trees in folders as one action, for other nodes to run by name, until Ctrl-C.
+
+Prints one line: `ready: ...` when goals are accepted, `unconfigured: ...` with --managed. What
+happens to goals goes to the log.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import threading
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from bt_actions.cli.arguments.options import namespace
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.commands.sim import say
+from bt_actions.cli.driving.sweep import sweep
+from bt_actions.cli.exits import BadInput, Exit, no_ros, refuse_domain, starting_ros
+from bt_actions.cli.streams.writing import note
+from bt_actions.utilities.plain_text import raised
+from bt_actions.utilities.suggest import did_you_mean, listing
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from bt_actions.cli.arguments.parser import Subparsers
+    from bt_actions.cli.driving.signals import Signals
+    from bt_actions.serving import TreeServer
+
+NAME = "bt_actions_serve"
+_EPILOG = """\
+examples:
+  bt-actions serve --trees trees
+  bt-actions serve --trees package://my_robot/trees --policy queue --max 5 --namespace /r1
+  bt-actions serve --ros-args --params-file serve.yaml
+  ros2 action send_goal /run_tree bt_actions_interfaces/action/RunTree "{tree: pick_and_place}"
+
+The action is `run_tree`, of type bt_actions_interfaces/action/RunTree; a tree's name is its file's.
+A goal with an unknown tree or wrong inputs is rejected, and `~/rejections` and the log say why.
+After a crash, the goals that the killed server left are canceled first; where nobody can see what
+was left, it ends with exit code 3.
+Ctrl-C and SIGTERM end it: all goals are canceled and drained first. A second Ctrl-C leaves at once
+and says which goals are not accounted for (exit code 3).
+"""
+
+_POLICIES = ("reject", "queue", "replace", "parallel")
+_LISTS = {"trees": "DIR", "python": "PACKAGE"}
+_MOST = 1000
+_HELP = {
+    "trees": "a folder of trees, or package://NAME/trees; repeatable; nothing outside is read; "
+    "./trees where not given",
+    "policy": "what to do with a goal while another runs (default: reject)",
+    "max": "how many goals may wait (queue), or run (parallel); 10 where not given",
+    "python": "a package whose classes the trees' python: nodes may name; repeatable",
+    "managed": "stay unconfigured, until a lifecycle manager configures and activates it",
+}
+"""Of the options that are parameters of the node, too."""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "serve",
+        help="run trees for other nodes",
+        description="Serve the trees in some folders as the action run_tree, until Ctrl-C.",
+        epilog=_EPILOG,
+    )
+    for name, help_text in _HELP.items():
+        kind: dict[str, Any] = {"metavar": "N", "type": _count}
+        if name in _LISTS:
+            kind = {"metavar": _LISTS[name], "action": "append"}
+        elif name == "policy":
+            kind = {"choices": _POLICIES}
+        elif name == "managed":
+            kind = {"action": "store_true", "default": None}
+        parser.add_argument(f"--{name}", help=help_text, **kind)
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        type=namespace,
+        default="",
+        help="namespace of the node, and thereby of run_tree and every relative action name",
+    )
+    more = f"; the parameters {listing(_HELP)} are used where the options are not given"
+    add_ros_args(parser, more)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until a signal ends it, or the executor dies."""
+    options = _options(args, parameters(args.ros_args, args.namespace, name=NAME))
+    try:
+        from bt_actions.cli.driving.drive import leave
+        from bt_actions.cli.driving.signals import SAME_WISH, Signals
+        from bt_actions.ros.spinning import Spinner
+    except ImportError as error:
+        raise no_ros(error) from error
+
+    code = _clean_up()
+    if code is not Exit.SUCCESS:
+        return code
+    with Signals() as signals:
+        errors: list[BaseException] = []
+
+        def died(error: BaseException) -> None:
+            errors.append(error)
+            signals.poke()
+
+        with starting_ros():
+            spinner = Spinner(None, None, name=NAME, namespace=args.namespace,
+                              died=died)  # fmt: skip
+        server = None
+        try:
+            server = _server(spinner.node, options)
+            spinner.start()
+            if options["managed"]:
+                say(f"unconfigured: {spinner.node.get_fully_qualified_name()}")
+            else:
+                assert server.lifecycle is not None
+                server.lifecycle.change("configure")
+                server.lifecycle.change("activate")
+                say(_ready(server))
+            while not errors and not signals.wait(None)[0]:
+                pass
+        finally:
+            if server is not None:
+                _drain(server, signals, time.monotonic() + SAME_WISH)
+                if server.stuck:
+                    for each in (*server.unaccounted, *server.stuck):
+                        note(f"bt-actions serve: may still be running: {each}")
+                    leave(Exit.UNKNOWN)
+            spinner.stop(server.close if server is not None else lambda: None)
+        for each in server.unaccounted:
+            note(f"bt-actions serve: may still be running: {each}")
+        if errors:
+            note(f"bt-actions serve: the executor died: {raised(errors[0])}")
+            code = Exit.FAILURE
+        code = Exit.UNKNOWN if server.unaccounted else code
+        signals.settle(code)
+    return code
+
+
+def _drain(server: TreeServer, signals: Signals, not_before: float) -> None:
+    """Drain all; one more signal ends the wait, but not one before that moment."""
+    drained = threading.Event()
+
+    def drain() -> None:
+        try:
+            server.drain()
+        finally:
+            drained.set()
+            signals.poke()
+
+    threading.Thread(target=drain, name="bt_actions-drain").start()
+    while not drained.is_set():
+        if signals.wait(None)[0] and time.monotonic() > not_before:
+            server.abandon()
+
+
+def _clean_up() -> Exit:
+    """Cancel what a killed server left, where one is on record; other starts lose no time."""
+    from bt_actions.serving.underway import left_underway
+
+    refuse_domain()
+    try:
+        left = dict(left_underway(int(os.environ.get("ROS_DOMAIN_ID") or "0", 0)))
+    except ValueError:  # rcl says why
+        return Exit.SUCCESS
+    except OSError as error:
+        note(f"bt-actions serve: nothing can be put on record there, nor was: {error}")
+        return Exit.SUCCESS
+    if not left:
+        return Exit.SUCCESS
+    actions = sorted(set().union(*left.values()))
+    note(f"bt-actions serve: one was killed while a tree ran; cleaning up: {listing(actions)}")
+    files = listing(map(str, left))
+    instead = f"remove {files} if it will not come back, and nothing moves"
+    code = sweep(look=1.0, patience=5.0, wanted=actions, first=instead)
+    if code is Exit.SUCCESS:
+        for path in left:
+            path.unlink(missing_ok=True)
+    else:
+        note("bt-actions serve: accepts no goals before that is settled")
+    return code
+
+
+def _options(args: argparse.Namespace, given: Mapping[str, object]) -> dict[str, Any]:
+    """What is served and how: of the command line, or else of the parameters. Raises BadInput."""
+    for name in given:
+        if name not in _HELP and (near := did_you_mean(name, _HELP)):
+            raise BadInput(f"--ros-args: there is no parameter {name!r}{near}")
+    options = {name: getattr(args, name) for name in _HELP}
+    for name, option in options.items():
+        if option is None and given.get(name) is not None:
+            options[name] = _checked(name, given[name])
+    policy = options["policy"] = options["policy"] or "reject"
+    if options["max"] is not None and policy in ("reject", "replace"):
+        raise BadInput(f"--max is for the policies queue and parallel, and this is {policy}")
+    defaults = {"trees": ["trees"], "max": 10, "python": [], "managed": False}
+    return {name: options[name] or defaults.get(name) for name in _HELP} | {"policy": policy}
+
+
+def _checked(name: str, value: object) -> object:
+    if name in _LISTS:
+        wanted = "a list of texts"
+        fits = isinstance(value, list | tuple) and all(isinstance(each, str) for each in value)
+        value = list(value) if isinstance(value, list | tuple) else value
+    elif name == "policy":
+        wanted, fits = listing(_POLICIES), value in _POLICIES
+    elif name == "max":
+        wanted = f"a whole number, 1 to {_MOST}"
+        fits = type(value) is int and 1 <= value <= _MOST
+    else:
+        wanted, fits = "true or false", isinstance(value, bool)
+    if not fits:
+        raise BadInput(f"--ros-args: the parameter {name!r} is {value!r}, and not {wanted}")
+    return value
+
+
+def _server(node: Node, options: Mapping[str, Any]) -> TreeServer:
+    from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+
+    from bt_actions.document import TreeNotFoundError
+    from bt_actions.serving import TreeServer
+
+    for name, value in options.items():
+        descriptor = ParameterDescriptor(description=_HELP[name], read_only=True)
+        if name == "policy":
+            descriptor.additional_constraints = listing(_POLICIES)
+        elif name == "max":
+            descriptor.integer_range = [IntegerRange(from_value=1, to_value=_MOST, step=1)]
+        node.declare_parameter(name, value, descriptor, ignore_override=True)
+    try:
+        return TreeServer(
+            node,
+            trees=options["trees"],
+            policy=options["policy"],
+            most=options["max"],
+            python=options["python"],
+            managed=True,
+        )
+    except (NotADirectoryError, TreeNotFoundError) as error:
+        raise BadInput(f"--trees: {error}") from error
+
+
+def _ready(server: TreeServer) -> str:
+    entries = server.catalog.entries()
+    broken = [each.name for each in entries if each.tree is None]
+    more = f", {len(broken)} broken: {listing(broken)}" if broken else ""
+    name = f"{server.node.get_namespace().rstrip('/')}/run_tree"
+    return f"ready: {name}, {len(entries) - len(broken)} trees{more}"
+
+
+def _count(text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if not 1 <= number <= _MOST:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of goals, 1 to {_MOST}")
+    return number

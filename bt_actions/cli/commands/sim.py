@@ -1,0 +1,187 @@
+"""`bt-actions sim`: simulated robots in a process of their own, until Ctrl-C.
+
+Prints one line `ready: ...` when the servers are up, and a line for whatever happens to a part. A
+standard output that nobody reads any more does not end it: it is a server.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.arguments.options import namespace, seconds, speed
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.exits import BadInput, Exit, starting_ros
+from bt_actions.cli.streams.writing import note
+from bt_actions.utilities.plain_text import raised
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from bt_actions.cli.arguments.parser import Subparsers
+    from bt_actions.simulation import Simulation, WorldEvent
+
+_EPILOG = """\
+examples:
+  bt-actions sim --speed 10
+  bt-actions sim --namespace /r1 --namespace /r2
+  bt-actions sim --robots 50 --speed 10
+  bt-actions sim --fault move_robot:2:abort --fault gripper_control:5%:stall --seed 7
+  bt-actions sim --journal goals.jsonl
+in a launch file:
+  Node(package="bt_actions", executable="bt-actions", namespace="r1", arguments=["sim"])
+
+A part lies at 2 m (pick); the shelf is at 5 m, home at 0 m. Ctrl-C and SIGTERM end it: exit code 0.
+The process uses ROS_DOMAIN_ID, as all ROS programs do.
+
+faults are written SERVER:N|*|P%:FAULT[=VALUE]: which server (move_robot, /r1/move_robot, or * for
+all), which of its goals (by number, all, or so many of a hundred), what it does wrong; times are
+wall seconds, defaults stand in brackets:
+"""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    from bt_actions.simulation.faults import table
+
+    parser = subparsers.add_parser(
+        "sim",
+        help="serve simulated robots",
+        description="Serve move_robot and gripper_control for simulated robots until Ctrl-C.",
+        epilog=_EPILOG + table(),
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--namespace",
+        metavar="NS",
+        type=namespace,
+        action="append",
+        default=[],
+        help="move all names into this namespace; repeat it for several robots",
+    )
+    which.add_argument(
+        "--robots", metavar="N", type=_count, help="serve so many robots, in /r1, /r2, ..."
+    )
+    parser.add_argument(
+        "--speed",
+        metavar="N",
+        type=speed,
+        default=1.0,
+        help="simulated seconds in one second (default 1)",
+    )
+    parser.add_argument(
+        "--step-period",
+        metavar="S",
+        type=seconds,
+        default=0.1,
+        help="simulated seconds between two steps (default 0.1)",
+    )
+    parser.add_argument(
+        "--fault",
+        metavar="SPEC",
+        action="append",
+        default=[],
+        help="make a server misbehave; repeatable, see below",
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=int, help="seed of faults that happen by chance"
+    )
+    parser.add_argument(
+        "--journal",
+        metavar="FILE",
+        help="append what happens to every goal, one JSON object a line",
+    )
+    parser.add_argument(
+        "--executor",
+        choices=("multi", "single"),
+        default="multi",
+        help="rclpy's multi-threaded (default) or single-threaded executor",
+    )
+    add_ros_args(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until a signal ends it, or the executor dies."""
+    from bt_actions.cli.driving.signals import Signals
+    from bt_actions.ros.spinning import Spinner
+
+    parameters(args.ros_args)
+    with Signals() as signals:
+        errors: list[BaseException] = []
+
+        def died(error: BaseException) -> None:
+            errors.append(error)
+            signals.poke()
+
+        with starting_ros():
+            spinner = Spinner(None, args.executor, name="simulation", died=died)
+        simulation = None
+        try:
+            simulation = _simulation(spinner.node, args)
+            spinner.start()
+            _announce(simulation, args)
+            caught: list[object] = []
+            while not caught and not errors:
+                caught.extend(signals.wait(None)[0])
+        finally:
+            spinner.stop(simulation.close if simulation else lambda: None)
+        if errors:
+            note(f"bt-actions sim: the executor died: {raised(errors[0])}")
+        else:
+            say(simulation.describe())
+        code = Exit.FAILURE if errors else Exit.SUCCESS
+        signals.settle(code)
+    return code
+
+
+def say(text: str) -> None:
+    """Print a line at once, whether or not anybody reads it."""
+    with contextlib.suppress(OSError, ValueError):
+        print(text, flush=True)
+
+
+def _simulation(node: Node, args: argparse.Namespace) -> Simulation:
+    from bt_actions.simulation import FaultError, Simulation
+
+    namespaces = args.namespace or [""]
+    if args.robots is not None:
+        namespaces = [f"/r{number}" for number in range(1, args.robots + 1)]
+    try:
+        return Simulation(
+            node,
+            namespaces=namespaces,
+            speed=args.speed,
+            step_period=args.step_period,
+            faults=args.fault,
+            seed=args.seed,
+            journal=args.journal,
+            in_process=False,
+            on_event=_tell,
+        )
+    except FaultError as error:
+        raise BadInput(f"--fault {error}") from error
+    except OSError as error:
+        raise BadInput(f"--journal {args.journal}: {error.strerror}") from error
+
+
+def _announce(simulation: Simulation, args: argparse.Namespace) -> None:
+    names = [server.name for server in simulation.servers]
+    shown = ", ".join(names) if len(names) <= 4 else f"{names[0]} to {names[-1]}"
+    count = "" if len(names) <= 4 else f", {len(names) // 2} robots"
+    seed = f", seed {simulation.seed}" if args.fault else ""
+    say(f"ready: {shown}{count}, speed {args.speed:g}{seed}")
+
+
+def _tell(_namespace: str, event: WorldEvent) -> None:
+    say(str(event))
+
+
+def _count(text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if not 1 <= number <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of robots, 1 to 1000")
+    return number

@@ -1,0 +1,262 @@
+"""One run with all that belongs to it: runner, simulation, signals, view, and the order of closing.
+
+The order: the tree ends and its goals are drained (runner), the simulated servers go, then node
+and context. It happens on the tree's thread, so that the main thread can still be told to leave.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self, TypeVar
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_actions.cli.driving.drive import Drive, Ended, leave
+from bt_actions.cli.driving.presence import Presence
+from bt_actions.cli.driving.signals import Signals
+from bt_actions.cli.driving.simulated import Wanted, remark, wanted
+from bt_actions.cli.exits import BadInput, Exit, no_ros, starting_ros
+from bt_actions.cli.streams.patient_file import gap_text
+from bt_actions.cli.streams.patient_output import PatientOutput
+from bt_actions.cli.streams.results import results
+from bt_actions.cli.streams.writing import note
+from bt_actions.cli.views.json_lines import JsonView
+from bt_actions.cli.views.lines import LineView
+from bt_actions.cli.views.view import View
+from bt_actions.cli.views.words import Closing
+from bt_actions.running.report import Report
+
+if TYPE_CHECKING:
+    from bt_actions.events import Event
+    from bt_actions.ros.naming import Outlook
+    from bt_actions.running.runner import GoalReport, TreeRunner
+    from bt_actions.simulation.faults import Fault
+    from bt_actions.simulation.world import Part
+
+Json = TypeVar("Json", bound=JsonView)
+PART_TOLERANCE = 0.05
+"""How far from --check-part the part may lie, in metres: the size of a simulated station."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationWish:
+    """What --sim and its companions ask for."""
+
+    speed: float = 1.0
+    faults: Sequence[Fault] = ()
+    seed: int | None = None
+
+
+class Session:
+    """Holds what one run needs, from construction to `__exit__`; main thread only."""
+
+    def __init__(
+        self,
+        root: Behaviour,
+        *,
+        executor: str = "multi",
+        namespace: str = "",
+        simulation: SimulationWish | None = None,
+        name: str = "",
+        outlook: Outlook | None = None,
+    ) -> None:
+        """`outlook` is where the node is made, called `name`; it is the session's to close.
+
+        Raises BadInput when ROS is not there or cannot start, or a fault fits no server."""
+        try:
+            import bt_actions.ros.spinning  # noqa: F401 - the runner imports it late
+        except ImportError as error:
+            raise no_ros(error) from error
+        from bt_actions.running.runner import TreeRunner as Runner
+
+        self.report = Report(root)
+        with starting_ros():
+            self._runner = Runner(
+                root,
+                executor=executor,
+                namespace=namespace,
+                name=name,
+                context=outlook and outlook.context,
+            )
+        if outlook is not None:
+            outlook.hand_over()
+        self._error: BaseException | None = None
+        self._presence = Presence(self._runner, root)
+        self._runner.on_close(lambda: self._presence.close(error=self._error))
+        self._output = PatientOutput()
+        self._simulator = None
+        if simulation is not None:
+            robots = wanted(root, self._runner.node.get_namespace().rstrip("/"))
+            if said := remark(robots):
+                note(f"bt-actions: {said}")
+            try:
+                self._simulator = _Simulator(self._runner, robots, simulation)
+            except BaseException:
+                self._runner.shutdown()
+                raise
+
+    def __enter__(self) -> Self:
+        self._output.__enter__()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            self._runner.shutdown()
+        finally:
+            self._output.__exit__()
+
+    def view(self, *, as_json: bool = False, plain: bool = False, verbose: bool = False) -> View:
+        """Return the view that suits standard output: lines if `plain`; `verbose` is about them."""
+        if as_json:
+            return self.json_view(JsonView)
+        if sys.stdout.isatty() and not plain:
+            from rich.console import Console
+
+            from bt_actions.cli.views.live import LiveView, suits
+
+            console = Console(highlight=False, markup=False, emoji=False)
+            if suits(console):
+                return LiveView(self.report, console)
+        return LineView(self.report, sys.stdout, verbose=verbose)
+
+    def json_view(self, kind: type[Json]) -> Json:
+        """Return a view for programs, which are told of lines that they were too slow for."""
+        self._output.tell_gaps(_gap_object)
+        return kind(self.report, results())
+
+    def run(
+        self,
+        view: View,
+        *,
+        timeout: float | None = None,
+        part_at: float | None = None,
+    ) -> Exit:
+        """Run to the end, show it all, return the exit code; does not return when abandoned."""
+        try:
+            if view.fileno < 0:  # else the view reads standard error itself
+                self._output.catch_stderr()
+            with Signals() as signals:
+                drive = Drive(
+                    self, self.report, view, signals, timeout=timeout, output=self._output
+                )
+                ended = drive.run()
+                code = drive.finish(self._close(ended, part_at))
+                if ended.abandoned:
+                    self._presence.close(left=True)
+                    leave(code)
+                signals.settle(code)
+        finally:
+            with contextlib.suppress(OSError):  # the terminal may be gone
+                view.close()
+        return code
+
+    # What Drive needs of a runner
+
+    def observe(self, callback: Callable[[Event], None]) -> None:
+        """Pass the runner's events on."""
+        self._runner.observe(callback)
+
+    def interrupt(self, *, abandon: bool = False) -> None:
+        """Make the run drain and end; with `abandon`, drain no longer."""
+        self._runner.interrupt(abandon=abandon)
+
+    def catch_up(self) -> None:
+        """Tell what became of goals while a behaviour does not return from its tick."""
+        self._runner.catch_up()
+
+    @property
+    def unaccounted(self) -> list[GoalReport]:
+        """The goals whose end is not known."""
+        return self._runner.unaccounted
+
+    def tick_to_end(self) -> Status:
+        """Run the tree, drain its goals, and close servers, node and context."""
+        try:
+            return self._runner.run()
+        except BaseException as error:
+            self._error = error
+            raise
+        finally:
+            self._runner.shutdown()
+
+    # Within
+
+    def _close(self, ended: Ended, part_at: float | None) -> Closing:
+        """Let the simulated world say what became of the part, and settle the exit code."""
+        error = _bug(ended.error)
+        if self._simulator is None or not self._simulator.parts:
+            return Closing(ended.code, ended.cause, error=error)
+        verdict = self._simulator.said
+        wrong = [
+            namespace
+            for namespace, part in self._simulator.parts.items()
+            if part_at is not None
+            and (part.held_by is not None or abs(part.position - part_at) > PART_TOLERANCE)
+        ]
+        if not wrong:
+            return Closing(ended.code, ended.cause, verdict, error=error)
+        code = Exit.FAILURE if ended.code is Exit.SUCCESS else ended.code
+        which = "The part" if len(self._simulator.parts) == 1 else f"The part of {', '.join(wrong)}"
+        complaint = f"{which} should lie at {part_at:.2f} m (--check-part)."
+        return Closing(code, ended.cause, verdict, complaint, error)
+
+
+class _Simulator:
+    """Simulated servers on a node of their own, in the executor that the tree's node is in too."""
+
+    def __init__(self, runner: TreeRunner, robots: Wanted, wish: SimulationWish) -> None:
+        """Bring the servers up before anything spins.
+
+        Raises BadInput when a fault fits none of the servers.
+        """
+        from bt_actions.ros.spinning import node_beside
+        from bt_actions.simulation import FaultError, Simulation
+
+        self._namespaces = robots.namespaces
+        self._node = node_beside(runner.node, "simulation")
+        self.parts: dict[str, Part] = {}
+        """By namespace, as they were when the run was over; empty before."""
+        self.said = ""
+        runner.on_close(self._close)
+        try:
+            self._simulation = Simulation(
+                self._node,
+                namespaces=self._namespaces,
+                speed=wish.speed,
+                faults=wish.faults,
+                seed=wish.seed,
+            )
+        except FaultError as error:
+            raise BadInput(f"--fault {error}") from error
+        runner.executor.add_node(self._node)
+
+    def _close(self) -> None:
+        """Take note of the world and destroy it all."""
+        simulation = getattr(self, "_simulation", None)
+        if simulation is not None:
+            self.parts = {name: simulation.world(name).part for name in self._namespaces}
+            self.said = simulation.describe()
+            simulation.close()
+        self._node.destroy_node()
+
+
+def _gap_object(lines: int) -> str:
+    return json.dumps({"event": "note", "text": gap_text(lines).strip()}) + "\n"
+
+
+def _bug(error: BaseException | None) -> str:
+    """One line about an exception in a behaviour, with the place in the user's code."""
+    if error is None:
+        return ""
+    from bt_actions.running.runner import TreeError
+
+    cause = error.__cause__ or error
+    frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
+    where = f" ({frames[-1].filename}:{frames[-1].lineno})" if frames else ""
+    return f"{error}{where}"

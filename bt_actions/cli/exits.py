@@ -1,0 +1,74 @@
+"""How a command ends: the exit codes, bad input, and ROS that is not there or cannot start.
+
+Imports nothing slow: every call of `bt-actions` loads this file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from enum import IntEnum
+
+
+class Exit(IntEnum):
+    """The exit codes of every command that runs goals; the others use the first three."""
+
+    SUCCESS = 0
+    FAILURE = 1
+    BAD_INPUT = 2
+    UNKNOWN = 3
+    """The end of a goal is not known: it may still be running. Wins over all others."""
+    TIMEOUT = 124
+    SIGHUP = 129
+    SIGINT = 130
+    SIGQUIT = 131
+    SIGPIPE = 141
+    """Nobody reads standard output any more."""
+    SIGTERM = 143
+
+
+class BadInput(Exception):
+    """What the user gave cannot be used; the text says what, where and what to do. Exit code 2."""
+
+    def __init__(self, message: str, *, prefixed: bool = True) -> None:
+        """`prefixed` is False for messages that begin with their own file:line:column."""
+        super().__init__(message)
+        self.prefixed = prefixed
+
+
+def no_ros(error: ImportError) -> BadInput:
+    """Return what to say where ROS cannot be imported.
+
+    Raises KeyboardInterrupt where that is why: a C extension makes an ImportError of it.
+    """
+    if isinstance(error.__cause__, KeyboardInterrupt):
+        raise error.__cause__
+    return BadInput(
+        f"ROS 2 cannot be imported ({error}); source your workspace, or install bt_actions with "
+        "its dependencies"
+    )
+
+
+HIGHEST_DOMAIN = 232
+
+
+def refuse_domain() -> None:
+    """Raise BadInput for what is no ROS domain; of one too high, Fast DDS would end the process."""
+    domain = os.environ.get("ROS_DOMAIN_ID", "")
+    digits = domain.strip().removeprefix("+").lower()
+    base = 16 if digits.startswith("0x") else 8 if digits.startswith("0") else 10  # as rcl reads it
+    with contextlib.suppress(ValueError):  # of which rcl says why
+        if int(digits, base) > HIGHEST_DOMAIN:
+            text = f"ROS_DOMAIN_ID is {domain!r}; a domain is a number from 0 to {HIGHEST_DOMAIN}"
+            raise BadInput(f"ROS 2 cannot start: {text}")
+
+
+@contextlib.contextmanager
+def starting_ros() -> Iterator[None]:
+    """Turn what ROS raises when it is first touched into BadInput."""
+    refuse_domain()
+    try:
+        yield
+    except RuntimeError as error:  # rclpy's RCLError
+        raise BadInput(f"ROS 2 cannot start: {str(error).splitlines()[0]}") from error

@@ -1,0 +1,153 @@
+"""Composes the commands: their parsers, what each ends with, and what the user is told of it.
+
+Nothing here knows what a command does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from bt_actions.cli.arguments.parser import Parser
+from bt_actions.cli.commands import (
+    call,
+    check,
+    cleanup,
+    completion,
+    explain,
+    list_trees,
+    render,
+    run,
+    schema,
+    send,
+    serve,
+    sim,
+)
+from bt_actions.cli.commands import format_trees as format_
+from bt_actions.cli.exits import BadInput, Exit
+from bt_actions.cli.streams.results import give_stdout_back, results
+from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note
+from bt_actions.ros.environment import Reach, prepare
+
+COMMANDS: dict[str, ModuleType] = {
+    "run": run,
+    "send": send,
+    "serve": serve,
+    "list": list_trees,
+    "call": call,
+    "sim": sim,
+    "cleanup": cleanup,
+    "check": check,
+    "explain": explain,
+    "format": format_,
+    "schema": schema,
+    "render": render,
+    "completion": completion,
+}
+"""In the order in which --help lists them."""
+
+_EPILOG = """\
+examples:
+  bt-actions run pick_and_place --sim --speed 10
+  bt-actions run trees/pick_and_place.yaml --set place_at=4.5 --timeout 60
+  bt-actions send move_robot MoveRobot distance=2.0
+  bt-actions check trees/*.yaml
+  bt-actions render trees/pick_and_place.yaml -o tree.svg
+
+exit codes:
+  0 success   1 failure   2 bad input   3 the end of a goal is unknown (wins over all others)
+  124 --timeout expired   129 SIGHUP   130 Ctrl-C   131 Ctrl-\\   141 closed stdout   143 SIGTERM
+"""
+
+
+def build_parser() -> Parser:
+    """Return the parser of every command."""
+    parser = Parser(
+        prog="bt-actions",
+        description="Run behaviour trees whose leaves are ROS 2 actions. Every goal is accounted "
+        "for: canceled and seen to its end, however the run ends.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("--version", action="version", version=f"bt-actions {_version()}")
+    subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
+    for module in COMMANDS.values():
+        module.add_parser(subparsers)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code. Never lets a traceback of bad input reach the user."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, ValueError):
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    try:
+        code = _dispatch(argv)
+    except BadInput as error:
+        note(f"bt-actions: {error}" if error.prefixed else str(error))
+        code = Exit.BAD_INPUT
+    except OutputLost as error:
+        note(f"bt-actions: {error}")
+        discard_stdout()
+        code = Exit.BAD_INPUT
+    except ImportError as error:
+        if error.name != "libyaml":
+            raise
+        note(f"bt-actions: {error}")
+        code = Exit.BAD_INPUT
+    except KeyboardInterrupt:
+        code = Exit.SIGINT
+    except BrokenPipeError:
+        code = Exit.SIGPIPE
+    code = code if _flushed() else code or Exit.BAD_INPUT
+    if argv is not None:  # it is called by a program, whose standard output that is again
+        give_stdout_back()
+    return code
+
+
+def _dispatch(argv: Sequence[str] | None) -> int:
+    arguments = sys.argv[1:] if argv is None else list(argv)
+    parser = build_parser()
+    if not arguments:
+        parser.print_help()
+        return Exit.BAD_INPUT
+    args = parser.parse(arguments)
+    prepare(_reach(args))
+    os.environ.pop("RCUTILS_LOGGING_USE_STDOUT", None)  # standard output is for results
+    return int(COMMANDS[args.command].run(args))
+
+
+def _reach(args: argparse.Namespace) -> Reach:
+    if getattr(args, "sim", False):
+        return Reach.PROCESS
+    return Reach.MACHINE if args.command == "sim" else Reach.NETWORK
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("bt_actions")
+    except PackageNotFoundError:  # a checkout that is on the path without being installed
+        return "(not installed)"
+
+
+def _flushed() -> bool:
+    """Flush what is left; say so when it cannot be written.
+
+    A reader that has gone must not make Python complain at exit.
+    """
+    note("", end="")  # and the same for what is left for standard error
+    try:
+        results().flush()
+    except BrokenPipeError:
+        discard_stdout()
+    except (OSError, ValueError) as error:
+        lost = OutputLost(error) if isinstance(error, OSError) else error
+        note(f"bt-actions: {lost}")
+        discard_stdout()
+        return False
+    return True

@@ -1,0 +1,1 @@
+"""Where text goes: standard output and standard error, whatever their readers do."""

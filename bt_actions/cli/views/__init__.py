@@ -1,0 +1,1 @@
+"""How a run is shown: as lines, as JSON, drawn live, or as one goal. Only writes."""
