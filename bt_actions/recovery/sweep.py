@@ -31,8 +31,8 @@ from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
 from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
 from bt_actions.recovery.unanswered import Unanswered
-from bt_actions.ros import participant
 from bt_actions.ros.action_view import STATUS, ActionView
+from bt_actions.ros.workarounds import participant
 from bt_actions.servers.stalls import AT_MOST, STOOD_STILL, Stalls
 
 TURN = 0.05

@@ -14,8 +14,8 @@ import unicodedata
 from rclpy.context import Context
 from rclpy.node import Node
 
-from bt_actions.ros import participant
 from bt_actions.ros.log import log
+from bt_actions.ros.workarounds import participant
 
 __all__ = ["LONGEST", "Outlook", "named_node", "node_name"]
 

@@ -27,7 +27,7 @@ from bt_actions.messages.fields import (
     Scalar,
     describe,
 )
-from bt_actions.ros import participant
+from bt_actions.ros.workarounds import participant
 from bt_actions.utilities.plain_text import as_json
 
 __all__ = ["declare_input", "parameters_in"]

@@ -24,10 +24,10 @@ from typing import Protocol
 from rclpy.context import Context
 from rclpy.node import Node
 
-from bt_actions.ros import participant
 from bt_actions.ros.action_client import ActionClient
 from bt_actions.ros.graph import servers
 from bt_actions.ros.log import log
+from bt_actions.ros.workarounds import participant
 from bt_actions.traffic.shared import lock
 from bt_actions.utilities.plain_text import raised
 

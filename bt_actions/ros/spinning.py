@@ -26,10 +26,10 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.task import Task
 
-from bt_actions.ros import participant
-from bt_actions.ros.executor import OnceExecutor
 from bt_actions.ros.log import log
 from bt_actions.ros.naming import named_node
+from bt_actions.ros.workarounds import participant
+from bt_actions.ros.workarounds.once_executor import OnceExecutor
 from bt_actions.traffic.traffic import Traffic
 
 THREADS = 2

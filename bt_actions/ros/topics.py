@@ -22,8 +22,8 @@ from rclpy.qos import (
 )
 
 from bt_actions.messages.interfaces import interface_name
-from bt_actions.ros.closable import closable
 from bt_actions.ros.in_sight import without_topic
+from bt_actions.ros.workarounds.closable import closable
 from bt_actions.traffic.traffic import Traffic
 
 __all__ = ["Publisher", "Subscription", "qos_profile"]

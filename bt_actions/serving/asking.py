@@ -16,8 +16,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from bt_actions.ros import participant
 from bt_actions.ros.topics import DISCOVERS
+from bt_actions.ros.workarounds import participant
 from bt_actions.serving.rejections import REJECTIONS
 
 __all__ = ["trees_in_sight", "why_rejected"]

@@ -10,7 +10,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState
 
-from bt_actions.ros.closable import closable
+from bt_actions.ros.workarounds.closable import closable
 from bt_actions.simulation.battery import Battery
 from bt_actions.simulation.gripper_control import GripperServer
 from bt_actions.simulation.move_robot import MoveRobotServer

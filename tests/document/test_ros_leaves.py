@@ -423,7 +423,7 @@ def stranger(domain: int) -> Iterator[Any]:
     from rclpy.context import Context
     from rclpy.node import Node
 
-    from bt_actions.ros.participant import close
+    from bt_actions.ros.workarounds.participant import close
 
     context = Context()
     context.init(domain_id=domain)

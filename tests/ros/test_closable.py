@@ -15,7 +15,7 @@ def test_event_handlers_survive_the_destruction_of_what_they_watch(
     from rclpy.impl.implementation_singleton import rclpy_implementation
     from std_msgs.msg import Empty
 
-    from bt_actions.ros.closable import closable
+    from bt_actions.ros.workarounds.closable import closable
 
     def make() -> Any:
         if kind == "publisher":

@@ -15,7 +15,7 @@ THREADS = 2
 
 @pytest.fixture
 def executor(context: Any) -> Iterator[Any]:
-    from bt_actions.ros.executor import OnceExecutor
+    from bt_actions.ros.workarounds.once_executor import OnceExecutor
 
     executor = OnceExecutor(THREADS, context=context)
     yield executor

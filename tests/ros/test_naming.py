@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 from rclpy.validate_node_name import validate_node_name
 
-from bt_actions.ros import naming, participant
+from bt_actions.ros import naming
 from bt_actions.ros.naming import Outlook, named_node, node_name
+from bt_actions.ros.workarounds import participant
 from tests.support.waiting import until
 
 

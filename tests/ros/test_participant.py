@@ -13,9 +13,9 @@ from std_msgs.msg import String
 
 from bt_actions import TreeRunner
 from bt_actions.recovery.sweep import cleanup
-from bt_actions.ros import participant
 from bt_actions.ros.parameters import parameters_in
 from bt_actions.ros.rediscovery import SecondParticipant
+from bt_actions.ros.workarounds import participant
 from tests.support.trees import Gate
 from tests.support.waiting import holds_for, until
 

@@ -5,7 +5,8 @@ holds the interpreter's lock, until a thread has begun with it; the pool's threa
 Measured, with /clock at 100 Hz: 7,000 hand-overs a second, 2,000 of them queued at a time, and all
 Python threads of the process still for 0.2 s again and again. Here whoever spins waits for the pool
 instead. What is called, in which order and on how many threads is as it was: rclpy's looks at
-nothing new either while work waits for a thread.
+nothing new either while work waits for a thread. The bug is rclpy #1452, mended by rclpy #1547: not
+needed any more with a release that has that.
 """
 
 from __future__ import annotations
