@@ -1,6 +1,7 @@
 """Simulated robots, their action servers, and faults on purpose.
 
-The names that need no ROS import without it; the servers are imported when first asked for.
+Nothing here imports rclpy but `ros/`, which is imported where a server is made on an rclpy node.
+The servers' messages are imported when a server's name is first asked for.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ __all__ = [
     "WorldEvent",
 ]
 
-_NEED_ROS = {
+_NEED_MESSAGES = {
     "GripperServer": "gripper_control",
     "MoveRobotServer": "move_robot",
     "Script": "scripted",
@@ -49,7 +50,7 @@ _NEED_ROS = {
 
 
 def __getattr__(name: str) -> object:
-    if name in _NEED_ROS:
-        module = importlib.import_module(f"{__name__}.{_NEED_ROS[name]}")
+    if name in _NEED_MESSAGES:
+        module = importlib.import_module(f"{__name__}.{_NEED_MESSAGES[name]}")
         return getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rclpy.node import Node
 from robot_control_interfaces.action import Gripper
 
 from bt_actions.simulation import gripper
@@ -49,7 +48,7 @@ class GripperServer(SimulatedServer):
     """
 
     def __init__(
-        self, node: Node, world: World, name: str = "gripper_control", **settings: Any
+        self, node: Any, world: World, name: str = "gripper_control", **settings: Any
     ) -> None:
         """`settings` are those of SimulatedServer."""
         self.world = world

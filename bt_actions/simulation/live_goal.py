@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from action_msgs.msg import GoalStatus
-from rclpy.action.server import RCLError, ServerGoalHandle
-
+from bt_actions.goals.terms import STATUS_ABORTED, STATUS_CANCELED, STATUS_SUCCEEDED
 from bt_actions.simulation.execution import CancelAnswer, Execution, Finish, Happened
 from bt_actions.simulation.goal_meaning import GoalMeaning
 from bt_actions.simulation.journal import Event
+from bt_actions.simulation.platform import Wire
 from bt_actions.utilities.plain_text import raised
 
-_EVENTS = {
-    GoalStatus.STATUS_SUCCEEDED: Event.SUCCEEDED,
-    GoalStatus.STATUS_CANCELED: Event.CANCELED,
-    GoalStatus.STATUS_ABORTED: Event.ABORTED,
-}
+_STATUSES = {Finish.COMPLETED: STATUS_SUCCEEDED, Finish.CANCELED: STATUS_CANCELED}
+_EVENTS = {STATUS_SUCCEEDED: Event.SUCCEEDED, STATUS_CANCELED: Event.CANCELED}
 
 
 class Owner(Protocol):
@@ -43,14 +39,14 @@ class LiveGoal:
         owner: Owner,
         meaning: GoalMeaning,
         goal_id: str,
-        handle: ServerGoalHandle,
+        wire: Wire,
         run: Execution,
         *,
         step_period: float,
     ) -> None:
         """`run` decides, `meaning` makes the messages, `owner` is told."""
         self.goal_id = goal_id
-        self.handle = handle
+        self._wire = wire
         self.run = run
         self._owner = owner
         self._meaning = meaning
@@ -109,7 +105,7 @@ class LiveGoal:
         try:
             message = self._meaning.feedback(self.run.motion)
             for _ in range(times):
-                self.handle.publish_feedback(message)
+                self._wire.feedback(self.goal_id, message)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
             self.give_up(f"it has no feedback: {raised(error)}")
 
@@ -126,19 +122,8 @@ class LiveGoal:
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
             finish, reason = Finish.FAULT, f"it has no result: {raised(error)}"
             result = self._meaning.action_type.Result()
-        event = self._change_state(finish)
+        status = self._wire.end(self.goal_id, _STATUSES.get(finish, STATUS_ABORTED))
+        event = _EVENTS.get(status, Event.ABORTED)
         more = {"reason": reason} if reason else {}
         self._owner.record(self.goal_id, event, **self._meaning.state(motion), **more)
         self._owner.ended(self, result)
-
-    def _change_state(self, finish: Finish) -> Event:
-        try:
-            if finish is Finish.COMPLETED:
-                self.handle.succeed()
-            elif finish is Finish.CANCELED:
-                self.handle.canceled()
-            else:
-                self.handle.abort()
-        except RCLError:  # not a state from which this one can be reached: it has ended already
-            return _EVENTS.get(self.handle.status, Event.ABORTED)
-        return _EVENTS.get(self.handle.status, Event.ABORTED)

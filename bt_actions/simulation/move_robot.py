@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rclpy.node import Node
 from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.simulation import robot
@@ -53,7 +52,7 @@ class MoveRobotServer(SimulatedServer):
     A newer goal aborts the older: there is one axis.
     """
 
-    def __init__(self, node: Node, world: World, name: str = "move_robot", **settings: Any) -> None:
+    def __init__(self, node: Any, world: World, name: str = "move_robot", **settings: Any) -> None:
         """`settings` are those of SimulatedServer."""
         self.world = world
         super().__init__(node, MoveRobot, name, **{"time_limit": TIME_LIMIT} | settings)

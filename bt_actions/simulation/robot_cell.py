@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.exceptions import InvalidHandle
-from rclpy.node import Node
 from sensor_msgs.msg import BatteryState
 
-from bt_actions.ros.workarounds.closable import closable
 from bt_actions.simulation.battery import Battery
 from bt_actions.simulation.gripper_control import GripperServer
 from bt_actions.simulation.move_robot import MoveRobotServer
+from bt_actions.simulation.platform import Platform
 from bt_actions.simulation.world import HOME, World, WorldEvent
 
 VOLTAGE = 24.0
@@ -24,7 +21,7 @@ class RobotCell:
 
     def __init__(
         self,
-        node: Node,
+        platform: Platform,
         namespace: str,
         *,
         on_event: Callable[[WorldEvent], None],
@@ -37,11 +34,9 @@ class RobotCell:
         self.world = World(name=name, on_event=on_event)
         self.battery = Battery()
         self._pose = self.world.robot.current_pose
-        self._node = node
-        self.move_robot = MoveRobotServer(node, self.world, f"{prefix}move_robot", **settings)
-        self.gripper = GripperServer(node, self.world, f"{prefix}gripper_control", **settings)
-        battery_state = node.create_publisher(BatteryState, f"{prefix}battery_state", 10)
-        self._battery_state = closable(battery_state)
+        self.move_robot = MoveRobotServer(platform, self.world, f"{prefix}move_robot", **settings)
+        self.gripper = GripperServer(platform, self.world, f"{prefix}gripper_control", **settings)
+        self._battery_state = platform.publisher(BatteryState, f"{prefix}battery_state")
 
     def __repr__(self) -> str:
         return f"<RobotCell {self.namespace or '/'} {self.world!r}>"
@@ -65,12 +60,10 @@ class RobotCell:
             present=True,
             power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
         )
-        message.header.stamp = self._node.get_clock().now().to_msg()
         self._battery_state.publish(message)
 
     def close(self) -> None:
         """Close the servers and the topic."""
         for server in self.servers:
             server.close()
-        with contextlib.suppress(InvalidHandle):  # the node was destroyed before its simulation
-            self._node.destroy_publisher(self._battery_state)
+        self._battery_state.destroy()

@@ -10,8 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.node import Node
-
 from bt_actions.simulation.execution import Finish
 from bt_actions.simulation.server import SimulatedServer
 
@@ -62,7 +60,7 @@ class ScriptedServer(SimulatedServer):
 
     def __init__(
         self,
-        node: Node,
+        node: Any,
         action_type: Any,
         name: str,
         script: Script | None = None,

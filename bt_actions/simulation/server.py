@@ -1,20 +1,15 @@
 """What all simulated action servers share: goals from request to end, their faults, their journal.
 
 A subclass says what a goal means (GoalMeaning); what may go wrong is decided by `faults`, and how,
-by `intake`, `execution` and `result_faults`. No callback blocks, none raises into the executor, and
-no goal has a thread of its own.
+by `intake`, `execution` and `result_faults`. The same code serves on an rclpy node and on the
+virtual network (`platform`): nothing here blocks, raises into an executor, or has a thread.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from functools import partial
 from typing import Any
-
-from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
-from rclpy.expand_topic_name import expand_topic_name
-from rclpy.node import Node
 
 from bt_actions.simulation.execution import Execution, Motion
 from bt_actions.simulation.fault_plan import FaultPlan
@@ -23,9 +18,9 @@ from bt_actions.simulation.goal_meaning import GoalMeaning
 from bt_actions.simulation.intake import Fate, Intake
 from bt_actions.simulation.journal import Event, Journal
 from bt_actions.simulation.live_goal import LiveGoal
+from bt_actions.simulation.platform import Platform, Request, Wire
 from bt_actions.simulation.result_faults import ResultFaults
 from bt_actions.simulation.stepper import Stepper
-from bt_actions.simulation.wire import InterceptedActionServer, Taken
 from bt_actions.utilities.plain_text import raised
 
 RESULT_TIMEOUT = 5.0
@@ -39,7 +34,7 @@ class SimulatedServer(GoalMeaning):
 
     def __init__(
         self,
-        node: Node,
+        node: Any,
         action_type: Any,
         name: str,
         *,
@@ -56,6 +51,7 @@ class SimulatedServer(GoalMeaning):
     ) -> None:
         """Serve `action_type` under `name`, which is expanded with the node's namespace.
 
+        `node` is an rclpy node, or another Platform.
         Servers that share a `stepper` share its timer and its lock, its speed and step period; a
         server without one makes its own. `time_limit` is in seconds of simulated time. With
         `preempts` a newer goal aborts the older ones. `on_death` is called when the fault `die`
@@ -63,22 +59,22 @@ class SimulatedServer(GoalMeaning):
 
         Raises FaultError when a fault fits no server of this name.
         """
-        self.node = node
+        self._platform = stepper.platform if stepper else platform_of(node)
         self.action_type = action_type
-        self.name = expand_topic_name(name, node.get_name(), node.get_namespace())
+        self.name = self._platform.expand(name)
         if isinstance(faults, FaultPlan):
             self.faults = faults
         else:
             self.faults = FaultPlan.of(faults, seed)
             self.faults.check([self.name])
-        self._log = node.get_logger()
+        self._log = self._platform.log
         self._owns_stepper = stepper is None
         self._owns_journal = not isinstance(journal, Journal)
         if isinstance(journal, Journal):
             self.journal = journal
         else:
-            self.journal = Journal(journal, on_error=self._log.error)
-        self.stepper = stepper or Stepper(node, speed=speed, step_period=step_period)
+            self.journal = Journal(journal, clock=self._platform.now, on_error=self._log.error)
+        self.stepper = stepper or Stepper(self._platform, speed=speed, step_period=step_period)
         self._time_limit = time_limit
         self._preempts = preempts
         self._result_timeout = result_timeout
@@ -87,7 +83,7 @@ class SimulatedServer(GoalMeaning):
         self._live: dict[str, LiveGoal] = {}
         self._results = ResultFaults(self.stepper, self._answer_result)
         self._closed = False
-        self._wire: InterceptedActionServer | None = None
+        self._wire: Wire | None = None
         try:
             self.open()
         except BaseException:
@@ -114,16 +110,8 @@ class SimulatedServer(GoalMeaning):
         with self.stepper.lock:
             if self._wire is not None or self._closed:
                 return
-            self._wire = InterceptedActionServer(
-                self.node,
-                self.action_type,
-                self.name,
-                interceptor=self,
-                callback_group=self.stepper.group,
-                goal_callback=self._decide,
-                handle_accepted_callback=self._start,
-                cancel_callback=self._cancel,
-                result_timeout=self._result_timeout,
+            self._wire = self._platform.serve(
+                self.action_type, self.name, self, self._result_timeout
             )
             self.record("", Event.OPENED)
 
@@ -184,53 +172,50 @@ class SimulatedServer(GoalMeaning):
         self.stepper.stop(goal)
         self._live.pop(goal.goal_id, None)
         if self._wire is not None:
-            self._wire.finish(goal.handle, result)
+            self._wire.finish(goal.goal_id, result)
         self._results.ended(goal.goal_id, self.stepper.now(), self._result_timeout)
 
     # Requests, as the wire brings them.
 
-    def on_request(self, kind: str, taken: Taken) -> bool:
+    def on_request(self, request: Request) -> bool:
         """Return whether to answer a request now."""
         with self.stepper.lock:
-            if kind == "goal":
-                return self._on_goal_request(taken)
-            if kind == "cancel":
-                return self._on_cancel_request(taken[1].goal_info)
-            return self._results.on_request(_hex(taken[1].goal_id), taken)
+            if request.kind == "goal":
+                return self._on_goal_request(request)
+            if request.kind == "cancel":
+                return self._on_cancel_request(request.goal_id)
+            return self._results.on_request(request.goal_id, request)
 
-    def on_answered(self, kind: str, taken: Taken) -> None:
+    def on_answered(self, request: Request) -> None:
         """Go on after an answer was sent."""
         with self.stepper.lock:
-            if kind == "goal":
-                goal_id = _hex(taken[1].goal_id)
-                not_started = self._intake.answered(taken[1].goal, goal_id)
-                handle = self._wire.handle_of(goal_id) if self._wire and not_started else None
-                if handle is not None:
+            if request.kind == "goal":
+                not_started = self._intake.answered(request.goal, request.goal_id)
+                if not_started and self._wire and self._wire.knows(request.goal_id):
                     # The client went away before its answer; rclpy then starts nothing.
-                    self._start(handle)
-            elif kind == "cancel":
+                    self.start(request.goal_id, request.goal)
+            elif request.kind == "cancel":
                 for live in list(self._live.values()):
                     live.poll(self.stepper.now())
                     if live.run.due is not None:
                         self.stepper.call_at(live.run.due, live.poll)
 
-    def _on_goal_request(self, taken: Taken) -> bool:
+    def _on_goal_request(self, taken: Request) -> bool:
         wire = self._wire
         if wire is None:
             return False
-        request = self._intake.receive(taken[1].goal, _hex(taken[1].goal_id))
+        request = self._intake.receive(taken.goal, taken.goal_id)
         if request.faults:
             self._log.info(f"{self.name}: goal {request.number} meets {request.faults}")
         if request.fate is Fate.DIE:
             self.die("fault: die=accept")
         elif request.fate in {Fate.LATER, Fate.SILENT}:
             silent = request.fate is Fate.SILENT
-            answer = partial(wire.later, "goal", taken, silent=silent)
-            self.stepper.call_at(self.stepper.now() + request.delay, lambda now: answer())
+            due = self.stepper.now() + request.delay
+            self.stepper.call_at(due, lambda now: wire.answer_soon(taken, silent=silent))
         return request.fate is Fate.ANSWER
 
-    def _on_cancel_request(self, goal_info: Any) -> bool:
-        goal_id = _hex(goal_info.goal_id)
+    def _on_cancel_request(self, goal_id: str) -> bool:
         asked = list(self._live) if goal_id == _ALL_GOALS else [goal_id]
         for each in asked:
             self.record(each, Event.CANCEL_REQUESTED)
@@ -240,35 +225,34 @@ class SimulatedServer(GoalMeaning):
             return False
         return not any(FaultKind.DROP_CANCEL in of_goal for of_goal in faults)
 
-    def _answer_result(self, taken: Taken) -> None:
+    def _answer_result(self, request: Request) -> None:
         if self._wire is not None:
-            self._wire.later("result", taken)
+            self._wire.answer_soon(request)
 
-    # rclpy's callbacks.
-
-    def _decide(self, goal: Any) -> GoalResponse:
+    def decide(self, goal: Any) -> bool:
+        """Return whether to accept a goal."""
         with self.stepper.lock:
-            accepted = self._intake.decide(goal, self.refusal)
-            return GoalResponse.ACCEPT if accepted else GoalResponse.REJECT
+            return self._intake.decide(goal, self.refusal)
 
-    def _start(self, handle: ServerGoalHandle) -> None:
+    def start(self, goal_id: str, goal: Any) -> None:
+        """Begin a goal that was accepted."""
         with self.stepper.lock:
             # The journal has it accepted before an older goal is aborted, so that a client which
             # has two goals at once is seen.
-            request = self._intake.start(_hex(handle.goal_id))
-            if request is None:
+            wire, request = self._wire, self._intake.start(goal_id)
+            if wire is None or request is None:
                 return
             if self._preempts:
                 for older in list(self._live.values()):
                     older.replace()
-            motion, problem = self._begin(handle.request)
+            motion, problem = self._begin(goal)
             now = self.stepper.now()
             run = Execution(motion, request.faults, now=now, time_limit=self._time_limit)
             period = self.stepper.step_period
-            live = LiveGoal(self, self, request.goal_id, handle, run, step_period=period)
-            self._live[request.goal_id] = live
-            self._results.expect(request.goal_id, request.faults)
-            handle.execute()
+            live = LiveGoal(self, self, goal_id, wire, run, step_period=period)
+            self._live[goal_id] = live
+            self._results.expect(goal_id, request.faults)
+            wire.start(goal_id)
             if problem:
                 live.give_up(problem)
             else:
@@ -280,11 +264,11 @@ class SimulatedServer(GoalMeaning):
         except Exception as error:  # noqa: BLE001 - rclpy would leave the goal live for ever
             return _Nowhere(), f"it could not begin: {raised(error)}"
 
-    def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
+    def cancel(self, goal_id: str) -> bool:
+        """Return whether to cancel a goal."""
         with self.stepper.lock:
-            live = self._live.get(_hex(handle.goal_id))
-            accepted = live is not None and live.cancel(self.stepper.now())
-            return CancelResponse.ACCEPT if accepted else CancelResponse.REJECT
+            live = self._live.get(goal_id)
+            return live is not None and live.cancel(self.stepper.now())
 
 
 class _Nowhere:
@@ -297,5 +281,11 @@ class _Nowhere:
         pass
 
 
-def _hex(goal_id: Any) -> str:
-    return bytes(goal_id.uuid).hex()
+def platform_of(node: Any) -> Platform:
+    """Return what an rclpy node is to a simulation; what is a platform already, as it is."""
+    if hasattr(node, "serve"):
+        platform: Platform = node
+        return platform
+    from bt_actions.simulation.ros.platform import NodePlatform
+
+    return NodePlatform(node)

@@ -11,15 +11,13 @@ import signal
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from types import TracebackType
-from typing import Self
-
-from rclpy.node import Node
+from typing import Any, Self
 
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault
 from bt_actions.simulation.journal import Journal
 from bt_actions.simulation.robot_cell import RobotCell
-from bt_actions.simulation.server import RESULT_TIMEOUT, SimulatedServer
+from bt_actions.simulation.server import RESULT_TIMEOUT, SimulatedServer, platform_of
 from bt_actions.simulation.stepper import Stepper
 from bt_actions.simulation.world import World, WorldEvent
 from bt_actions.utilities.plain_text import raised
@@ -33,7 +31,7 @@ class Simulation:
 
     def __init__(
         self,
-        node: Node,
+        node: Any,
         *,
         namespaces: Sequence[str] = ("",),
         speed: float = 1.0,
@@ -47,6 +45,7 @@ class Simulation:
     ) -> None:
         """Serve one robot for each of `namespaces`; "" is the node's own.
 
+        `node` is an rclpy node, or another Platform.
         `speed` is simulated seconds in one wall second, `step_period` in simulated seconds. Without
         a `seed` one is chosen; it is logged when a fault depends on it. `in_process` False says
         that the process is the simulation's own, to be killed by the fault `die`. `on_event` is
@@ -59,18 +58,18 @@ class Simulation:
         names = tuple(dict.fromkeys(namespaces))
         if not names:
             raise ValueError("a simulation needs at least one namespace")
-        self.node = node
+        platform = platform_of(node)
         self._faults = FaultPlan.of(faults, seed)
         self._on_event: Callable[[str, WorldEvent], None] | None = on_event
-        self._log = node.get_logger()
-        self._journal = Journal(journal, on_error=self._log.error)
+        self._log = platform.log
+        self._journal = Journal(journal, clock=platform.now, on_error=self._log.error)
         self._cells: dict[str, RobotCell] = {}
         self._speed = speed
-        self._stepper = Stepper(node, speed=speed, step_period=step_period)
+        self._stepper = Stepper(platform, speed=speed, step_period=step_period)
         try:
             for namespace in names:
                 self._cells[namespace] = RobotCell(
-                    node,
+                    platform,
                     namespace,
                     on_event=partial(self._tell, namespace),
                     stepper=self._stepper,

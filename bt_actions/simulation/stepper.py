@@ -1,4 +1,4 @@
-"""The one timer of a node's simulated servers: steps what moves, and rings when a time has come.
+"""The one timer of simulated servers: steps what moves, and calls when a time has come.
 
 Everything it calls runs under `lock`, one at a time. The timer is off while nothing moves and
 nothing is due. It never blocks, and nothing that it calls can end the executor's spin: what raises
@@ -7,21 +7,14 @@ is logged and stepped no more.
 
 from __future__ import annotations
 
-import contextlib
 import heapq
 import itertools
 import math
 import threading
-import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
-from rclpy.exceptions import InvalidHandle
-from rclpy.node import Node
-
+from bt_actions.simulation.platform import Platform
 from bt_actions.utilities.plain_text import raised
 
 CATCH_UP = 0.25
@@ -30,7 +23,6 @@ robots jump: they go on where they were."""
 SHORTEST_RING = 0.008
 """Wall seconds between two rings for steps: a higher speed makes more steps at once. Each ring has
 the executor rebuild its wait set, which for 100 servers takes milliseconds."""
-SHORTEST_WAIT = 0.0001
 
 
 class Stepped(Protocol):
@@ -43,16 +35,14 @@ class Stepped(Protocol):
 class Stepper:
     """Calls `step` of everything that moves each `step_period` of simulated time."""
 
-    def __init__(self, node: Node, *, speed: float = 1.0, step_period: float = 0.1) -> None:
-        """Use one timer on `node`. `speed` is simulated seconds in one wall second."""
+    def __init__(self, platform: Platform, *, speed: float = 1.0, step_period: float = 0.1) -> None:
+        """Use one timer of `platform`. `speed` is simulated seconds in one wall second."""
         for name, value in (("speed", speed), ("step_period", step_period)):
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be more than zero and finite, not {value!r}")
-        self.node = node
+        self.platform = platform
         self.lock = threading.RLock()
         self.step_period = step_period
-        self.group: CallbackGroup = MutuallyExclusiveCallbackGroup()
-        """The servers' callbacks belong here too: a second thread would only wait for the lock."""
         self._wall_period = step_period / speed
         self._most_steps = max(1, math.ceil(CATCH_UP / self._wall_period))
         self._moving: dict[Stepped, None] = {}
@@ -62,17 +52,11 @@ class Stepper:
         self._armed_for = math.inf
         self._last_ring = -math.inf
         self._closed = False
-        self._timer = node.create_timer(
-            self._wall_period,
-            self._ring,
-            callback_group=self.group,
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-            autostart=False,
-        )
+        self._timer = platform.timer(self._ring)
 
     def now(self) -> float:
-        """Return the steady clock's seconds, the clock of the journal."""
-        return time.monotonic()
+        """Return the seconds of the platform's steady clock."""
+        return self.platform.now()
 
     def start(self, stepped: Stepped) -> None:
         """Step `stepped` from now on, until its `step` returns False."""
@@ -101,16 +85,13 @@ class Stepper:
             self._closed = True
             self._moving.clear()
             self._alarms.clear()
-            with contextlib.suppress(InvalidHandle):  # the node was destroyed before
-                self._timer.cancel()
-                self.node.destroy_timer(self._timer)
+            self._timer.destroy()
 
     def _ring(self) -> None:
         with self.lock:
             self._armed_for = math.inf
             if self._closed:
                 return
-            self._timer.cancel()
             now = self.now()
             while self._alarms and self._alarms[0][0] <= now:
                 callback = heapq.heappop(self._alarms)[2]
@@ -146,18 +127,12 @@ class Stepper:
         if due == self._armed_for:
             return
         self._armed_for = due
-        if due == math.inf:
-            self._timer.cancel()
-            return
-        wait = max(due - self.now(), SHORTEST_WAIT)
-        self._timer.timer_period_ns = int(wait * 1e9)
-        self._timer.reset()
+        self._timer.set(None if due == math.inf else due)
 
     def _guarded(self, function: Callable[[float], Any], now: float) -> Any:
         try:
             return function(now)
         except Exception as error:  # noqa: BLE001 - an exception in a timer callback ends spin()
-            self.node.get_logger().error(
-                f"simulation: {function.__qualname__} raised {raised(error)}"
-            )
+            name = getattr(function, "__qualname__", function)
+            self.platform.log.error(f"simulation: {name} raised {raised(error)}")
             return False

@@ -20,7 +20,7 @@ from bt_actions.simulation import journal
 from bt_actions.simulation.journal import Entry, Event
 from tests.support.waiting import until
 
-STEPS = {Event.STEP, Event.OPENED, Event.PROCESS_EXITING}
+STEPS = {Event.STEP, Event.OPENED, Event.CLOSED}
 
 
 class Goal:

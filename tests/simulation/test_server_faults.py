@@ -264,7 +264,7 @@ def test_die_destroys_the_server(serve: Any, bench: Bench, fault: str, events: l
     bench.until(lambda: not client.rclpy_client.server_is_ready())
     assert goal.status is None
     assert bench.events() == events
-    assert bench.entries()[-1].event is j.Event.PROCESS_EXITING
+    assert bench.entries()[-1].event is j.Event.CLOSED
 
 
 def test_a_server_that_died_can_be_opened_again(serve: Any, bench: Bench) -> None:

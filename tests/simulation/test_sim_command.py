@@ -95,7 +95,7 @@ def test_die_is_sigkill(start_sim: Any, bench: Bench, space: str, fault: str) ->
     entries = bench.entries()
     [end] = j.ends(entries).values()
     assert end is (None if fault == "die=accept" else j.Event.DIED)
-    closed = [entry.server for entry in entries if entry.event is j.Event.PROCESS_EXITING]
+    closed = [entry.server for entry in entries if entry.event is j.Event.CLOSED]
     assert closed == [f"{space}/move_robot", f"{space}/gripper_control"]
     assert j.max_live(entries) == (0 if fault == "die=accept" else 1)
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from bt_actions.simulation.ros.platform import NodePlatform
 from bt_actions.simulation.stepper import CATCH_UP, Stepper
 from tests.simulation.conftest import Bench
 
@@ -27,21 +28,21 @@ class Walker:
 
 @pytest.fixture
 def stepper(bench: Bench) -> Iterator[Stepper]:
-    each = Stepper(bench.node, speed=1.0, step_period=0.02)
+    each = Stepper(NodePlatform(bench.node), speed=1.0, step_period=0.02)
     yield each
     each.close()
 
 
 def is_off(stepper: Stepper) -> bool:
-    return bool(stepper._timer.is_canceled())
+    return bool(stepper._timer.rclpy_timer.is_canceled())
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, math.inf])
 def test_a_senseless_speed_is_an_error(bench: Bench, speed: float) -> None:
     with pytest.raises(ValueError, match="speed"):
-        Stepper(bench.node, speed=speed)
+        Stepper(NodePlatform(bench.node), speed=speed)
     with pytest.raises(ValueError, match="step_period"):
-        Stepper(bench.node, step_period=speed)
+        Stepper(NodePlatform(bench.node), step_period=speed)
 
 
 def test_it_is_off_until_something_moves_and_after(bench: Bench, stepper: Stepper) -> None:
@@ -64,7 +65,7 @@ def test_steps_come_in_their_period(bench: Bench, stepper: Stepper) -> None:
 
 
 def test_a_high_speed_makes_several_steps_at_once(bench: Bench) -> None:
-    stepper = Stepper(bench.node, speed=1000.0, step_period=0.1)
+    stepper = Stepper(NodePlatform(bench.node), speed=1000.0, step_period=0.1)
     walker = Walker(2000)
     began = stepper.now()
     stepper.start(walker)

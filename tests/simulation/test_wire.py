@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import warnings
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,7 +13,7 @@ from rclpy.node import Node
 from test_msgs.action import Fibonacci
 
 from bt_actions.simulation import ScriptedServer
-from bt_actions.simulation.wire import InterceptedActionServer
+from bt_actions.simulation.ros.wire import InterceptedActionServer
 from tests.simulation.conftest import Bench
 
 
@@ -67,9 +66,9 @@ def test_python_does_not_warn_of_what_an_executor_did_not_come_to(bench: Bench, 
     wire: Any = server._wire
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        wire.finish(SimpleNamespace(), Fibonacci.Result())
+        wire.finish("00", Fibonacci.Result())
         for silent in (True, False):
-            wire.later("goal", (object(), object()), silent=silent)
+            wire.answer_soon(object(), silent=silent)
         server.close()
         executor.shutdown()
         node.destroy_node()

@@ -50,17 +50,19 @@ class TellsLate(ScriptedServer):
             more["distance"] = self._asked
         super().record(goal_id, event, **more)
 
-    def on_request(self, kind: str, taken: Any) -> bool:
-        if kind == "goal":
-            self._asked = taken[1].goal.distance
-        is_answered = super().on_request(kind, taken)
-        if kind == "goal" and not is_answered and self.tells_after is not None:
-            self.stepper.call_at(self.stepper.now() + self.tells_after, lambda _: self._tell(taken))
+    def on_request(self, request: Any) -> bool:
+        if request.kind == "goal":
+            self._asked = request.goal.distance
+        is_answered = super().on_request(request)
+        if request.kind == "goal" and not is_answered and self.tells_after is not None:
+            due = self.stepper.now() + self.tells_after
+            self.stepper.call_at(due, lambda _: self._tell(request.header))
         return is_answered
 
-    def _tell(self, taken: Any) -> None:
+    def _tell(self, header: Any) -> None:
+        wire: Any = self._wire
         answer = self.action_type.Impl.SendGoalService.Response(accepted=True)
-        self._wire._handle.send_goal_response(taken[0], answer)
+        wire._handle.send_goal_response(header, answer)
 
 
 class Serving:
