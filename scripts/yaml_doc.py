@@ -14,7 +14,9 @@ import textwrap
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from bt_actions.document.model import (
+from bt_actions.document.findings.pages import PAGES
+from bt_actions.document.findings.rules import RULES
+from bt_actions.document.language.model import (
     ACTION_KEYS,
     ALIAS,
     INPUT,
@@ -29,22 +31,21 @@ from bt_actions.document.model import (
     Group,
     Kind,
 )
-from bt_actions.document.pages import PAGES
-from bt_actions.document.rules import RULES
-from bt_actions.document.scalars import Text
-from bt_actions.document.shape import Shape
-from bt_actions.document.shapes import Key, Record
+from bt_actions.document.language.scalars import Text
+from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.shapes import Key, Record
 from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Busy
 from bt_actions.utilities.units import DURATION_UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
+PAGES_FILE = "bt_actions/document/findings/pages.py"
 
 HEAD = f"""\
 # Trees in YAML
 
-<!-- Made by scripts/yaml_doc.py from bt_actions/document/model.py. Do not edit. -->
+<!-- Made by scripts/yaml_doc.py from bt_actions/document/language/model.py. Do not edit. -->
 
 A tree is a YAML file. `bt-actions check` finds what is wrong with it before a robot moves,
 `bt-actions format` puts it in canonical form, and `bt-actions schema` prints a JSON Schema for
@@ -289,7 +290,7 @@ def rules_page() -> str:
     """docs/rules.md."""
     lines = [
         "# The rules of `bt-actions check`", "",
-        "<!-- Made by scripts/yaml_doc.py from bt_actions/document/pages.py. Do not edit. -->", "",
+        f"<!-- Made by scripts/yaml_doc.py from {PAGES_FILE}. Do not edit. -->", "",
         "| code | | |", "|---|---|---|",
         *(f"| [{rule.code}](#{rule.code.lower()}) | {rule.severity} | {rule.title} |"
           for rule in RULES.values()), "",

@@ -12,10 +12,10 @@ import pytest
 from bt_actions import load_tree
 from bt_actions.cli import main
 from bt_actions.document import DocumentError
-from bt_actions.document.build import build
-from bt_actions.document.scope import Scope
-from bt_actions.document.source import MAX_ERRORS
-from bt_actions.document.workspace import Workspace
+from bt_actions.document.building.build import build
+from bt_actions.document.building.scope import Scope
+from bt_actions.document.reading.workspace import Workspace
+from bt_actions.document.yaml.source import MAX_ERRORS
 
 PACKAGE = Path(__file__).parents[1] / "bt_actions"
 

@@ -3,7 +3,6 @@
 Importing this imports neither rclpy nor any message package.
 """
 
-from bt_actions.document.find import TreeNotFoundError, find_tree, installed_trees
 from bt_actions.document.findings import (
     PLACE,
     DocumentError,
@@ -13,7 +12,7 @@ from bt_actions.document.findings import (
     Severity,
     Span,
 )
-from bt_actions.document.inputs import InputError, TreeInput, parse_input
+from bt_actions.document.findings.rules import RULES, Rule
 from bt_actions.document.load import (
     Tree,
     check_file,
@@ -25,8 +24,9 @@ from bt_actions.document.load import (
     tree_name,
     tree_outputs,
 )
-from bt_actions.document.rules import RULES, Rule
-from bt_actions.document.source import Source, read_source, source_of
+from bt_actions.document.reading.find import TreeNotFoundError, find_tree, installed_trees
+from bt_actions.document.reading.inputs import InputError, TreeInput, parse_input
+from bt_actions.document.yaml.source import Source, read_source, source_of
 
 __all__ = [
     "RULES",

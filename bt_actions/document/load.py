@@ -11,24 +11,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_actions.document.check import check_document
-from bt_actions.document.checker import Checker
-from bt_actions.document.find import TreeNotFoundError, find_tree, installed_trees
+from bt_actions.document.checking.check import check_document
+from bt_actions.document.checking.checker import Checker
+from bt_actions.document.checking.hazards import find_hazards
 from bt_actions.document.findings import LOADED, DocumentError, Finding, Severity, Span
-from bt_actions.document.hazards import find_hazards
-from bt_actions.document.ignores import apply_ignores
-from bt_actions.document.inputs import TreeInput, check_inputs, inputs_of
-from bt_actions.document.source import Source, TooManyErrors
-from bt_actions.document.tree import Document
-from bt_actions.document.unread import Doubts
-from bt_actions.document.workspace import Workspace
+from bt_actions.document.reading.find import TreeNotFoundError, find_tree, installed_trees
+from bt_actions.document.reading.inputs import TreeInput, check_inputs, inputs_of
+from bt_actions.document.reading.tree import Document
+from bt_actions.document.reading.unread import Doubts
+from bt_actions.document.reading.workspace import Workspace
+from bt_actions.document.yaml.ignores import apply_ignores
+from bt_actions.document.yaml.source import Source, TooManyErrors
 from bt_actions.utilities.plain_data import plain
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
-    from bt_actions.document.classes import Python
-    from bt_actions.document.scope import Scope
+    from bt_actions.document.building.scope import Scope
+    from bt_actions.document.language.classes import Python
 
 __all__ = [
     "Tree",
@@ -120,8 +120,8 @@ class Tree:
         Raises InputError for inputs that do not fit, DocumentError for a class of a ``python:``
         node that fails when it is made.
         """
-        from bt_actions.document.build import build
-        from bt_actions.document.scope import Scope
+        from bt_actions.document.building.build import build
+        from bt_actions.document.building.scope import Scope
 
         values = check_inputs(self._document, inputs or {}, types=self._types)
         scope = Scope.of_load(self._document.name)

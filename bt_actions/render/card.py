@@ -19,7 +19,7 @@ from bt_actions.goals.policy import Retry, Timeouts
 from bt_actions.render.look import action_of
 
 if TYPE_CHECKING:
-    from bt_actions.document.tree import Document, TreeNode
+    from bt_actions.document.reading.tree import Document, TreeNode
 
 __all__ = ["Line", "Table", "describe", "interface_of", "tables"]
 
@@ -136,7 +136,7 @@ def _retry(retry: Retry) -> Iterator[Line]:
 
 
 def _ports(document: Document) -> Iterator[Table]:
-    from bt_actions.document.inputs import inputs_of
+    from bt_actions.document.reading.inputs import inputs_of
 
     inputs = []
     for name, one in inputs_of(document).items():

@@ -16,7 +16,7 @@ from bt_actions.document.findings import LOADED, PLACE
 
 if TYPE_CHECKING:
     from bt_actions.document.findings import Place
-    from bt_actions.document.tree import Document, TreeNode
+    from bt_actions.document.reading.tree import Document, TreeNode
 
 __all__ = ["Written", "own_text"]
 

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from bt_actions.document import DocumentError, source_of
-from bt_actions.document.bounds import refuse_large
-from bt_actions.document.compose import compose
-from bt_actions.document.nodes import Mapping as YamlMapping
-from bt_actions.document.nodes import data_of
+from bt_actions.document.language.bounds import refuse_large
+from bt_actions.document.yaml.compose import compose
+from bt_actions.document.yaml.nodes import Mapping as YamlMapping
+from bt_actions.document.yaml.nodes import data_of
 from bt_actions.utilities.plain_text import clean
 
 __all__ = ["MAX_BYTES", "Refused", "inputs_of"]

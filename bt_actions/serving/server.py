@@ -21,7 +21,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from bt_actions.document.find import tree_folder
+from bt_actions.document.reading.find import tree_folder
 from bt_actions.ros.log import log
 from bt_actions.ros.rosout import Rosout
 from bt_actions.serving.catalog import Catalog

@@ -15,9 +15,9 @@ import yaml
 
 from bt_actions.cli import main
 from bt_actions.document import check_source, source_of
-from bt_actions.document.model import KINDS, TOP_KEYS
-from bt_actions.document.reports import as_github, as_json, as_sarif, as_text
-from bt_actions.document.schema import json_schema
+from bt_actions.document.findings.reports import as_github, as_json, as_sarif, as_text
+from bt_actions.document.language.model import KINDS, TOP_KEYS
+from bt_actions.document.language.schema import json_schema
 
 WRONG = """\
 tree: t

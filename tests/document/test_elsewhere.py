@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from bt_actions.document import elsewhere
-from bt_actions.document.model import KINDS
+from bt_actions.document.findings import elsewhere
+from bt_actions.document.language.model import KINDS
 from tests.document.test_wrong_documents import findings_of
 
 WORDS = {

@@ -22,20 +22,19 @@ from bt_actions import render
 from bt_actions.document import (
     DocumentError,
     Finding,
-    build_names,
     check_file,
     check_source,
-    hazards,
     load_tree,
-    source,
     source_of,
-    verdicts,
-    workspace,
 )
-from bt_actions.document.inputs import parse_input
-from bt_actions.document.source import MAX_BYTES, MAX_ERRORS, Source
-from bt_actions.document.tree import Document, TreeNode
-from bt_actions.document.workspace import MAX_LEVELS
+from bt_actions.document.checking import hazards, verdicts
+from bt_actions.document.reading import settings as node_settings
+from bt_actions.document.reading import workspace
+from bt_actions.document.reading.inputs import parse_input
+from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.reading.workspace import MAX_LEVELS
+from bt_actions.document.yaml import source
+from bt_actions.document.yaml.source import MAX_BYTES, MAX_ERRORS, Source
 from tests.document.test_wrong_documents import CASES
 
 EMPTY = '""'
@@ -113,7 +112,7 @@ def test_a_path_without_a_name_of_its_own_is_answered_as_any_other(path: str) ->
 def test_a_tree_in_a_pipe_is_read_however_long_its_writer_thinks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("bt_actions.document.source.PIPE_PATIENCE", 0.0)
+    monkeypatch.setattr("bt_actions.document.yaml.source.PIPE_PATIENCE", 0.0)
     reader, writer = os.pipe()
     with ThreadPoolExecutor() as pool:
         found = pool.submit(check_file, f"/dev/fd/{reader}")
@@ -128,7 +127,7 @@ def test_a_tree_in_a_pipe_is_read_however_long_its_writer_thinks(
 def test_a_pipe_that_nobody_writes_to_is_not_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bt_actions.document.source.PIPE_PATIENCE", 0.05)
+    monkeypatch.setattr("bt_actions.document.yaml.source.PIPE_PATIENCE", 0.05)
     path = tmp_path / "pipe.yaml"
     os.mkfifo(path)
     assert "nobody wrote to this pipe within 0.05 s" in only(check_file(path))
@@ -616,7 +615,7 @@ def test_what_trees_inside_each_other_hold_is_looked_at_once(
 
     def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
         looked.append(node)
-        return build_names.settings_of(node, document)
+        return node_settings.settings_of(node, document)
 
     monkeypatch.setattr(verdicts, "settings_of", settings_of)
     monkeypatch.setattr(hazards, "settings_of", settings_of)

@@ -143,7 +143,7 @@ def test_a_large_goal_that_nodes_add_to_is_looked_at_once(
         "  children:\n" + "    - {go: G, goal: {header: {frame_id: b}}}\n" * 50
     )
     monkeypatch.setattr(
-        "bt_actions.document.checker.interface_of",
+        "bt_actions.document.checking.checker.interface_of",
         lambda _name, _kind: SimpleNamespace(Goal=nav_msgs.msg.Path, Result=std_msgs.msg.Empty),
     )
     looked = 0

@@ -12,7 +12,7 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from bt_actions.document import Severity, check_source, source_of, tree_outputs
-from bt_actions.document.model import KINDS, Kind
+from bt_actions.document.language.model import KINDS, Kind
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]

@@ -193,7 +193,9 @@ def test_goals_that_are_merged_must_fit_together(
     from std_msgs.msg import Empty
 
     action = SimpleNamespace(Goal=PoseStamped, Result=Empty)  # no action here wants a pose
-    monkeypatch.setattr("bt_actions.document.checker.interface_of", lambda _name, _kind: action)
+    monkeypatch.setattr(
+        "bt_actions.document.checking.checker.interface_of", lambda _name, _kind: action
+    )
     text = (
         "tree: t\ninputs: {w: float64}\nactions:\n  go: {type: a/action/B, server: s, timeout: 1 s,"
         f" goal: {{pose: {{orientation: {shared}}}}}}}\n"

@@ -16,13 +16,13 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from bt_actions.document import DocumentError, tree_outputs
-from bt_actions.document.compose import compose
-from bt_actions.document.model import KINDS, NODE, NODES, TOP_KEYS
-from bt_actions.document.scalars import Condition, Duration, Place, Text
-from bt_actions.document.shape import Shape
-from bt_actions.document.shapes import Key, ListOf, ListValue, OneOf, Record, Table, Values
-from bt_actions.document.source import Source
-from bt_actions.document.values import computed_in
+from bt_actions.document.language.model import KINDS, NODE, NODES, TOP_KEYS
+from bt_actions.document.language.scalars import Condition, Duration, Place, Text
+from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.shapes import Key, ListOf, ListValue, OneOf, Record, Table, Values
+from bt_actions.document.language.values import computed_in
+from bt_actions.document.yaml.compose import compose
+from bt_actions.document.yaml.source import Source
 
 Load = Callable[..., Behaviour]
 Where = tuple[str | int, ...]

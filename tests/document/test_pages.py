@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions.document import RULES, Severity, check_file
-from bt_actions.document.pages import PAGES, page
+from bt_actions.document.findings.pages import PAGES, page
 
 NOT_SHOWN = {"BT100", "BT101"}
 """What is wrong with a file, and not with its text: their examples are commands."""

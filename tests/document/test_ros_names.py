@@ -14,11 +14,11 @@ from rclpy.expand_topic_name import expand_topic_name
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from robot_control_interfaces.action import MoveRobot
 
-from bt_actions.document.build_names import join_names
-from bt_actions.document.compose import compose
-from bt_actions.document.ros_names import LONGEST, LONGEST_NAMESPACE, RosName
-from bt_actions.document.source import Source
-from bt_actions.document.values import BAD
+from bt_actions.document.language.ros_names import LONGEST, LONGEST_NAMESPACE, RosName
+from bt_actions.document.language.values import BAD
+from bt_actions.document.reading.settings import join_names
+from bt_actions.document.yaml.compose import compose
+from bt_actions.document.yaml.source import Source
 
 PIECES = ["a", "Z", "_", "0", "/", "~", "{node}", "{ns}", "{x}", "{", "}", "-", " ", ".", "é"]
 

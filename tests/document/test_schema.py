@@ -12,12 +12,12 @@ import pytest
 
 from bt_actions.cli import main
 from bt_actions.document import check_file
-from bt_actions.document.compose import compose
-from bt_actions.document.model import KINDS
-from bt_actions.document.nodes import Listing, Mapping, Node, Scalar
-from bt_actions.document.pages import PAGES
-from bt_actions.document.schema import json_schema
-from bt_actions.document.source import Source
+from bt_actions.document.findings.pages import PAGES
+from bt_actions.document.language.model import KINDS
+from bt_actions.document.language.schema import json_schema
+from bt_actions.document.yaml.compose import compose
+from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
+from bt_actions.document.yaml.source import Source
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = jsonschema.Draft202012Validator(json_schema())

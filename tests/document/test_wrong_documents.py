@@ -13,7 +13,7 @@ from typing import NamedTuple
 import pytest
 
 from bt_actions.document import Finding, check_source, source_of
-from bt_actions.document.rules import RULES
+from bt_actions.document.findings.rules import RULES
 
 TABLE = Path(__file__).with_name("wrong_documents.txt")
 

@@ -56,7 +56,7 @@ def namespace(text: str) -> str:
         raise argparse.ArgumentTypeError(
             f"{text!r} is no ROS namespace: letters, digits and _ between slashes, as in /r1"
         )
-    from bt_actions.document.ros_names import LONGEST_NAMESPACE
+    from bt_actions.document.language.ros_names import LONGEST_NAMESPACE
 
     if len(name) > LONGEST_NAMESPACE:
         raise argparse.ArgumentTypeError(f"a namespace has at most {LONGEST_NAMESPACE} characters")

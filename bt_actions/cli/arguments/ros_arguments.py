@@ -59,7 +59,7 @@ def as_inputs(
     parameter that is no input, or does not fit.
     """
     from bt_actions.document import parse_input
-    from bt_actions.document.inputs import convert
+    from bt_actions.document.reading.inputs import convert
 
     inputs: dict[str, object] = {}
     for name, value in _with_fields(given, declared).items():
@@ -102,8 +102,8 @@ def _with_fields(
 
 def _read(value: object, kind: str) -> object:
     """Read the texts within a message that stand for arrays of messages, as `run` shows them."""
-    from bt_actions.document.inputs import parse_text
-    from bt_actions.document.types import parse_type
+    from bt_actions.document.language.types import parse_type
+    from bt_actions.document.reading.inputs import parse_text
     from bt_actions.messages.fields import Listing, Message, describe
 
     def read(inner: object, field: object) -> object:

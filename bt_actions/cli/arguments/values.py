@@ -36,9 +36,9 @@ def value(text: str, where: str) -> object:
 
     Raises BadInput.
     """
-    from bt_actions.document.compose import compose
-    from bt_actions.document.nodes import Node, Scalar, data_of
-    from bt_actions.document.source import Source
+    from bt_actions.document.yaml.compose import compose
+    from bt_actions.document.yaml.nodes import Node, Scalar, data_of
+    from bt_actions.document.yaml.source import Source
 
     stripped = text.strip()
     if not stripped:

@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 def _leaf(tree: str, server: str, inputs: dict[str, object], goal_name: str) -> RunTree:
     """Check what can be checked without a server."""
     from bt_actions.behaviours.run_tree import RunTree, inputs_text
-    from bt_actions.document.ros_names import why_not
+    from bt_actions.document.language.ros_names import why_not
 
     if why := why_not(server):
         raise BadInput(f"--server: {server!r} cannot be the name of an action: {why}")

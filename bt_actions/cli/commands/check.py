@@ -55,7 +55,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check the trees that `args` name."""
     keep_results_apart()
-    from bt_actions.document.reports import REPORTS, as_text
+    from bt_actions.document.findings.reports import REPORTS, as_text
 
     findings: list[Finding] = []
     seen = set()
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(tree: str, *, types: bool, python: bool) -> list[Finding]:
     from bt_actions.document import DocumentError, check_file, check_source
-    from bt_actions.document.source import read_stream
+    from bt_actions.document.yaml.source import read_stream
 
     if tree != "-":
         return check_file(tree, types=types, python=python)

@@ -76,7 +76,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from bt_actions.document.ros_names import why_not
+    from bt_actions.document.language.ros_names import why_not
 
     for name in args.actions:
         if why := why_not(name):

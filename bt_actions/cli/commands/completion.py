@@ -96,7 +96,7 @@ def _command(name: str, text: str, parser: argparse.ArgumentParser) -> Command:
 def _inputs_of_trees() -> dict[str, list[str]]:
     """The names of the inputs of every installed tree; files that hold no tree are left out."""
     from bt_actions.document import DocumentError, tree_inputs
-    from bt_actions.document.find import installed_trees
+    from bt_actions.document.reading.find import installed_trees
 
     found = {}
     for name in installed_trees():
@@ -106,7 +106,7 @@ def _inputs_of_trees() -> dict[str, list[str]]:
 
 
 def _codes() -> tuple[str, ...]:
-    from bt_actions.document.rules import RULES
+    from bt_actions.document.findings.rules import RULES
 
     return tuple(RULES)
 

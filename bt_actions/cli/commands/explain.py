@@ -25,8 +25,8 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the page of a rule, or the list of rules."""
-    from bt_actions.document.pages import page
-    from bt_actions.document.rules import RULES
+    from bt_actions.document.findings.pages import page
+    from bt_actions.document.findings.rules import RULES
 
     if args.code is None:
         write("".join(f"{rule.code}  {rule.severity:7}  {rule.title}\n" for rule in RULES.values()))

@@ -26,7 +26,7 @@ class Presence:
     """Shows one run on its node, which `close` has to find alive."""
 
     def __init__(self, runner: TreeRunner, root: Behaviour) -> None:
-        from bt_actions.document.types import parse_type
+        from bt_actions.document.language.types import parse_type
         from bt_actions.ros.parameters import declare_input
         from bt_actions.ros.rosout import Rosout
 

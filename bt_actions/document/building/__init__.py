@@ -1,0 +1,1 @@
+"""From a document without errors to py_trees behaviours."""

@@ -1,0 +1,156 @@
+"""What a node is built in: its document, its variables, its namespace. Builds nothing itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bt_actions.behaviours.topics import TopicValue
+from bt_actions.document.building.scope import Scope
+from bt_actions.document.language.bounds import refuse_large
+from bt_actions.document.language.classes import Python
+from bt_actions.document.language.values import Computed, resolve
+from bt_actions.document.reading.inputs import convert
+from bt_actions.document.reading.settings import join_names, text_of
+from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.yaml.nodes import Scalar
+from bt_actions.expressions.expression import Expression
+
+__all__ = ["Condition", "Context", "plain_name", "table_of", "written_text"]
+
+
+Root = str | Callable[[Any], Mapping[str, object]] | None
+"""The bare name that an expression has for what it is a function of; or what gives several."""
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a node is built in: its document, its variables, its namespace."""
+
+    document: Document
+    scope: Scope
+    namespace: str
+    types: bool
+    topics: Mapping[str, TopicValue]
+    python: Python = True
+    """Which ``python:`` nodes may be made."""
+
+    def read(self, name: str) -> object:
+        """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.
+
+        A topic's name is a variable, too: the latest message.
+        """
+        topic = self.topics.get(name)
+        return self.scope.read(name) if topic is None else topic.read()
+
+    def write(self, values: Mapping[str, object]) -> None:
+        """Give variables their values, as `fitting` has them; all or none."""
+        self.scope.write_all({name: self.fitting(name, value) for name, value in values.items()})
+
+    def fitting(self, name: str, value: object) -> object:
+        """A value as the variable's declared type wants it.
+
+        Raises ValueError for one that does not fit, or is too large to be kept.
+        """
+        declared = self.document.outputs.get(name) or self.document.inputs.get(name)
+        kind = None if declared is None else declared.values.get("type")
+        try:
+            refuse_large(value)
+            return convert(value, kind, types=self.types) if isinstance(kind, str) else value
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+
+    def name(self, values: Mapping[str, object], key: str) -> str:
+        """A ROS name in the namespaces that hold here."""
+        return self.joined(values, text_of(values, key))
+
+    def joined(self, values: Mapping[str, object], name: str) -> str:
+        """A name in the namespaces that hold here."""
+        return join_names(self.namespace, text_of(values, "namespace"), name)
+
+    def value(self, written: object) -> Callable[[], object]:
+        """A function that computes a value as it stands in the document."""
+        return lambda: resolve(written, self.read)
+
+    def condition(self, written: object, root: Root = None) -> Callable[[Any], bool] | None:
+        """A condition over a bare root as a function of it."""
+        if not isinstance(written, Computed):
+            return None
+        return Condition(written.expression, root, self.read)
+
+    def saved(self, written: object, root: Root) -> dict[str, Callable[[Any], object]]:
+        """What `save` keeps, by the variable's name, as functions of a bare root.
+
+        They raise ValueError for what has no value, or does not fit its variable.
+        """
+        return {
+            name: Part(place.expression, root, self, name)
+            for name, place in table_of(written).items()
+        }
+
+    def holds(self, written: object) -> Callable[[], bool]:
+        """A condition over variables alone as a function, which raises ExpressionError."""
+        assert isinstance(written, Computed)
+        return lambda: written.expression.holds({}, self.read)
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """An expression as a function of its bare root; `text` says what was expected."""
+
+    expression: Expression
+    root: Root
+    read: Callable[[str], object]
+
+    @property
+    def text(self) -> str:
+        """The condition as it was written."""
+        return self.expression.text
+
+    def __call__(self, given: Any) -> bool:
+        """Whether it holds; raises ExpressionError."""
+        return self.expression.holds(_roots(self.root, given), self.read)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What is kept of a result or a message, as a function of it; `text` says what that is."""
+
+    expression: Expression
+    root: Root
+    context: Context
+    name: str
+
+    @property
+    def text(self) -> str:
+        """The expression as it was written."""
+        return self.expression.text
+
+    def __call__(self, given: Any) -> object:
+        """The value as its variable wants it; raises ValueError."""
+        value = self.expression.evaluate(_roots(self.root, given), self.context.read)
+        return self.context.fitting(self.name, value)
+
+
+def _roots(root: Root, given: Any) -> Mapping[str, object]:
+    if callable(root):
+        return root(given)
+    return {} if root is None else {root: given}
+
+
+def table_of(value: object) -> dict[str, Any]:
+    """A mapping as it is, and anything else as an empty one."""
+    return value if isinstance(value, dict) else {}
+
+
+def plain_name(text: str) -> str:
+    """A text as a node's name: one line, no colon."""
+    line = " ".join(text.split()).replace(":", ";")
+    return line if len(line) <= 60 else f"{line[:57]}..."
+
+
+def written_text(node: TreeNode) -> str:
+    """What stands behind the kind's key, in the text's own words."""
+    written = node.written[node.key.text]
+    return written.text if isinstance(written, Scalar) else ""

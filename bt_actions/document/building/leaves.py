@@ -1,0 +1,229 @@
+"""The leaves of a tree as py_trees behaviours, by the names of their kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Failure, Running, Success
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.check import Check
+from bt_actions.behaviours.doing import Log, SetValues
+from bt_actions.behaviours.run_tree import CANCEL, RunTree, roots_of
+from bt_actions.behaviours.service import CallService
+from bt_actions.behaviours.topics import Publish, WaitForMessage
+from bt_actions.behaviours.waiting import Wait, WaitUntil
+from bt_actions.document.building.context import Context, Root, plain_name, table_of, written_text
+from bt_actions.document.language.classes import ClassError, make_behaviour, refusal
+from bt_actions.document.language.values import Computed, computed_in
+from bt_actions.document.reading.settings import server_of, settings_of, text_of
+from bt_actions.document.reading.tree import TreeNode
+from bt_actions.document.yaml.nodes import span_of
+from bt_actions.goals.policy import Retry, Timeouts
+
+__all__ = ["LEAVES", "build_action"]
+
+
+def build_action(node: TreeNode, context: Context) -> Behaviour:
+    """The behaviour of an action, by its name in the document or in place."""
+    settings = settings_of(node, context.document)
+    goal = settings.get("goal", {})
+    dynamic = any(True for _ in computed_in(goal))
+    return ActionBehaviour(
+        node.name,
+        _interface(settings["type"], "action", context),
+        context.name(settings, "server"),
+        context.value(goal) if dynamic else goal,
+        timeout=_timeouts(tuple(table_of(settings.get("timeout")).items())),
+        **_terms(settings, context, "result"),
+    )
+
+
+def _run_tree(node: TreeNode, context: Context) -> Behaviour:
+    settings = settings_of(node, context.document)
+    timeout = {"cancel": CANCEL, **table_of(settings.get("timeout"))}
+    return RunTree(
+        node.name,
+        context.value(settings["tree"]),
+        context.value(settings.get("inputs", {})),
+        server=context.joined(settings, server_of(settings)),
+        timeout=_timeouts(tuple(timeout.items())),
+        **_terms(settings, context, roots_of),
+    )
+
+
+def _terms(settings: Mapping[str, object], context: Context, root: Root) -> dict[str, Any]:
+    """What a goal is sent and judged by, whatever it says."""
+    saved = context.saved(settings.get("save"), root)
+    given = settings.get("resources")
+    resources = given if isinstance(given, list) else []
+    return {
+        "retry": _retry(settings, context),
+        "expect": context.condition(settings.get("expect"), root),
+        "save": {context.scope.key(name): part for name, part in saved.items()},
+        "busy": text_of(settings, "busy") or "wait",
+        "resources": [context.joined(settings, str(each)) for each in resources],
+    }
+
+
+@lru_cache(maxsize=1024)
+def _timeouts(fields: tuple[tuple[str, float | None], ...]) -> Timeouts:
+    """Most nodes of a tree have the timeouts of its action: they share one object."""
+    return Timeouts(**dict(fields))
+
+
+def _retry(settings: Mapping[str, object], context: Context) -> Retry:
+    given = table_of(settings.get("retry"))
+    fields = {key: value for key, value in given.items() if key not in ("outcomes", "when")}
+    if "outcomes" in given:
+        fields["outcomes"] = frozenset(given["outcomes"])
+    if "when" in given:  # reads the variables of one tree, so that no other can share it
+        return Retry(**fields, when=context.condition(given["when"], "result"))
+    return _plain_retry(tuple(fields.items()))
+
+
+@lru_cache(maxsize=1024)
+def _plain_retry(fields: tuple[tuple[str, Any], ...]) -> Retry:
+    return Retry(**dict(fields))
+
+
+def _interface(name: object, kind: str, context: Context) -> Any:
+    if not context.types:
+        return name
+    from bt_actions.messages.interfaces import interface
+
+    return interface(str(name), kind)  # type: ignore[arg-type]
+
+
+def _check(node: TreeNode, context: Context) -> Behaviour:
+    written = node.values["check"]
+    assert isinstance(written, Computed)
+    name = node.name or plain_name(written.expression.text)
+    return Check(name, written.expression, variable=context.read)
+
+
+def _saver(node: TreeNode, context: Context, root: str) -> Callable[[Any], None] | None:
+    """What keeps parts of an answer or a message, as `save` says."""
+    saved = context.saved(node.values.get("save"), root)
+    if not saved:
+        return None
+    return lambda given: context.scope.write_all(
+        {name: part(given) for name, part in saved.items()}
+    )
+
+
+def _service(node: TreeNode, context: Context) -> Behaviour:
+    values = node.values
+    timeout = table_of(values.get("timeout"))
+    return CallService(
+        node.name,
+        _interface(values["type"], "srv", context),
+        context.name(values, "server"),
+        context.value(values.get("request", {})),
+        server=timeout.get("server", 5.0),
+        response=timeout.get("response", 5.0),
+        retry=_retry(values, context),
+        expect=context.condition(values.get("expect"), "result"),
+        save=_saver(node, context, "result"),
+    )
+
+
+def _publish(node: TreeNode, context: Context) -> Behaviour:
+    values = node.values
+    subscribers: Any = values.get("subscribers", 0)
+    timeout: Any = values.get("timeout")
+    return Publish(
+        node.name or plain_name(f"publish {text_of(values, 'publish')}"),
+        _interface(values["type"], "msg", context),
+        context.name(values, "publish"),
+        context.value(values.get("message", {})),
+        qos=text_of(values, "qos") or "default",
+        subscribers=subscribers,
+        timeout=timeout,
+    )
+
+
+def _wait_for_message(node: TreeNode, context: Context) -> Behaviour:
+    values = node.values
+    timeout: Any = values.get("timeout")
+    return WaitForMessage(
+        node.name,
+        _interface(values["type"], "msg", context),
+        context.name(values, "topic"),
+        qos=text_of(values, "qos") or "default",
+        until=context.condition(values.get("until"), "message"),
+        timeout=timeout,
+        save=_saver(node, context, "message"),
+    )
+
+
+def _wait(node: TreeNode, context: Context) -> Behaviour:
+    name = node.name or plain_name(f"wait {written_text(node)}")
+    return Wait(name, context.value(node.values["wait"]))
+
+
+def _wait_until(node: TreeNode, context: Context) -> Behaviour:
+    name = node.name or plain_name(f"wait until {written_text(node)}")
+    timeout: Any = node.values.get("timeout")
+    return WaitUntil(name, context.holds(node.values["wait_until"]), timeout)
+
+
+def _set(node: TreeNode, context: Context) -> Behaviour:
+    written = table_of(node.values["set"])
+    name = node.name or plain_name(f"set {', '.join(written)}")
+    compute = context.value(written)
+    return SetValues(name, lambda: table_of(compute()), context.write)
+
+
+def _log(node: TreeNode, context: Context) -> Behaviour:
+    name = node.name or plain_name(f"log {written_text(node)}")
+    level = text_of(node.values, "level") or "info"
+    return Log(name, context.value(node.values["log"]), level)
+
+
+def _python(node: TreeNode, context: Context) -> Behaviour:
+    """What cannot be made is reported to the document's source, and `Failure` stands for it."""
+    path = text_of(node.values, "python")
+    name = node.name or path.rpartition(".")[2]
+    if refused := refusal(path, context.python):  # nothing is imported, whatever the checker said
+        node.source.report("BT214", span_of(node.key), refused)
+        return Failure(name)
+    try:
+        return make_behaviour(path, name, table_of(node.values.get("arguments")))
+    except ClassError as error:
+        code, at = "BT214", node.written["python"]
+        if "arguments" in node.written:
+            code, at = "BT215", node.written["arguments"]
+        node.source.report(code, span_of(at), str(error))
+        return Failure(name)
+
+
+def _plain(
+    make: Callable[..., Behaviour], default: str
+) -> Callable[[TreeNode, Context], Behaviour]:
+    return lambda node, _context: make(name=node.name or default)
+
+
+LEAVES: Mapping[str, Callable[[TreeNode, Context], Behaviour]] = MappingProxyType(
+    {
+        "action": build_action,
+        "run_tree": _run_tree,
+        "service": _service,
+        "publish": _publish,
+        "wait_for_message": _wait_for_message,
+        "wait": _wait,
+        "wait_until": _wait_until,
+        "check": _check,
+        "set": _set,
+        "log": _log,
+        "python": _python,
+        "success": _plain(Success, "success"),
+        "failure": _plain(Failure, "failure"),
+        "running": _plain(Running, "running"),
+    }
+)
+"""What makes a behaviour of each kind of leaf but `subtree`."""

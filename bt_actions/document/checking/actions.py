@@ -1,0 +1,154 @@
+"""Checks actions: as they are declared, as trees import them, and as nodes use them.
+
+What is written in another file is told there where it is wrong by itself, and at the import where
+it is wrong in this tree only. Knows nothing of single values: that is the Checker's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from bt_actions.document.checking.checker import Checker
+from bt_actions.document.checking.variables import root_type
+from bt_actions.document.findings import Related
+from bt_actions.document.language.values import BAD, Computed, Interpolated, locate
+from bt_actions.document.reading.settings import settings_of, when_of
+from bt_actions.document.reading.tree import Declared, TreeNode
+from bt_actions.document.reading.workspace import merged
+from bt_actions.document.yaml.nodes import Mapping, span_of
+from bt_actions.document.yaml.source import Source
+from bt_actions.messages.fields import FieldType, Message
+
+__all__ = ["check_actions", "check_defaults", "check_use"]
+
+
+def check_actions(checker: Checker) -> None:
+    """The actions that are declared here, and of those imported what the nodes take over."""
+    users: dict[str | None, list[dict[str, object]]] = {}
+    if checker.document.imported:
+        for node in checker.document.nodes():
+            users.setdefault(node.alias, []).append(node.values)
+    for declared in checker.document.actions.values():
+        if not isinstance(declared.node, Mapping):
+            continue
+        checker.reader = declared
+        if declared.source is checker.source:
+            _check_action(checker, declared.values, declared.node, declared)
+            continue
+        values = _left(declared.values, users.get(declared.name, []))
+        with _within(checker, declared.source, f"the imported action {declared.name!r}"):
+            _check_action(checker, values, declared.node, declared)
+
+
+def check_defaults(checker: Checker) -> None:
+    """The condition in `defaults` is that of each action which has none nearer."""
+    when = when_of(checker.document.defaults)
+    if when is None:
+        return
+    users = {
+        node.alias or node.values.get("type"): node
+        for node in checker.document.nodes()
+        if node.is_action and when_of(settings_of(node, checker.document)) is when
+    }
+    documents = checker.document.with_imports()
+    source = next(one.source for one in documents if when_of(one.values.get("defaults")) is when)
+    with _within(checker, source, "the imported defaults"):
+        for node in users.values():
+            checker.reader = checker.document.actions.get(node.alias or "", checker.document)
+            checker.condition(when, {"result": root_type(node, "result", checker)})
+
+
+def check_use(checker: Checker, node: TreeNode, declared: Declared) -> None:
+    """Check a node that runs an action, with what it says beside the action's own words."""
+    _check_action(checker, node.values, node.node, declared)
+    _check_together(checker, node, declared)
+
+
+@contextmanager
+def _within(checker: Checker, source: Source, what: str) -> Iterator[None]:
+    """Look at what stands in a source.
+
+    Of one that is imported, what is wrong in this document only is told at the import.
+    """
+    own, written = checker.source, checker.document.node.get("import")
+    if source is own or written is None:
+        yield
+        return
+    checker.source = replace(source, findings=[], errors=0, unread=own.unread)
+    try:
+        yield
+    finally:
+        found, checker.source = checker.source.findings, own
+        for one in found:
+            if one not in source.findings:
+                own.report(
+                    one.code, span_of(written), f"{what}: {one.message}",
+                    hint=one.hint, related=Related(one.place, "written here"),
+                )  # fmt: skip
+
+
+def _check_action(
+    checker: Checker, values: dict[str, object], node: Mapping, declared: Declared
+) -> None:
+    cls = checker.action_class(declared)
+    checker.call(
+        values, node,
+        request=None if cls is None else Message(cls.Goal),  # type: ignore[attr-defined]
+        result=None if cls is None else Message(cls.Result),  # type: ignore[attr-defined]
+        request_key="goal",
+    )  # fmt: skip
+
+
+def _check_together(checker: Checker, node: TreeNode, declared: Declared) -> None:
+    """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
+    own, shared = node.values.get("goal"), declared.values.get("goal")
+    if not isinstance(own, dict) or not isinstance(shared, dict):
+        return
+    cls = checker.action_class(declared)
+    if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):
+        return
+
+    from bt_actions.messages.conversion import Problem, examine
+
+    def problems(goal: object) -> list[Problem]:
+        return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]
+
+    over, under = _where_both(own, shared), _where_both(shared, own)
+    told = {*problems(over), *problems(under)}
+    for problem in problems(merged(under, over)):
+        if problem not in told:
+            checker.source.report(
+                "BT204", span_of(locate(node.written["goal"], problem.path)), problem.text,
+                related=Related(declared.place, "merged with the goal here"),
+            )  # fmt: skip
+
+
+def _where_both(goal: dict[str, object], other: dict[str, object]) -> dict[str, object]:
+    """What a goal says in the mappings that another writes too: beside it, each may be large."""
+    part: dict[str, object] = {}
+    for name, value in goal.items():
+        inner = other.get(name)
+        if isinstance(value, dict) and isinstance(inner, dict):
+            part[name] = _where_both(value, inner)
+        elif not isinstance(value, dict | list):
+            part[name] = value
+    return part
+
+
+def _is_computed(value: object, _kind: FieldType, _path: tuple[str | int, ...]) -> bool:
+    return value is BAD or isinstance(value, Computed | Interpolated)
+
+
+def _left(settings: dict[str, object], nearer: list[dict[str, object]]) -> dict[str, object]:
+    """The settings that not everything nearer has others for."""
+    left: dict[str, object] = {}
+    for name, value in settings.items():
+        over = [one[name] for one in nearer if name in one]
+        inner = [one for one in over if isinstance(one, dict)]
+        if len(over) < len(nearer):
+            left[name] = value
+        elif inner and isinstance(value, dict):
+            left[name] = _left(value, inner)
+    return left

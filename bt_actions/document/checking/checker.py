@@ -1,0 +1,315 @@
+"""What all checks of names and types work with: what a document declares, writes and reads.
+
+Checks single values and expressions; which there are, and in which order, is said in `check.py`.
+With `types=False` nothing of ROS is imported, and what would need it is taken for granted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container
+from collections.abc import Mapping as MappingType
+from typing import TYPE_CHECKING, NamedTuple
+
+from bt_actions.document.checking.infer import BOOL, TEXT, infer, named
+from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
+from bt_actions.document.checking.variables import infer_variables, items_inside, type_of
+from bt_actions.document.findings import Related
+from bt_actions.document.findings.elsewhere import notation_here
+from bt_actions.document.language.types import TypeNameError, fits, interface_of, misfits
+from bt_actions.document.language.values import (
+    BAD,
+    Computed,
+    Interpolated,
+    computed_in,
+    constant_of,
+    locate,
+    names_file,
+)
+from bt_actions.document.reading.inputs import refuse_infinite
+from bt_actions.document.reading.settings import when_of
+from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.unread import Doubts
+from bt_actions.document.reading.writes import Write, writes_of
+from bt_actions.document.yaml.inner import inner_span
+from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
+from bt_actions.document.yaml.source import Source
+from bt_actions.expressions.expression import ExpressionError
+from bt_actions.messages.fields import Either, FieldType
+from bt_actions.utilities.suggest import closest, listing
+
+if TYPE_CHECKING:
+    from bt_actions.document.language.classes import Python
+
+__all__ = ["Checker", "Read"]
+
+
+class Read(NamedTuple):
+    """A variable that an expression reads, and where."""
+
+    name: str
+    computed: Computed
+    start: int
+    end: int
+
+
+Types = MappingType[str, FieldType | None]
+
+
+class Checker:
+    """What is known of one document; the trees that it includes have their own."""
+
+    def __init__(self, document: Document, *, types: bool, python: Python = True) -> None:
+        """A ``python:`` node that `python` does not allow is an error, and nothing is imported."""
+        self.document = document
+        self.source = document.source
+        self.doubts = Doubts(document)
+        self._doubts_of: dict[int, Doubts] = {}
+        self.types = types
+        self.python = python
+        self.variables: dict[str, FieldType | None] = {}
+        self.declared_at: dict[str, Declared] = {}
+        self.reads: dict[int, list[Read]] = {}
+        """What each node reads, by the node's id; an alias's own reads under the alias's."""
+        self.reader: object = document
+        self._writes: dict[int, tuple[Write, ...]] = {}
+        self._items: dict[int, dict[str, Write]] = {}
+        self._interfaces: dict[str, type | None] = {}
+
+    def interface(
+        self, name: str, kind: str, node: Node, source: Source | None = None
+    ) -> type | None:
+        """The class of a type name, or None after reporting (or when types are not checked).
+
+        What is written in another source is reported by the checker of that one.
+        """
+        if not self.types:
+            return None
+        known = f"{kind}:{name}"
+        if known not in self._interfaces:
+            try:
+                self._interfaces[known] = interface_of(name, kind)  # type: ignore[arg-type]
+            except TypeNameError as error:
+                self._interfaces[known] = None
+                if source is None or source is self.source:
+                    self.source.report("BT205", span_of(node), str(error))
+        return self._interfaces[known]
+
+    def doubts_of(self, included: Document) -> Doubts:
+        """What is not certain about a tree that this one includes."""
+        known = self._doubts_of.get(id(included))
+        if known is None:
+            known = self._doubts_of[id(included)] = Doubts(included)
+        return known
+
+    def writes_of(self, node: TreeNode) -> tuple[Write, ...]:
+        """The variables that a node writes."""
+        return self._writes.get(id(node), ())
+
+    def types_at(self, reader: object) -> Callable[[str], FieldType | None]:
+        """Gives the type of a variable as a node reads it."""
+        items = self._items.get(id(reader))
+        if items is None:
+            return self.variables.get
+        return lambda name: (
+            type_of(items[name], self) if name in items else self.variables.get(name)
+        )
+
+    def collect_writes(self) -> None:
+        """Find the variables that nodes write, with their types as far as they are known."""
+        for node in self.document.nodes():
+            writes = tuple(writes_of(node, self.document))
+            if writes:
+                self._writes[id(node)] = writes
+        self._items = items_inside(self._writes.values(), self.declared_at)
+        written = (write for writes in self._writes.values() for write in writes)
+        infer_variables(written, self)
+
+    def action_class(self, declared: Declared) -> type | None:
+        """The class of the action that a name stands for."""
+        text = declared.values.get("type")
+        if not isinstance(text, str):
+            return None
+        return self.interface(text, "action", declared.written("type"), declared.source)
+
+    def call(
+        self,
+        values: dict[str, object],
+        node: Mapping,
+        *,
+        request: FieldType | None,
+        result: FieldType | None,
+        request_key: str,
+    ) -> None:
+        """Check what an action and a service have in common."""
+        written = node.get(request_key)
+        if request_key in values and written is not None:
+            self.value(request, values[request_key], written)
+        roots = {"result": result}
+        for condition in (values.get("expect"), when_of(values)):
+            self.condition(condition, roots)
+        self.save(values.get("save"), roots)
+
+    def save(self, saved: object, roots: Types) -> None:
+        """Check the places that names are kept from, and that they fit what is declared."""
+        if not isinstance(saved, dict):
+            return
+        for name, place in saved.items():
+            if not isinstance(place, Computed):
+                continue
+            kind = self.expression(place, roots)
+            self.assigns(name, kind, place.node)
+
+    def assigns(self, name: str, kind: FieldType | None, node: Node) -> None:
+        """Check that a value of a type may be written to a variable."""
+        declared = self.declared_at.get(name)
+        if declared is None:
+            return
+        if name in self.document.topics:
+            message = f"{name!r} is a topic: nothing can be written to it"
+            related = Related(declared.place, "declared here")
+            self.source.report("BT204", span_of(node), message, related=related)
+            return
+        wanted = self.variables.get(name)
+        texts = [f"{name}{text}" for text in misfits(kind, wanted)]
+        if not fits(kind, wanted):
+            texts = [f"{name!r} is {named(wanted)}, and this is {named(kind)}"]
+        for text in texts:
+            related = Related(declared.place, "declared here")
+            self.source.report("BT204", span_of(node), text, related=related)
+
+    # Values
+
+    def value(
+        self, kind: FieldType | None, value: object, node: Node, *, prose: bool = False
+    ) -> None:
+        """Check a value against the type it must have; without one, only what it reads.
+
+        In `prose` a variable's bare name is a word like any other.
+        """
+        errors = self.source.errors
+        self.fit(kind, value, node, self.variables)
+        if value is not BAD and self.source.errors == errors:
+            warn_unmarked(node, self.source, self.variables, prose=prose)
+
+    def fit(self, kind: FieldType | None, value: object, node: Node, known: Container[str]) -> None:
+        """As `value`; what is `known` may be meant by a bare name where the value does not fit."""
+        if value is BAD:
+            return
+        if kind is None:
+            for computed in computed_in(value):
+                self.expression(computed, {})
+            return
+
+        from bt_actions.messages.conversion import examine
+
+        def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
+            if isinstance(item, Computed):
+                given = self.expression(item, {})
+                said = item.expression.text.strip()
+                if not fits(given, wanted):
+                    if isinstance(given, Either):
+                        given = next(kind for kind in given.kinds if not fits(kind, wanted))
+                        said = f"in one item {said}"
+                    text = f"{named(wanted)} is needed, and {said} is {named(given)}"
+                    self.source.report("BT204", span_of(item.node), text)
+                elif texts := misfits(given, wanted):
+                    for text in texts:
+                        self.source.report("BT204", span_of(item.node), f"{said}{text}")
+                elif (constant := constant_of(item)) is not None:
+                    for problem in examine(wanted, constant):
+                        self.source.report("BT204", span_of(item.node), problem.text)
+                return True
+            if isinstance(item, Interpolated):
+                for part in computed_in(item):
+                    self.expression(part, {})
+                if not fits(TEXT, wanted):
+                    text = f"{named(wanted)} is needed, and this is a text"
+                    self.source.report("BT204", span_of(item.node), text)
+                return True
+            if isinstance(item, (int, float)) and wanted == TEXT:
+                at = locate(node, path)
+                if isinstance(at, Scalar) and at.value == item:  # else it comes from a file
+                    self.source.report(
+                        "BT204", span_of(at), f"a text is needed, not {at.text}",
+                        hint=f'put it in quotes: "{at.text}"',
+                    )  # fmt: skip
+                    return True
+            return item is BAD
+
+        for problem in examine(kind, value, hole):
+            at = locate(node, problem.path, at_key=problem.at_key)
+            code = "BT203" if problem.at_key else "BT204"
+            text = problem.text
+            if isinstance(at, Scalar) and names_file(at.text):
+                text = f"{at.text}: {problem}"
+            meant = None if problem.at_key else marked_here(at, self.source, known)
+            self.source.report(code, span_of(at), text, hint=_trap(at) or meant)
+
+    def finite(self, value: object, node: Node) -> None:
+        """Check that no number of an input's value is infinite."""
+        try:
+            refuse_infinite(value)
+        except ValueError as error:
+            self.source.report("BT110", span_of(node), str(error))
+
+    def condition(self, value: object, roots: Types) -> None:
+        """Check an expression that must be true or false."""
+        if not isinstance(value, Computed):
+            return
+        kind = self.expression(value, roots)
+        if kind is not None and kind != BOOL:
+            text = f"a condition is true or false, and this is {named(kind)}"
+            self.source.report("BT206", span_of(value.node), text)
+
+    def expression(self, computed: Computed, roots: Types) -> FieldType | None:
+        """Check what an expression reads and does; return its type, or None."""
+        expression = computed.expression
+        for name, (start, end) in expression.variable_spans:
+            self.reads.setdefault(id(self.reader), []).append(Read(name, computed, start, end))
+            if name not in self.variables:
+                self._unknown(name, computed, start, end)
+
+        def report(code: str, message: str, start: int, end: int) -> None:
+            span = inner_span(
+                computed.node, self.source, computed.start + start, computed.start + end
+            )
+            self.source.report(code, span, message)
+
+        if not expression.names and not expression.roots and not expression.constants:
+            try:
+                computed.evaluate(lambda _name: None)
+            except ExpressionError as error:
+                report("BT206", error.message, error.column, error.end_column)
+                return None
+        if not self.types and not roots and not expression.names:
+            return None
+        variable = self.types_at(self.reader)
+        return infer(expression, roots, variable, report, types=self.types)
+
+    def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
+        if self.document.root is None or self.doubts.declares(name):
+            return  # a library's words are read with the names of whoever imports it
+        span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
+        if name in computed.expression.roots:
+            bare = f"write '{name}' without a dollar sign"
+            self.source.report("BT202", span, f"there is no variable ${name}", hint=bare)
+            return
+        maybe = self.doubts.declared
+        meant = closest(name, self.variables) or closest(name, maybe)
+        near = f"; did you mean '${meant}'?" if meant else ""
+        hint = None
+        if meant:
+            self.source.unread.meant.add(meant)
+        else:
+            self.source.unread.variables = True
+            known = listing(f"${known}" for known in self.variables)
+            nothing = None if maybe else "this tree has no inputs and saves nothing"
+            hint = f"this tree has {known}" if known else nothing
+        self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
+
+
+def _trap(node: Node) -> str | None:
+    """What YAML may have made of what was meant."""
+    if isinstance(node, Scalar) and node.text in ("on", "off", "yes", "no"):
+        return "YAML 1.2 reads this as a text: write true or false"
+    return notation_here(node.text) if isinstance(node, Scalar) else None

@@ -1,0 +1,303 @@
+"""Hazards: what is allowed, and likely to go wrong on a robot. Each is a warning with a code.
+
+Looks at one checked document (and at what it includes, where a hazard spans both).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from bt_actions.document.checking.checker import Checker
+from bt_actions.document.checking.order import find_early_reads
+from bt_actions.document.checking.verdicts import BEGUN, Verdicts
+from bt_actions.document.findings import Related, Span
+from bt_actions.document.language.values import names_value
+from bt_actions.document.reading.settings import resources_below, settings_of
+from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.unread import Doubts
+from bt_actions.document.yaml.nodes import Mapping as YamlMapping
+from bt_actions.document.yaml.nodes import Node, span_of
+
+__all__ = ["find_hazards"]
+
+_BUSY = BEGUN | {"wait_until", "running", "python", "retry", "repeat", "for_each"}
+
+
+def find_hazards(checker: Checker, doubts: Doubts) -> None:
+    """Report the hazards of a document that was checked, but for those that are not certain."""
+    document = checker.document
+    if document.root is None:
+        return
+    _Hazards(checker, doubts).look(document.root)
+
+
+class _Hazards:
+    def __init__(self, checker: Checker, doubts: Doubts) -> None:
+        self._checker = checker
+        self._doubts = doubts
+        self._document: Document = checker.document
+        self._source = checker.source
+        self._verdicts = Verdicts()
+        self._at_once = Verdicts(at_once=True)
+        self._held: dict[tuple[int, str], dict[str, TreeNode]] = {}
+        self._slow: dict[int, bool] = {}
+        self._anew: dict[int, TreeNode | None] = {}
+        self._unbounded: dict[str, TreeNode] = {}
+        self._used: set[str] = set()
+
+    def look(self, root: TreeNode) -> None:
+        self._walk(root, bounded=False)
+        self._result_timeouts()
+        find_early_reads(self._checker, self._doubts, root)
+        self._unused()
+
+    def _report(self, code: str, span: Span, message: str, **more: object) -> None:
+        self._source.report(code, span, message, **more)  # type: ignore[arg-type]
+
+    def _walk(self, root: TreeNode, *, bounded: bool) -> None:
+        loops: dict[str, TreeNode] = {}
+        stack = [(root, bounded, loops)]
+        while stack:
+            node, inside, around = stack.pop()
+            kind = node.kind.name if node.kind is not None else ""
+            if node.alias is not None:
+                self._used.add(node.alias)
+            if node.is_action:
+                if not inside:
+                    self._look_at_action(node)
+            elif kind == "parallel":
+                self._parallel(node)
+            elif kind == "retry" and not inside:
+                self._retry(node)
+            elif kind in ("sequence", "fallback"):
+                self._unreachable(node, kind)
+                if node.values.get("memory") is False:
+                    self._reactive(node, kind)
+            elif kind == "invert":
+                self._inverted(node)
+            elif kind == "timeout":
+                self._short(node)
+                inside = True
+            elif kind == "for_each":
+                self._taken(node, around)
+                around = around | {write.name: node for write in self._checker.writes_of(node)}
+            stack.extend((child, inside, around) for child in reversed(node.children))
+
+    # BT304
+
+    def _retry(self, node: TreeNode) -> None:
+        if "attempts" not in node.values and not self._doubts.own(node):
+            hint = "attempts: N, or a 'timeout' around it"
+            self._report("BT304", span_of(node.key), "this retry never gives up", hint=hint)
+
+    # BT301
+
+    def _look_at_action(self, node: TreeNode) -> None:
+        timeout = settings_of(node, self._document).get("timeout", {})
+        if not isinstance(timeout, dict) or "result" in timeout:
+            return
+        if self._doubts.below(node):
+            return
+        if node.alias is not None:
+            self._unbounded.setdefault(node.alias, node)
+        else:
+            self._no_result_timeout(node.key, f"{node.name or 'this action'} may take for ever")
+
+    def _no_result_timeout(self, at: object, message: str) -> None:
+        hint = "timeout: 30 s, or {result: none} where it is meant"
+        self._report("BT301", span_of(at), message, hint=hint)  # type: ignore[arg-type]
+
+    def _result_timeouts(self) -> None:
+        for name, node in self._unbounded.items():
+            declared = self._document.actions.get(name)
+            own = declared is not None and declared.source is self._source
+            at = declared.key if own and declared is not None else node.key
+            self._no_result_timeout(at, f"{name!r} has no result timeout: it may take for ever")
+
+    # BT303
+
+    def _parallel(self, node: TreeNode) -> None:
+        taken: dict[str, TreeNode] = {}
+        for child in node.children:
+            below = resources_below(child, self._document, known=self._held)
+            for resource, user in below.items():
+                first = taken.get(resource.lstrip("/"))
+                if first is None or self._doubts.below(node):
+                    continue
+                place = first.place
+                where = user if user.source is self._source else child
+                self._report(
+                    "BT303", span_of(where.key),
+                    f"this needs {resource!r}, and so does a branch beside it: only one can run",
+                    related=Related(place, "the other is here"),
+                    hint="busy: share, where both may run at once",
+                )  # fmt: skip
+                break
+            for resource, user in below.items():
+                taken.setdefault(resource.lstrip("/"), user)
+
+    # BT305, BT306, BT307
+
+    def _unreachable(self, node: TreeNode, kind: str) -> None:
+        for child, after in zip(node.children, node.children[1:], strict=False):
+            can = self._verdicts.of(child)
+            ends = not can.fail if kind == "fallback" else not can.succeed
+            if ends and not self._doubts.below(child):
+                how = "fails" if kind == "fallback" else "succeeds"
+                self._report(
+                    "BT305", span_of(after.key), "this child is never reached",
+                    related=Related(child.place, f"this one never {how}"),
+                )  # fmt: skip
+                return
+
+    def _reactive(self, node: TreeNode, kind: str) -> None:
+        slow = (self._takes_time(child) for child in node.children)
+        last = max((at for at, takes in enumerate(slow) if takes), default=0)
+        onward = 0 if kind == "sequence" else 1  # the end after which the next child is ticked
+        begun_anew = [
+            self._restarted(child) or child
+            for child in node.children[:last]
+            if self._verdicts.of(child)[onward] and not self._at_once.of(child)[onward]
+        ]
+        if not begun_anew or self._doubts.below(node):
+            return
+        for begun in begun_anew:
+            self._report(
+                "BT306", span_of(begun.key),
+                f"this starts again while a later child of {node.name!r} runs, and interrupts it",
+                related=Related(node.place, "because of 'memory: false' here"),
+            )  # fmt: skip
+
+    def _restarted(self, root: TreeNode) -> TreeNode | None:
+        """The first leaf below that takes time whenever it is begun, or the tree it is in."""
+        if id(root) in self._anew:
+            return self._anew[id(root)]
+        found: TreeNode | None = None
+        stack = [root]
+        while stack and found is None:
+            node = stack.pop()
+            inner = node.included.root if node.included is not None else None
+            anew = node.is_action or (node.kind is not None and node.kind.name in BEGUN)
+            if anew or (inner is not None and self._restarted(inner)):
+                found = node
+            elif node.kind is None or node.kind.name != "run_once":
+                stack.extend(reversed(node.children))
+        self._anew[id(root)] = found
+        return found
+
+    def _takes_time(self, node: TreeNode) -> bool:
+        """Whether a node, or one below it, may take more than one tick."""
+        found = self._slow.get(id(node))
+        if found is None:
+            below = node.included.root if node.included is not None else None
+            within = [*node.children, below] if below is not None else node.children
+            busy = node.is_action or (node.kind is not None and node.kind.name in _BUSY)
+            busy = busy or "subscribers" in node.values  # of a publish, which waits for them
+            found = busy or any(self._takes_time(each) for each in within)
+            self._slow[id(node)] = found
+        return found
+
+    def _short(self, node: TreeNode) -> None:
+        after = node.values.get("after")
+        if not isinstance(after, float) or not node.children or self._doubts.below(node):
+            return
+        needed = self._verdicts.budget(node.children[0], self._document)
+        if after < needed:
+            self._report(
+                "BT307", span_of(node.written["after"]),
+                f"{after:g} s are less than the {needed:g} s that what it holds may take",
+                hint="the deadlines and retries inside would never be reached",
+            )  # fmt: skip
+
+    # BT314
+
+    def _inverted(self, node: TreeNode) -> None:
+        """A check fails where nothing has come on its topic; that is a success here."""
+        asked = [inner for child in node.children for inner in child.walk()]
+        kinds = {inner.kind.name if inner.kind is not None else "" for inner in asked}
+        if not kinds <= {"sequence", "fallback", "check"}:
+            return
+        reads = (read for inner in asked for read in self._checker.reads.get(id(inner), ()))
+        first = next((read for read in reads if read.name in self._document.topics), None)
+        if first is None or self._doubts.below(node):
+            return
+        hint = "write 'not' in the check itself, which fails while it has no value"
+        if asked[0].values.get("check") is first.computed:
+            text = first.computed.expression.text.strip()
+            hint = f"check: not {text if names_value(text) else f'({text})'}"
+        self._report(
+            "BT314", span_of(node.key), f"this succeeds, too, while nobody knows ${first.name}",
+            hint=hint,
+        )  # fmt: skip
+
+    # BT312
+
+    def _taken(self, node: TreeNode, around: Mapping[str, TreeNode]) -> None:
+        document = self._document
+        given: dict[str, TreeNode | Declared] = {**document.inputs, **document.topics, **around}
+        for write in self._checker.writes_of(node):
+            other = given.get(write.name)
+            if other is not None:
+                self._report(
+                    "BT312", span_of(write.written),
+                    f"${write.name} already stands for something else here",
+                    related=Related(other.place, "for this"),
+                    hint="as: another name",
+                )  # fmt: skip
+
+    # BT308 to BT311
+
+    def _unused(self) -> None:
+        checker, document, doubts = self._checker, self._document, self._doubts
+        read = {one.name for reads in checker.reads.values() for one in reads}
+        written = {w.name for node in document.nodes() for w in self._checker.writes_of(node)}
+        if not doubts.unknown_variable:
+            self._unread(read)
+        for name in self._own(document.actions):
+            if name not in self._used and not doubts.unknown_action and not doubts.mentions(name):
+                key = document.actions[name].key
+                self._report("BT309", span_of(key), f"no node uses the action {name!r}")
+        for name, declared in document.outputs.items():
+            given = name in written or name in document.inputs
+            if not given and not doubts.unknown_action and not doubts.mentions(name):
+                text = f"nothing writes the output {name!r}"
+                self._report("BT311", span_of(declared.key), text)
+
+    def _unread(self, read: set[str]) -> None:
+        document, doubts = self._document, self._doubts
+        for name, declared in document.inputs.items():
+            if name not in read and name not in document.outputs and not doubts.mentions(name):
+                self._report("BT308", span_of(declared.key), f"nothing reads the input {name!r}")
+        for name in self._own(document.topics):
+            if name not in read and not doubts.mentions(name):
+                key = document.topics[name].key
+                self._report("BT309", span_of(key), f"nothing reads the topic {name!r}")
+        known = read | set(document.outputs) | set(document.inputs) | set(document.topics)
+        for node in document.nodes():
+            if node.kind is not None and node.kind.name == "for_each":
+                continue
+            writes = self._checker.writes_of(node)
+            if known.issuperset(write.name for write in writes):
+                continue
+            keys = _keys_of(node)
+            for write in writes:
+                if write.name not in known and not doubts.mentions(write.name):
+                    known.add(write.name)
+                    own = write.written if write.written is not node.node else node.key
+                    at = keys.get((write.name, id(write.written)), own)
+                    text = f"nothing reads ${write.name}"
+                    self._report("BT310", span_of(at), text)
+
+    def _own(self, table: dict[str, Declared]) -> Iterator[str]:
+        return (name for name, declared in table.items() if declared.source is self._source)
+
+
+def _keys_of(node: TreeNode) -> dict[tuple[str, int], Node]:
+    """The keys under which a node writes variables, by their names and the ids of their values."""
+    tables = [node.written.get(table) for table in ("set", "save")]
+    return {
+        (key.text, id(value)): key
+        for table in tables
+        if isinstance(table, YamlMapping)
+        for key, value in table.pairs
+    }

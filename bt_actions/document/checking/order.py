@@ -1,0 +1,142 @@
+"""Variables that are read before anything can have written them, in the order of ticks: BT302.
+
+Follows what is written by the time a node has succeeded, and by the time it has failed: a sequence
+goes on with the first, a fallback with the second. Where several rounds or branches may have
+written a name, nothing is claimed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Set
+from functools import cached_property
+from typing import NamedTuple
+
+from bt_actions.document.checking.checker import Checker
+from bt_actions.document.findings import Span
+from bt_actions.document.reading.tree import TreeNode
+from bt_actions.document.reading.unread import Doubts
+from bt_actions.document.yaml.inner import inner_span
+from bt_actions.document.yaml.nodes import span_of
+
+__all__ = ["find_early_reads"]
+
+_NOTHING: frozenset[str] = frozenset()
+_LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
+_STRAIGHT = frozenset({"sequence", "timeout", "while", "run_once"})
+"""Go on when a child succeeds, and fail with it."""
+_TURNED = frozenset({"fallback", "invert"})
+"""Go on when a child fails. Of all other kinds nothing is known."""
+
+
+class _Written(NamedTuple):
+    """Names that may have been written below a node when it has succeeded, and when it has failed.
+
+    What has been written meanwhile is in both: a node that is stopped has written no more than if
+    it had failed.
+    """
+
+    succeeded: Set[str]
+    failed: Set[str]
+
+
+def find_early_reads(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
+    """Report the reads that no write can come before."""
+    _Order(checker, doubts, root).visit(root, _NOTHING, _NOTHING)
+
+
+class _Order:
+    def __init__(self, checker: Checker, doubts: Doubts, root: TreeNode) -> None:
+        self._checker = checker
+        self._doubts = doubts
+        self._known = {*checker.document.inputs, *checker.document.topics}
+        """What may have been written when the node is reached that is visited now."""
+        self._passed: set[str] = set()
+        """What the nodes write that were visited already."""
+        self._root = root
+
+    @cached_property
+    def _writers(self) -> Counter[str]:
+        """How many nodes write a name."""
+        return Counter(name for node in self._root.walk() for name in self._own(node))
+
+    def visit(self, node: TreeNode, around: frozenset[str], later: frozenset[str]) -> _Written:
+        """Look at a node and what is below it.
+
+        `around` is what loops and branches around it may have written, `later` what they write only
+        when nothing in their first round has failed.
+        """
+        kind = node.kind.name if node.kind is not None else ""
+        own = self._own(node)
+        self._reads(node, own, around)
+        self._passed |= own
+        if not node.children:
+            return _Written(own, own if kind == "subtree" else _NOTHING)
+        if kind == "repeat":  # a read in its first round has nothing yet
+            later |= self._below(node)
+        elif kind in _LOOPS or node.values.get("memory") is False:
+            around |= self._below(node)
+        if kind not in ("repeat", "sequence"):  # who may go on after a read that failed
+            around |= later
+        if not own:
+            return self._children(node, kind, around, later)
+        added = own - self._known  # a loop's item
+        self._known |= added
+        succeeded, failed = self._children(node, kind, around, later)
+        self._known -= added
+        return _Written(succeeded | own, failed | own)
+
+    def _children(
+        self, node: TreeNode, kind: str, around: frozenset[str], later: frozenset[str]
+    ) -> _Written:
+        added: set[str] = set()
+        onward: set[str] = set()  # written when the next child is reached, or there is none left
+        ended: set[str] = set()  # written when a child ends the node
+        for child in node.children:
+            ended |= onward
+            succeeded, failed = self.visit(child, around, later)
+            if kind in _TURNED:
+                succeeded, failed = failed, succeeded
+            elif kind not in _STRAIGHT:
+                succeeded = failed = succeeded | failed
+            ended |= failed
+            if succeeded:
+                onward |= succeeded
+                added |= succeeded - self._known
+                self._known |= succeeded
+        self._known -= added
+        return _Written(ended, onward) if kind == "fallback" else _Written(onward, ended)
+
+    def _own(self, node: TreeNode) -> frozenset[str]:
+        writes = self._checker.writes_of(node)
+        return frozenset(write.name for write in writes) if writes else _NOTHING
+
+    def _below(self, node: TreeNode) -> frozenset[str]:
+        return frozenset(name for inner in node.walk() for name in self._own(inner))
+
+    def _reads(self, node: TreeNode, own: frozenset[str], around: frozenset[str]) -> None:
+        checker = self._checker
+        for read in checker.reads.get(id(node), ()):
+            if not self._may_be_written(read.name, own, around):
+                written, start = read.computed.node, read.computed.start
+                span = inner_span(written, checker.source, start + read.start, start + read.end)
+                self._report(read.name, span, f"nothing has written ${read.name} when this is read")
+        declared = checker.document.actions.get(node.alias) if node.alias is not None else None
+        for read in checker.reads.get(id(declared), ()) if declared is not None else ():
+            if not self._may_be_written(read.name, own, around):
+                text = f"nothing has written ${read.name} when {node.alias!r} reads it here"
+                self._report(read.name, span_of(node.key), text)
+
+    def _may_be_written(self, name: str, own: frozenset[str], around: frozenset[str]) -> bool:
+        doubts = self._doubts
+        if name in self._known or name not in self._checker.variables:
+            return True
+        if name in around and (name not in own or self._writers[name] > 1):
+            return True
+        return doubts.unknown_action or doubts.mentions(name)
+
+    def _report(self, name: str, span: Span, message: str) -> None:
+        hint = None
+        if name in self._passed:
+            hint = "what writes it does so when it succeeds, and has not when this is reached"
+        self._checker.source.report("BT302", span, message, hint=hint)

@@ -1,0 +1,75 @@
+"""Names of variables that a text holds as they are, where their values may be meant: BT315.
+
+Other languages write `{name}`, `{{ name }}`, `%(name)s`, `<name>` or `@name`; here that is text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+
+from bt_actions.document.language.values import computes, names_file, names_value
+from bt_actions.document.yaml.inner import inner_span
+from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of
+from bt_actions.document.yaml.source import Source
+
+__all__ = ["marked_here", "warn_unmarked"]
+
+_PATH = r"([A-Za-z]\w*(?:\.\w+)*)"
+_FORMS = re.compile(
+    rf"(?<!\$)\{{+\s*{_PATH}\s*(?::[^{{}}]*)?\}}+|%\({_PATH}\)[a-z]?|<{_PATH}>|(?<!\w)@{_PATH}",
+    re.ASCII,
+)
+_NAME = re.compile(r"(?<![\w.$'\"/])[A-Za-z]\w*", re.ASCII)
+
+
+def warn_unmarked(value: Node, source: Source, known: Container[str], *, prose: bool) -> None:
+    """Warn of the known names in a value's texts; of bare ones only where it is no prose.
+
+    A bare name in quotes is taken for text.
+    """
+    waiting = [value]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Scalar):
+            if _FORMS.search(node.text) and not names_file(node.text):
+                _in_other_words(node, source, known)
+            if not prose and "$" not in node.text:
+                _bare(node, source, known)
+        elif isinstance(node, Mapping):
+            waiting.extend([inner for _, inner in reversed(node.pairs)])
+        elif isinstance(node, Listing):
+            waiting.extend(reversed(node.items))
+
+
+def _in_other_words(node: Scalar, source: Source, known: Container[str]) -> None:
+    for match in _FORMS.finditer(node.text):
+        path = next(group for group in match.groups() if group)
+        name = path.partition(".")[0]
+        if name in known:
+            source.unread.meant.add(name)
+            right = f"${path}" if match[0] == node.text else f"$({path})"
+            source.report(
+                "BT315", inner_span(node, source, *match.span()),
+                f"{match[0]!r} is text here, not the value of ${path}", hint=f"write {right}",
+            )  # fmt: skip
+
+
+def marked_here(node: Node, source: Source, known: Container[str]) -> str | None:
+    """What to write for a text that is nothing but names of variables and what computes them."""
+    if not isinstance(node, Scalar) or not node.plain or "$" in node.text:
+        return None
+    marked = _NAME.sub(lambda name: ("$" if name[0] in known else "") + name[0], node.text)
+    if marked == node.text or not computes(marked):
+        return None
+    source.unread.meant.update(name for name in _NAME.findall(node.text) if name in known)
+    return f"write {marked}" if names_value(marked) else f"write '= {marked}' to compute it"
+
+
+def _bare(node: Scalar, source: Source, known: Container[str]) -> None:
+    right = marked_here(node, source, known)
+    if right is not None:
+        source.report(
+            "BT315", span_of(node), f"{node.text!r} is text here: no variable is read",
+            hint=f"{right}, or put it in quotes to mean the text",
+        )  # fmt: skip

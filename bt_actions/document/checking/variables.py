@@ -1,0 +1,163 @@
+"""Of which types the variables are that nodes write."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterable
+from typing import Protocol
+
+from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
+from bt_actions.document.checking.infer import common_type, infer, type_of_literal
+from bt_actions.document.language.types import TypeNameError, parse_type
+from bt_actions.document.language.values import Computed, Interpolated
+from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.writes import Write
+from bt_actions.document.yaml.nodes import Node
+from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
+
+__all__ = ["Known", "infer_variables", "items_inside", "root_type", "type_of"]
+
+_ROUNDS = 8
+"""How far a type is followed from variable to variable, before none is taken for known."""
+
+
+class Known(Protocol):
+    """What has to be known of a document for the types of what its nodes write."""
+
+    types: bool
+    document: Document
+    variables: dict[str, FieldType | None]
+
+    def types_at(self, reader: object) -> Callable[[str], FieldType | None]:
+        """Gives the type of a variable as a node reads it."""
+        ...
+
+    def interface(self, name: str, kind: str, node: Node) -> type | None:
+        """The class of a type name."""
+        ...
+
+    def action_class(self, declared: Declared) -> type | None:
+        """The class of the action that a name stands for."""
+        ...
+
+
+def type_of(write: Write, known: Known) -> FieldType | None:
+    """The type of what is written, without reporting anything."""
+    if write.node.kind is not None and write.node.kind.name == "subtree":
+        return _output_type(write, known)
+    if write.root == "item of":
+        return _item_type(write, known)
+    if isinstance(write.value, Interpolated):
+        return Scalar("string")
+    if not isinstance(write.value, Computed):
+        return type_of_literal(write.value)
+    roots = {} if write.root is None else {write.root: root_type(write.node, write.root, known)}
+    return infer(write.value.expression, roots, known.types_at(write.node), lambda *_: None,
+                 types=known.types)  # fmt: skip
+
+
+def _item_type(write: Write, known: Known) -> FieldType | None:
+    """The type of what a for_each gives its child."""
+    if isinstance(write.value, list):
+        return common_type([type_of_literal(item) for item in write.value])
+    if not isinstance(write.value, Computed):
+        return None
+    kind = infer(write.value.expression, {}, known.types_at(write.node), lambda *_: None,
+                 types=known.types)  # fmt: skip
+    return kind.item if isinstance(kind, Listing) else None
+
+
+def _output_type(write: Write, known: Known) -> FieldType | None:
+    included = write.node.included
+    declared = included.outputs.get(str(write.value)) if included is not None else None
+    text = declared.values.get("type") if declared is not None else None
+    if not isinstance(text, str):
+        return None
+    try:
+        return parse_type(text, types=known.types)
+    except TypeNameError:
+        return None
+
+
+def items_inside(
+    written: Iterable[tuple[Write, ...]], declared: Container[str]
+) -> dict[int, dict[str, Write]]:
+    """What gives the nodes inside of loops their items, by the node's id.
+
+    Only where several loops use one name, and nothing else writes it: inside of each it has the
+    type of that loop's items.
+    """
+    writers: dict[str, list[Write]] = {}
+    for writes in written:
+        for write in writes:
+            writers.setdefault(write.name, []).append(write)
+    inside: dict[int, dict[str, Write]] = {}
+    for name, loops in writers.items():
+        if len(loops) < 2 or name in declared or any(one.root != "item of" for one in loops):
+            continue
+        heads = {id(loop.node) for loop in loops}
+        for loop in loops:
+            body = [node for child in loop.node.children for node in child.walk()]
+            if heads.isdisjoint(id(node) for node in body):
+                for node in body:
+                    inside.setdefault(id(node), {})[name] = loop
+    return inside
+
+
+def infer_variables(written: Iterable[Write], known: Known) -> None:
+    """Give the variables that nodes write the one type that all of them write, or None.
+
+    What is declared keeps its type. A value may be computed from a variable that is written further
+    down, or from itself (a counter): so unknown types are left out of account at first, and count
+    once every variable has had its chance.
+    """
+    writers: dict[str, list[Write]] = {}
+    for write in written:
+        if write.name not in known.variables or write.name in writers:
+            writers.setdefault(write.name, []).append(write)
+            known.variables.setdefault(write.name, None)
+    changed = True
+    for _ in range(_ROUNDS):
+        if not changed:
+            break
+        changed = False
+        for name, writes in writers.items():
+            if known.variables[name] is None:
+                kinds = {type_of(write, known) for write in writes} - {None}
+                known.variables[name] = kinds.pop() if len(kinds) == 1 else None
+                changed |= known.variables[name] is not None
+    open_still = {n: w for n, w in writers.items() if len(w) > 1 or w[0].depends}
+    for _ in range(_ROUNDS):
+        changed = False
+        for name, writes in open_still.items():
+            kind = known.variables[name]
+            if kind is not None and any(type_of(write, known) != kind for write in writes):
+                known.variables[name] = None
+                changed = True
+        if not changed:
+            return
+    for name in open_still:
+        known.variables[name] = None
+
+
+def root_type(node: TreeNode, root: str, known: Known) -> FieldType | None:
+    """The type of the bare root that a node's expressions may use."""
+    if not known.types:
+        return None
+    if node.alias is not None:
+        declared = known.document.actions.get(node.alias)
+        cls = known.action_class(declared) if declared is not None else None
+        return None if cls is None else Message(cls.Result)  # type: ignore[attr-defined]
+    if node.kind is None or node.kind.name not in _ANSWERS:
+        return None
+    kind, part = _ANSWERS[node.kind.name]
+    name = RUN_TREE if node.kind.name == "run_tree" else node.values.get("type")
+    if not isinstance(name, str):
+        return None
+    cls = known.interface(name, kind, node.written.get("type", node.key))
+    if cls is None:
+        return None
+    return Message(getattr(cls, part) if part else cls)
+
+
+_ANSWERS = {"action": ("action", "Result"), "run_tree": ("action", "Result"),
+            "service": ("srv", "Response"), "wait_for_message": ("msg", "")}  # fmt: skip

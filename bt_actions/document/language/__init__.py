@@ -1,0 +1,1 @@
+"""The language of trees: its kinds and keys, the forms of values, and their types."""

@@ -1,0 +1,460 @@
+"""The language of trees in one place: which kinds of nodes there are, which keys, of which form.
+
+Reading, checking, the JSON Schema and the reference (docs/yaml.md) are all made from this. What a
+kind does when it is built stands in `building/` under the same name; a test compares the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+
+from bt_actions.document.language.ros_names import RosName
+from bt_actions.document.language.scalars import (
+    Choice,
+    Condition,
+    Duration,
+    Flag,
+    Name,
+    NodeName,
+    Place,
+    Quantity,
+    Text,
+    TypeName,
+    Whole,
+)
+from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.shapes import (
+    AnyValue,
+    Key,
+    ListOf,
+    ListValue,
+    OneOf,
+    Record,
+    Table,
+    Values,
+)
+from bt_actions.goals.policy import RETRYABLE, Busy
+
+__all__ = ["ACTION_KEYS", "ALIAS", "KINDS", "LIBRARY_KEYS", "TOP_KEYS", "Group", "Kind"]
+
+
+class Group(StrEnum):
+    """What py_trees calls the place of a node."""
+
+    COMPOSITE = "composite"
+    DECORATOR = "decorator"
+    LEAF = "leaf"
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of node. `value` is the form of what stands behind the kind's own key."""
+
+    name: str
+    group: Group
+    value: Shape
+    doc: str
+    keys: Mapping[str, Key]
+    example: str
+
+    @property
+    def named_by_value(self) -> bool:
+        """Whether the kind's value is the node's name."""
+        return isinstance(self.value, NodeName)
+
+
+def _keys(*keys: Key) -> Mapping[str, Key]:
+    return MappingProxyType({key.name: key for key in keys})
+
+
+_RESULT = frozenset({"result"})
+_MESSAGE = frozenset({"message"})
+_RUN = frozenset({"result", "outputs"})
+_NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
+_CHILD = "child"
+_CHILDREN = "children"
+
+TIMEOUT = Record(
+    "a duration or a mapping of deadlines",
+    _keys(
+        Key("queue", Duration(or_none=True), "For the resource to become free.", default="10 s"),
+        Key("server", Duration(or_none=True), "For a server to be there.", default="5 s"),
+        Key("accept", Duration(or_none=True), "From the goal to its acceptance.", default="5 s"),
+        Key("result", Duration(or_none=True), "From acceptance to the result.", default="none"),
+        Key("feedback", Duration(or_none=True), "The longest silence.", default="none"),
+        Key("cancel", Duration(or_none=True), "From canceling to the end.", default="5 s"),
+    ),
+    short="result",
+)
+_TRIES = (
+    Key("attempts", Whole(1), "All tries, the first among them.", default="1"),
+    Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
+    Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
+    Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
+    Key("jitter", Quantity(0.0, 1.0), "By how much of itself a pause varies.", default="0"),
+)
+_OUTCOMES = ListOf(Choice(tuple(sorted(outcome.value for outcome in RETRYABLE))), single=True)
+_WHEN = Key("when", Condition(_RESULT), "Try again only if this holds for the result.")
+RETRY = Record(
+    "a number of attempts or a mapping",
+    _keys(*_TRIES, Key("outcomes", _OUTCOMES, "After which outcomes to try again."), _WHEN),
+    short="attempts",
+)
+SERVICE_RETRY = Record("a number of attempts or a mapping", _keys(*_TRIES, _WHEN), short="attempts")
+NAMESPACE = RosName("a namespace", namespace=True)
+_POLICIES = (
+    Key("timeout", TIMEOUT, "How long each phase may take; a bare duration is the result's."),
+    Key("retry", RETRY, "How often to try; a bare number is the attempts."),
+    Key("busy", Choice(tuple(busy.value for busy in Busy)), "What to do while the server is taken.",
+        default="wait"),
+)  # fmt: skip
+_DOING = (
+    Key("goal", Values(), "The fields of the goal; what is not named keeps its default."),
+    *_POLICIES,
+    Key("expect", Condition(_RESULT), "What the result must be, beyond the server's word."),
+    Key("save", Table(Place(_RESULT)), "Names to keep parts of the result under."),
+    Key("resources", ListOf(Text("a text")),
+        "What the goal occupies, in place of its server; named as servers are.",
+        default="the server's name"),
+    Key("namespace", NAMESPACE, "Put before a relative name of a server or resource."),
+)  # fmt: skip
+ACTION_KEYS = _keys(*_DOING)
+"""What may stand beside an action's alias."""
+_TYPE = Key("type", TypeName("action"), "The action's type.", required=True)
+_SERVER = RosName("the name of an action server")
+ALIAS = Record(
+    "an action: its type, server and settings",
+    _keys(_TYPE, Key("server", _SERVER, "The action's name.", required=True), *_DOING),
+)
+INPUT = Record(
+    "the type of an input",
+    _keys(
+        Key("type", TypeName("value"), "What the value is.", required=True),
+        Key("default", AnyValue(), "The value where none is given; without it one must be."),
+        Key("unit", Text(), "For people."),
+        Key("description", Text(), "For people."),
+    ),
+    short="type",
+)
+OUTPUT = Record(
+    "the type of an output",
+    _keys(
+        Key("type", TypeName("value"), "What the value is.", required=True),
+        Key("unit", Text(), "For people."),
+        Key("description", Text(), "For people."),
+    ),
+    short="type",
+)
+QOS = Choice(("default", "sensor", "latched", "best_effort", "services"))
+_TOPIC = RosName("the name of a topic")
+TOPIC = Record(
+    "a topic: its name and type",
+    _keys(
+        Key("topic", _TOPIC, "The topic's name.", required=True),
+        Key("type", TypeName("msg"), "The message's type.", required=True),
+        Key("qos", QOS, "How it is subscribed to.", default="default"),
+        Key("max_age", Duration(or_none=True), default="none",
+            doc="A value older than this, by the node's clock, counts as missing."),
+        Key("namespace", NAMESPACE, "Put before a relative topic name."),
+    ),
+)  # fmt: skip
+DEFAULTS = Record("a mapping of settings", _keys(*_POLICIES))
+_DESCRIPTION = Key("description", Text(), "What it is for.")
+_IMPORT = Key("import", ListOf(Text("a path, as a text"), single=True), "Files with more of these.")
+_SHARED = (
+    Key("actions", Table(ALIAS), "This tree's words for the actions it uses."),
+    Key("topics", Table(TOPIC), "Latest values, read as `$name.field`; missing ones fail a check."),
+    Key("defaults", DEFAULTS, "Settings for all actions that do not say otherwise."),
+)
+
+
+class _NodeShape:
+    """A node of the tree; `read.py` reads it, since it needs the whole document."""
+
+    words = "a node"
+
+    def read(self, node: object, source: object) -> object:
+        raise AssertionError("nodes are read by read.py")
+
+    def schema(self) -> dict[str, object]:
+        return {"$ref": "#/$defs/node"}
+
+
+class _NodesShape(_NodeShape):
+    words = "a list of nodes"
+
+    def schema(self) -> dict[str, object]:
+        return {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/node"}}
+
+
+NODE: Shape = _NodeShape()
+NODES: Shape = _NodesShape()
+TOP_KEYS = _keys(
+    Key("tree", Name(), "The tree's name.", required=True),
+    _DESCRIPTION,
+    _IMPORT,
+    Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
+    Key("inputs", Table(INPUT), "Values that whoever runs the tree gives."),
+    Key("outputs", Table(OUTPUT), "Values that the tree gives back."),
+    *_SHARED,
+    Key("root", NODE, "The root node.", required=True),
+)
+"""What may stand at the top of a tree."""
+LIBRARY_KEYS = _keys(_DESCRIPTION, _IMPORT, *_SHARED)
+"""What may stand at the top of a file that is only imported."""
+
+LEVELS = ("debug", "info", "warn", "error", "fatal")
+SERVICE_TIMEOUT = Record(
+    "a duration or a mapping of deadlines",
+    _keys(
+        Key("server", Duration(or_none=True), "For the service to be there.", default="5 s"),
+        Key("response", Duration(or_none=True), "For the answer.", default="5 s"),
+    ),
+    short="response",
+)
+_POLICY = OneOf(
+    Choice(("all", "one")),
+    Record(
+        "{at_least: N}",
+        _keys(Key("at_least", Whole(1), "So many must succeed.", required=True)),
+    ),
+)
+_LIST = ListValue()
+_CHILDREN_KEY = Key(_CHILDREN, NODES, "The nodes it holds.", required=True)
+_CHILD_KEY = Key(_CHILD, NODE, "The node it holds.", required=True)
+_MEMORY = Key(
+    "memory",
+    Flag(),
+    "Whether a child that has finished is left alone; false makes the node reactive.",
+    default="true",
+)
+
+
+def _composite(name: str, doc: str, example: str, *keys: Key) -> Kind:
+    return Kind(name, Group.COMPOSITE, NodeName(), doc, _keys(_CHILDREN_KEY, *keys), example)
+
+
+def _decorator(name: str, doc: str, example: str, *keys: Key) -> Kind:
+    return Kind(name, Group.DECORATOR, NodeName(), doc, _keys(_CHILD_KEY, *keys), example)
+
+
+def _leaf(name: str, value: Shape, doc: str, example: str, *keys: Key) -> Kind:
+    named = isinstance(value, NodeName)
+    return Kind(name, Group.LEAF, value, doc, _keys(*keys, *(() if named else (_NAME,))), example)
+
+
+def _all() -> Iterable[Kind]:
+    yield _composite(
+        "sequence",
+        "Ticks its children in order until one fails; succeeds when all have.",
+        "sequence: Fetch\nchildren:\n  - success: Go\n  - success: Grasp",
+        _MEMORY,
+    )
+    yield _composite(
+        "fallback",
+        "Ticks its children in order until one succeeds; fails when all have.",
+        "fallback: Try both ways\nchildren:\n  - failure: Left\n  - success: Right",
+        _MEMORY,
+    )
+    yield _composite(
+        "parallel",
+        "Ticks its children beside each other. A child that has finished is not started again.",
+        "parallel: Look and listen\nchildren:\n  - success: Look\n  - success: Listen",
+        Key("policy", _POLICY, "How many must succeed; the rest is then stopped.", default="all"),
+    )
+    yield _decorator(
+        "retry",
+        "Ticks its child again when it has failed.",
+        "retry: Until it holds\nattempts: 3\nbackoff: 500 ms\nchild:\n  success: Grasp",
+        Key("attempts", Whole(1, values=True), "All tries.", default="without limit"),
+        Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
+        Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
+        Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
+    )
+    yield _decorator(
+        "repeat",
+        "Ticks its child again when it has succeeded; fails as soon as it fails.",
+        "repeat: Three rounds\ntimes: 3\nchild:\n  success: Patrol",
+        Key("times", Whole(0, values=True), "All rounds.", default="for ever"),
+    )
+    yield _decorator(
+        "timeout",
+        "Stops its child after some time, and fails when what it stopped has ended, or did not end "
+        "within its own 'cancel'.",
+        "timeout: Ten seconds at most\nafter: 10 s\nchild:\n  success: Search",
+        Key("after", Duration(values=True), "How long the child may take.", required=True),
+    )
+    yield _decorator(
+        "invert", "Succeeds when its child fails, and fails when it succeeds.",
+        "invert: Nobody there\nchild:\n  failure: Somebody",
+    )  # fmt: skip
+    yield _decorator(
+        "force_success", "Succeeds when its child has finished, however.",
+        "force_success: If possible\nchild:\n  failure: Wave",
+    )  # fmt: skip
+    yield _decorator(
+        "force_failure", "Fails when its child has finished, however.",
+        "force_failure: Give up\nchild:\n  success: Go home",
+    )  # fmt: skip
+    yield _decorator(
+        "run_once", "Runs its child to its end once, and keeps to that end ever after.",
+        "run_once: Calibrate first\nchild:\n  success: Calibrate",
+    )  # fmt: skip
+    yield _decorator(
+        "for_each",
+        "Ticks its child once for each item of a list.",
+        "for_each: Every station\nin: [1.0, 2.0]\nas: station\nchild:\n"
+        "  check: $station > 0",
+        Key("in", _LIST, "The list.", required=True),
+        Key("as", Name(), "The variable that holds the item.", default="item"),
+        Key("index", Name(), "A variable that counts the items, from 0."),
+        Key("on_failure", Choice(("stop", "continue")),
+            "Whether to go on when an item fails; the node then succeeds if any item did.",
+            default="stop"),
+    )  # fmt: skip
+    yield Kind(
+        "while",
+        Group.DECORATOR,
+        Condition(),
+        "Ticks its child as long as the expression is true, asked before each tick; stops it and "
+        "fails when it is not.",
+        _keys(_CHILD_KEY, _NAME),
+        "while: $level > 0.2\nchild:\n  success: Work",
+    )
+    yield _leaf(
+        "action",
+        NodeName(),
+        "Sends a goal to an action; the same as a name under `actions`, with type and server here.",
+        "action: To the part\ntype: robot_control_interfaces/action/MoveRobot\n"
+        "server: move_robot\ngoal: {distance: 2.0}\ntimeout: 30 s",
+        _TYPE,
+        Key("server", _SERVER, "The action's name.", required=True),
+        *_DOING,
+    )
+    yield _leaf(
+        "run_tree",
+        NodeName(),
+        "Has a tree run by a server of trees (`bt-actions serve`), and takes over how it ends: "
+        "where the end of a goal of that run is not known, it is not known here either.",
+        "run_tree: Fetch the part\ntree: fetch\nserver: /r1/run_tree\ninputs: {pick_at: 2.0}\n"
+        "save: {at: outputs.at}",
+        Key("tree", Text(values=True), "The tree's name at that server.", required=True),
+        Key("server", _SERVER, "The server's action.", default="run_tree"),
+        Key("inputs", Values(), "Values for the tree's inputs."),
+        Key("timeout", TIMEOUT, "As for an action, but `cancel` is 15 s where nothing is said: "
+            "the run sees its own goals to their ends first."),
+        *_POLICIES[1:],
+        Key("expect", Condition(_RUN), "What must hold of `result`, or of `outputs`."),
+        Key("save", Table(Place(_RUN)), "Names to keep parts of the outputs under."),
+        *_DOING[-2:],
+    )  # fmt: skip
+    yield _leaf(
+        "service",
+        NodeName(),
+        "Calls a service.",
+        "service: Switch the light on\ntype: std_srvs/srv/SetBool\nserver: light\n"
+        "request: {data: true}\nexpect: result.success",
+        Key("type", TypeName("srv"), "The service's type.", required=True),
+        Key("server", RosName("the name of a service"), "The service.", required=True),
+        Key("request", Values(), "The fields of the request."),
+        Key("timeout", SERVICE_TIMEOUT, "How long to wait; a bare duration is the answer's."),
+        Key("retry", SERVICE_RETRY, "How often to try; a bare number is the attempts."),
+        Key("expect", Condition(_RESULT), "What the answer must be."),
+        Key("save", Table(Place(_RESULT)), "Names to keep parts of the answer under."),
+        Key("namespace", NAMESPACE, "Put before a relative name."),
+    )
+    yield _leaf(
+        "publish",
+        _TOPIC,
+        "Publishes a message. While a process is new (3.5 s), who listens may not be discovered "
+        "yet, so it waits for one until then; where nobody listens it succeeds with a warning.",
+        "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
+        Key("type", TypeName("msg"), "The message's type.", required=True),
+        Key("message", Values(), "The fields of the message."),
+        Key(
+            "subscribers",
+            Whole(1),
+            "So many must listen before it publishes.",
+            default="whoever is there",
+        ),
+        Key(
+            "timeout",
+            Duration(or_none=True),
+            "After which it fails where fewer listen; not while a process is new.",
+            default="none",
+        ),
+        Key("qos", QOS, "How it is published.", default="default"),
+        Key("namespace", NAMESPACE, "Put before a relative name."),
+    )
+    yield _leaf(
+        "wait_for_message",
+        NodeName(),
+        "Succeeds with the first message, since it started, that fits.",
+        "wait_for_message: The door opens\ntopic: door\ntype: std_msgs/msg/Bool\n"
+        "until: message.data\ntimeout: 60 s",
+        Key("topic", _TOPIC, "The topic.", required=True),
+        Key("type", TypeName("msg"), "The message's type.", required=True),
+        Key("until", Condition(_MESSAGE), "What the message must be.", default="any message"),
+        Key("timeout", Duration(or_none=True), "After which it fails.", default="none"),
+        Key("save", Table(Place(_MESSAGE)), "Names to keep parts of the message under."),
+        Key("qos", QOS, "How the topic is subscribed to.", default="default"),
+        Key("namespace", NAMESPACE, "Put before a relative name."),
+    )
+    yield _leaf(
+        "wait", Duration(zero=True, values=True), "Succeeds after some time.", "wait: 500 ms"
+    )
+    yield _leaf(
+        "wait_until",
+        Condition(),
+        "Succeeds as soon as the expression is true.",
+        "wait_until: $level > 0.2\ntimeout: 60 s",
+        Key("timeout", Duration(or_none=True), "After which it fails.", default="none"),
+    )
+    yield _leaf(
+        "set",
+        Table(AnyValue()),
+        "Gives variables their values, all or none.",
+        "set: {count: = $count + 1}",
+    )
+    yield _leaf(
+        "log",
+        Text(values=True),
+        "Writes a line to the log.",
+        "log: The level is $(level)\nlevel: warn",
+        Key("level", Choice(tuple(LEVELS)), "How grave it is.", default="info"),
+    )
+    yield _leaf(
+        "python",
+        Text("a class, such as package.module.Class, as a text"),
+        "A behaviour of one's own, made with its name and `arguments`.",
+        "python: py_trees.timers.Timer\narguments: {duration: 0.1}",
+        Key("arguments", Values(), "For its constructor."),
+    )
+    yield _leaf(
+        "check",
+        Condition(),
+        "Succeeds when the expression is true, and fails when it is not or cannot be computed.",
+        "check: $level > 0.2",
+    )
+    yield _leaf(
+        "subtree",
+        Text("a tree's file or name, as a text"),
+        "Another tree: it sees only what `with` passes, and gives back outputs by `save`.",
+        "subtree: recover\nwith: {home: 0.0}",
+        Key("with", Values(), "Values for the tree's inputs."),
+        Key("save", Table(Name()), "Names here for the tree's outputs."),
+        Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
+    )
+    for name, doc in (
+        ("success", "Succeeds at once."),
+        ("failure", "Fails at once."),
+        ("running", "Never ends."),
+    ):
+        yield _leaf(name, NodeName(optional=True), doc, f"{name}: As it is")
+
+
+KINDS: Mapping[str, Kind] = MappingProxyType({kind.name: kind for kind in _all()})
+"""Every kind of node, by its key."""

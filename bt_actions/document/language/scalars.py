@@ -1,0 +1,325 @@
+"""The forms of single values: texts, names, numbers, durations, choices, expressions, type names.
+
+Each reports what is wrong to the source and then gives BAD; it knows nothing of the rest.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import dataclass
+
+from bt_actions.document.findings.elsewhere import notation_here
+from bt_actions.document.language.shape import (
+    Schema,
+    is_computed,
+    or_variable,
+    read_computed,
+    words_for,
+    wrong_form,
+)
+from bt_actions.document.language.values import BAD, Computed, read_expression, read_value
+from bt_actions.document.yaml.cut import warn_cut
+from bt_actions.document.yaml.nodes import Node, Scalar, span_of
+from bt_actions.document.yaml.source import Source, spoken
+from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.units import DURATION_UNITS, parse_duration
+
+__all__ = [
+    "Choice", "Condition", "Duration", "Flag", "Name", "NodeName", "Place", "Quantity", "Text",
+    "TypeName", "Whole",
+]  # fmt: skip
+
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+GREATEST = sys.float_info.max
+_NAME_LIMIT = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text; with `values`, `$(name)` may stand in it."""
+
+    words: str = "a text"
+    values: bool = False
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Scalar) or not isinstance(node.value, str):
+            return wrong_form(self, node, source)
+        if self.values:
+            return read_value(node, source)
+        warn_cut(node, source, "text")
+        return node.text
+
+    def schema(self) -> Schema:
+        return {"type": "string"}
+
+
+@dataclass(frozen=True, slots=True)
+class NodeName:
+    """The name of a node; `optional` where the kind itself says enough."""
+
+    optional: bool = False
+    words: str = "a name"
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Scalar):
+            return wrong_form(self, node, source)
+        if node.plain and node.text == "" and self.optional:
+            return None
+        text = node.text
+        if not text.strip():
+            source.report("BT113", span_of(node), "a node needs a name")
+            return BAD
+        if ":" in text:
+            source.report(
+                "BT113", span_of(node), f"a colon cannot stand in a node's name: {text!r}",
+                hint="tools that draw trees take 'a:b' for a port of the node 'a'",
+            )  # fmt: skip
+            return BAD
+        if (odd := _odd(text)) is not None:
+            source.report("BT113", span_of(node), f"{odd} cannot stand in a node's name")
+            return BAD
+        if len(text) > _NAME_LIMIT:
+            source.report("BT113", span_of(node), "a name is one line of up to 200 characters")
+            return BAD
+        warn_cut(node, source, "name")
+        return text
+
+    def schema(self) -> Schema:
+        pattern: Schema = {"type": ["string", "number", "boolean"], "pattern": "^[^:]+$"}
+        return {"anyOf": [pattern, {"type": "null"}]} if self.optional else pattern
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A word that is a name in this document: of an input, a variable, an action."""
+
+    words: str = "a name of letters, digits and underscores"
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Scalar):
+            return wrong_form(self, node, source)
+        if not _IDENTIFIER.fullmatch(node.text) or len(node.text) > _NAME_LIMIT:
+            odd = _odd(node.text)
+            source.report(
+                "BT113", span_of(node), f"{node.text!r} is no name",
+                hint=f"{odd} stands in it" if odd is not None
+                else "letters, digits and underscores, beginning with a letter",
+            )  # fmt: skip
+            return BAD
+        if not isinstance(node.value, str):
+            return wrong_form(self, node, source)
+        return node.text
+
+    def schema(self) -> Schema:
+        return {"type": "string", "pattern": f"^{_IDENTIFIER.pattern}$"}
+
+
+def _odd(text: str) -> str | None:
+    """What to call the first character of a text that nobody sees."""
+    return next((spoken(char) for char in text if not char.isprintable()), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """True or false."""
+
+    words: str = "true or false"
+
+    def read(self, node: Node, source: Source) -> object:
+        if isinstance(node, Scalar) and isinstance(node.value, bool):
+            return node.value
+        return wrong_form(self, node, source)
+
+    def schema(self) -> Schema:
+        return {"type": "boolean"}
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A whole number of at least `least`; with `values`, `$name` may stand for it."""
+
+    least: int = 0
+    values: bool = False
+
+    @property
+    def words(self) -> str:
+        return "a whole number"
+
+    def read(self, node: Node, source: Source) -> object:
+        if self.values and is_computed(node):
+            return read_computed(self, node, source)
+        value = node.value if isinstance(node, Scalar) else None
+        if isinstance(value, bool) or not isinstance(value, int):
+            return wrong_form(self, node, source)
+        if value < self.least:
+            source.report("BT110", span_of(node), f"at least {self.least} is needed, not {value}")
+            return BAD
+        return value
+
+    def schema(self) -> Schema:
+        return or_variable({"type": "integer", "minimum": self.least}, self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number between two bounds."""
+
+    least: float = 0.0
+    most: float = float("inf")
+    words: str = "a number"
+
+    def read(self, node: Node, source: Source) -> object:
+        value = node.value if isinstance(node, Scalar) else None
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return wrong_form(self, node, source)
+        if not self.least <= value <= min(self.most, GREATEST):
+            most = "" if self.most == float("inf") else f" and at most {self.most:g}"
+            text = f"a number of at least {self.least:g}{most} is needed, not {words_for(node)}"
+            source.report("BT110", span_of(node), text)
+            return BAD
+        return float(value)
+
+    def schema(self) -> Schema:
+        schema: Schema = {"type": "number", "minimum": self.least}
+        if self.most != float("inf"):
+            schema["maximum"] = self.most
+        return schema
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """Seconds, from ``500 ms`` or a bare number; `or_none` lets ``none`` mean no limit."""
+
+    or_none: bool = False
+    zero: bool = False
+    values: bool = False
+
+    @property
+    def words(self) -> str:
+        return (
+            "a duration, such as 5 s," if not self.or_none else "a duration, such as 5 s, or none"
+        )
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Scalar):
+            return wrong_form(self, node, source)
+        if self.or_none and node.text == "none":
+            return None
+        if self.values and is_computed(node):
+            return read_computed(self, node, source)
+        try:
+            seconds = parse_duration(node.value)
+        except ValueError as error:
+            hint = notation_here(node.text)
+            source.report("BT110", span_of(node), str(error), hint=hint)
+            return BAD
+        if seconds == 0 and not self.zero:
+            source.report("BT110", span_of(node), "a duration here is more than zero")
+            return BAD
+        return seconds
+
+    def schema(self) -> Schema:
+        units = "|".join(DURATION_UNITS)
+        pattern = rf"^[+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)? *({units})?$"
+        forms: list[object] = [
+            {"type": "number", "minimum": 0},
+            {"pattern": pattern, "type": "string"},
+        ]
+        if self.or_none:
+            forms.append({"const": "none"})
+        return or_variable({"anyOf": forms}, self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of some words."""
+
+    options: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        return f"one of {', '.join(self.options)}"
+
+    def read(self, node: Node, source: Source, words: str = "") -> object:
+        """`words` say what else may stand here, too."""
+        if not isinstance(node, Scalar):
+            return wrong_form(self, node, source)
+        if node.text in self.options:
+            return node.text
+        near = did_you_mean(node.text, self.options)
+        hint = None if near else notation_here(node.text) or words or self.words
+        source.report(
+            "BT110", span_of(node), f"{words_for(node)} is not known here{near}", hint=hint
+        )
+        return BAD
+
+    def schema(self) -> Schema:
+        return {"enum": list(self.options)}
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """An expression that is true or false."""
+
+    roots: frozenset[str] = frozenset()
+    words: str = "an expression"
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Scalar) or node.value is None:
+            return wrong_form(self, node, source)
+        expression = read_expression(node, source, node.text, 0, self.roots)
+        if expression is None:
+            return BAD
+        warn_cut(node, source, "expression")
+        return Computed(expression, node)
+
+    def schema(self) -> Schema:
+        return {"type": ["string", "boolean"]}
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in a result or a message, or an expression over it: ``result.pose.position``."""
+
+    roots: frozenset[str]
+    words: str = "a place, such as result.final_pose,"
+
+    def read(self, node: Node, source: Source) -> object:
+        return Condition(self.roots, self.words).read(node, source)
+
+    def schema(self) -> Schema:
+        return {"type": "string"}
+
+
+@dataclass(frozen=True, slots=True)
+class TypeName:
+    """The name of a ROS interface, or (kind `value`) of a type that a variable can have."""
+
+    kind: str
+
+    @property
+    def words(self) -> str:
+        if self.kind == "value":
+            return "a type, such as float64, string[] or geometry_msgs/msg/Pose,"
+        return f"a type name, such as package/{self.kind}/Name,"
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Scalar) or not isinstance(node.value, str) or not node.text:
+            return wrong_form(self, node, source)
+        if self.kind != "value" and not re.fullmatch(_TYPE_NAMES[self.kind], node.text):
+            text = f"{node.text!r} is no type name"
+            hint = f"it is written package/{self.kind}/Name"
+            source.report("BT207", span_of(node), text, hint=hint)
+            return BAD
+        return node.text
+
+    def schema(self) -> Schema:
+        if self.kind == "value":
+            return {"type": "string"}
+        return {"type": "string", "pattern": f"^{_TYPE_NAMES[self.kind]}$"}
+
+
+_TYPE_NAMES = {
+    kind: rf"[a-z][a-z0-9_]*/(?:{kind}/)?[A-Za-z][A-Za-z0-9]*" for kind in ("action", "srv", "msg")
+}

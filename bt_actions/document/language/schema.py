@@ -1,0 +1,60 @@
+"""JSON Schema of the tree language, made from the model, for completion in editors.
+
+An action's alias is the file's own word, so a node may have one key that the schema does not know.
+"""
+
+from __future__ import annotations
+
+from bt_actions.document.language.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS, Kind
+from bt_actions.document.language.shape import Schema
+from bt_actions.document.language.shapes import Key, keys_schema
+
+__all__ = ["json_schema"]
+
+
+def json_schema() -> Schema:
+    """The schema of a tree, or of a file that trees import (JSON Schema 2020-12)."""
+    kinds = {name: _kind(kind) for name, kind in KINDS.items()}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "bt_actions tree",
+        "description": "A behaviour tree whose leaves are ROS 2 actions.",
+        "anyOf": [
+            {**keys_schema(TOP_KEYS), "title": "a tree"},
+            {
+                **keys_schema(LIBRARY_KEYS),
+                "title": "a file that trees import",
+                "not": {"required": ["root"]},
+            },
+        ],
+        "$defs": {
+            "node": {
+                "type": "object",
+                "anyOf": [
+                    *({"$ref": f"#/$defs/{name}"} for name in KINDS),
+                    {"$ref": "#/$defs/use_of_an_action"},
+                ],
+            },
+            **kinds,
+            "use_of_an_action": _alias(),
+        },
+    }
+
+
+def _kind(kind: Kind) -> Schema:
+    own = Key(kind.name, kind.value, kind.doc, required=True)
+    return {"title": kind.name, **keys_schema({kind.name: own, **kind.keys})}
+
+
+def _alias() -> Schema:
+    """One key that is no kind, and the keys of an action."""
+    schema = keys_schema(ACTION_KEYS)
+    schema.pop("additionalProperties")
+    settings = sorted(ACTION_KEYS)
+    return {
+        "title": "an action that the tree declares under 'actions'",
+        **schema,
+        "propertyNames": {"not": {"enum": sorted(set(KINDS) - set(settings))}},
+        "minProperties": 1,
+        "maxProperties": len(settings) + 1,
+    }

@@ -1,0 +1,259 @@
+"""The forms of values with parts: lists, tables, records, data with variables in it.
+
+`model.py` says which key has which form. A form reports what is wrong to the source and then gives
+BAD; it knows nothing of the rest of the document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
+
+from bt_actions.document.findings.elsewhere import as_mapping, key_here
+from bt_actions.document.language.scalars import Choice, Name, Place
+from bt_actions.document.language.shape import Schema, Shape, is_computed, read_computed, wrong_form
+from bt_actions.document.language.values import BAD, read_value
+from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of
+from bt_actions.document.yaml.source import Source
+from bt_actions.utilities.suggest import did_you_mean
+
+__all__ = [
+    "AnyValue", "Key", "ListOf", "ListValue", "OneOf", "Record", "Table", "Values", "keys_schema",
+    "read_keys", "report_unknown_key", "required_in",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class AnyValue:
+    """Anything, with `$name` in it."""
+
+    words: str = "a value"
+
+    def read(self, node: Node, source: Source) -> object:
+        return read_value(node, source)
+
+    def schema(self) -> Schema:
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
+class Values:
+    """A mapping of fields (or names) to values, with `$name` in them."""
+
+    words: str = "a mapping of fields to values"
+
+    def read(self, node: Node, source: Source) -> object:
+        if is_computed(node):
+            return read_computed(self, node, source)
+        if not isinstance(node, Mapping):
+            hint = as_mapping(node.text) if isinstance(node, Scalar) else None
+            return wrong_form(self, node, source, hint=hint)
+        return read_value(node, source)
+
+    def schema(self) -> Schema:
+        return {"type": ["object", "string"]}
+
+
+@dataclass(frozen=True, slots=True)
+class ListValue:
+    """A list of any values, or `$name` for one."""
+
+    words: str = "a list"
+
+    def read(self, node: Node, source: Source) -> object:
+        if is_computed(node):
+            return read_computed(self, node, source)
+        if isinstance(node, Listing):
+            return read_value(node, source)
+        return wrong_form(self, node, source)
+
+    def schema(self) -> Schema:
+        return {"type": ["array", "string"]}
+
+
+@dataclass(frozen=True, slots=True)
+class ListOf:
+    """A list; with `single`, one item may stand without the brackets."""
+
+    item: Shape
+    single: bool = False
+
+    @property
+    def words(self) -> str:
+        return "a list"
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Listing):
+            if self.single and isinstance(node, Scalar):
+                value = self.item.read(node, source)
+                return BAD if value is BAD else [value]
+            return wrong_form(self, node, source)
+        items = [self.item.read(item, source) for item in node.items]
+        return BAD if any(item is BAD for item in items) else items
+
+    def schema(self) -> Schema:
+        listing: Schema = {"type": "array", "items": self.item.schema()}
+        return {"anyOf": [listing, self.item.schema()]} if self.single else listing
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A mapping from names to values of one form."""
+
+    item: Shape
+    words: str = "a mapping"
+
+    def read(self, node: Node, source: Source) -> object:
+        if isinstance(node, Scalar) and node.plain and node.text == "":
+            return {}
+        if not isinstance(node, Mapping):
+            return wrong_form(self, node, source, hint=self._meant(node))
+        found: dict[str, object] = {}
+        for key, inner in node.pairs:
+            name = Name().read(key, source)
+            value = self.item.read(inner, source)
+            if name is BAD:
+                source.unread.nodes += (key, inner)
+                continue
+            found[key.text] = value
+            if value is BAD:
+                source.unread.nodes.append(inner)
+        return found
+
+    def _meant(self, node: Node) -> str | None:
+        if isinstance(node, Listing):
+            named = any(isinstance(item, Mapping) for item in node.items)
+            return "each name is a key here, and begins with no '-'" if named else None
+        assert isinstance(node, Scalar)
+        root = min(self.item.roots) if isinstance(self.item, Place) else None
+        return as_mapping(node.text, "" if isinstance(self.item, Name) else root)
+
+    def schema(self) -> Schema:
+        return {
+            "type": ["object", "null"],
+            "propertyNames": Name().schema(),
+            "additionalProperties": self.item.schema(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key that may stand in a mapping."""
+
+    name: str
+    shape: Shape
+    doc: str
+    required: bool = False
+    default: str | None = None
+
+
+def required_in(keys: MappingType[str, Key]) -> tuple[Key, ...]:
+    """The keys that must be there."""
+    return tuple(key for key in keys.values() if key.required)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A mapping with known keys; `short` is the key that a bare value stands for."""
+
+    words: str
+    keys: MappingType[str, Key]
+    short: str | None = None
+
+    def read(self, node: Node, source: Source) -> object:
+        if not isinstance(node, Mapping):
+            if self.short is not None and isinstance(node, Scalar):
+                value = node.value
+                if "default" in self.keys and isinstance(value, bool | int | float):
+                    kind = {bool: "bool", int: "int64"}.get(type(value), "float64")
+                    hint = f"write {{type: {kind}, default: {node.text}}}"
+                    return wrong_form(self.keys[self.short].shape, node, source, hint=hint)
+                value = self.keys[self.short].shape.read(node, source)
+                return BAD if value is BAD else {self.short: value}
+            return wrong_form(self, node, source)
+        return read_keys(node, self.keys, source)
+
+    def schema(self) -> Schema:
+        schema = keys_schema(self.keys)
+        if self.short is not None:
+            return {"anyOf": [self.keys[self.short].shape.schema(), schema]}
+        return schema
+
+
+@dataclass(frozen=True, slots=True)
+class OneOf:
+    """A word out of a few, or a record."""
+
+    choice: Choice
+    record: Record
+
+    @property
+    def words(self) -> str:
+        return f"{self.choice.words}, or {self.record.words}"
+
+    def read(self, node: Node, source: Source) -> object:
+        if isinstance(node, Scalar):
+            return self.choice.read(node, source, self.words)
+        return self.record.read(node, source)
+
+    def schema(self) -> Schema:
+        return {"anyOf": [self.choice.schema(), self.record.schema()]}
+
+
+def read_keys(
+    node: Mapping,
+    keys: MappingType[str, Key],
+    source: Source,
+    all_keys: MappingType[str, Key] | None = None,
+) -> dict[str, object]:
+    """The values of a mapping's keys; unknown and missing ones are reported.
+
+    `all_keys` are those that may stand here, where some of them are read elsewhere.
+    """
+    values: dict[str, object] = {}
+    unknown = False
+    for key, inner in node.pairs:
+        known = keys.get(key.text)
+        if known is None:
+            unknown = True
+            report_unknown_key(key, all_keys or keys, source)
+            source.unread.nodes += (key, inner)
+            continue
+        value = values[key.text] = known.shape.read(inner, source)
+        if value is BAD:
+            source.unread.nodes.append(inner)
+    if not unknown:  # a misspelt key would be reported twice
+        for key_model in keys.values():
+            if key_model.required and key_model.name not in values:
+                source.report("BT108", span_of(node), f"the key {key_model.name!r} is missing",
+                              hint=key_model.doc)  # fmt: skip
+                source.unread.nodes.append(node.pairs[0][0] if node.pairs else node)
+    return values
+
+
+def report_unknown_key(
+    key: Scalar, known: MappingType[str, object], source: Source, hint: str | None = None
+) -> None:
+    """Report a key that cannot stand where it stands; `hint` says what to do instead, if known."""
+    here, instead = key_here(key.text, known) if hint is None else (None, hint)
+    near = f"; here it is '{here}'" if here else ""
+    if not near and not instead:
+        near = did_you_mean(key.text, known)
+    there = f"there is {', '.join(known)}" if known else "no other key can stand here"
+    hint = instead or (None if near else there)
+    source.report("BT107", span_of(key), f"unknown key {key.text!r}{near}", hint=hint)
+
+
+def keys_schema(keys: MappingType[str, Key]) -> Schema:
+    """JSON Schema for a mapping with known keys."""
+    schema: Schema = {
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {
+            key.name: {"description": key.doc, **key.shape.schema()} for key in keys.values()
+        },
+    }
+    required = [key.name for key in required_in(keys)]
+    if required:
+        schema["required"] = required
+    return schema

@@ -1,0 +1,178 @@
+"""Types as a tree names them (`float64`, `string[]`, `geometry_msgs/msg/Pose`), and what fits what.
+
+Needs no ROS for the plain types; a message's type is looked up only where types are checked.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from bt_actions.document.findings.elsewhere import type_here
+from bt_actions.messages.fields import (
+    FLOATS,
+    INTEGERS,
+    Either,
+    FieldType,
+    Listing,
+    Message,
+    Record,
+    Scalar,
+)
+from bt_actions.utilities.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from bt_actions.messages.interfaces import Kind
+
+__all__ = ["PLAIN_TYPES", "TypeNameError", "fits", "interface_of", "misfits", "parse_type"]
+
+PLAIN_TYPES = ("bool", *FLOATS, *(name for name in INTEGERS), "string")
+"""The types that need no package."""
+_STAND_FOR = {
+    "builtin_interfaces/msg/Time": (*FLOATS, *INTEGERS),
+    "builtin_interfaces/msg/Duration": (*FLOATS, *INTEGERS, "string"),
+}
+"""The plain types whose values may be given for a message: seconds, and `500 ms`."""
+_TEXT = Scalar("string")
+_SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{1,9}))?(\])?)?")
+
+
+class TypeNameError(ValueError):
+    """A text that names no type; `missing` is True for one that may be installed elsewhere."""
+
+    def __init__(self, message: str, *, missing: bool = False) -> None:
+        super().__init__(message)
+        self.missing = missing
+
+
+def parse_type(text: str, *, types: bool = True) -> FieldType | None:
+    """The type a text names; None for a message's type when `types` is False.
+
+    Raises TypeNameError, which says what was meant or what is missing.
+    """
+    match = _SYNTAX.fullmatch(text)
+    listed = "[" in text
+    if match is None or listed != (match[5] is not None) or (match[2] and match[1] != "string"):
+        raise TypeNameError(f"{text!r} is no type{_instead(text)}")
+    item = _item(match[1], int(match[2]) if match[2] else None, types)
+    if item is None or not listed:
+        return item
+    if match[4] is None:
+        return Listing(item)
+    size = int(match[4])
+    return Listing(item, limit=size) if match[3] else Listing(item, size=size)
+
+
+def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
+    if name in PLAIN_TYPES:
+        return Scalar(name, limit)
+    if "/" not in name:
+        near = _instead(name) or did_you_mean(name, PLAIN_TYPES)
+        known = near or f"; there is {', '.join(PLAIN_TYPES)}, and package/msg/Name"
+        raise TypeNameError(f"{name!r} is no type{known}")
+    if not types:
+        return None
+    return Message(interface_of(name, "msg"))
+
+
+def _instead(text: str) -> str:
+    here = type_here(text)
+    return f": {here}" if here else ""
+
+
+def interface_of(name: str, kind: Kind) -> type:
+    """The class of an interface. Raises TypeNameError."""
+    from bt_actions.messages.interfaces import UnknownInterface, interface
+
+    try:
+        return interface(name, kind)
+    except UnknownInterface as error:
+        raise TypeNameError(str(error), missing=True) from None
+
+
+def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
+    """Whether a value of one type can be put where another is needed; unknown types fit."""
+    if given is None or wanted is None:
+        return True
+    if isinstance(given, Either):
+        return all(fits(kind, wanted) for kind in given.kinds)
+    if isinstance(wanted, Message):
+        return _fills(given, wanted.cls)
+    if isinstance(wanted, Listing):
+        return (
+            isinstance(given, Listing)
+            and fits(given.item, wanted.item)
+            and _fits_size(given, wanted)
+        )
+    if not isinstance(given, Scalar) or not isinstance(wanted, Scalar):
+        return False
+    if wanted.name in FLOATS:
+        return given.name in FLOATS or given.name in INTEGERS
+    if wanted.name in INTEGERS:
+        return given.name in INTEGERS
+    if wanted.name in ("string", "wstring"):
+        return given.name in ("string", "wstring")
+    return given.name == wanted.name
+
+
+def _fits_size(given: Listing, wanted: Listing) -> bool:
+    """Whether a list can have as many items as are needed, as far as both are known."""
+    if given.size is None:
+        return wanted.size is None or given.limit is None or given.limit >= wanted.size
+    if wanted.size is not None:
+        return given.size == wanted.size
+    return wanted.limit is None or given.size <= wanted.limit
+
+
+def _fills(given: FieldType, cls: type) -> bool:
+    """Whether a value can stand where a message is needed; of a mapping, `misfits` says more."""
+    from bt_actions.messages.interfaces import interface_name
+
+    if isinstance(given, Message):
+        return given.cls is cls
+    if isinstance(given, Scalar):
+        return given.name in _STAND_FOR.get(interface_name(cls), ())
+    return isinstance(given, Record)
+
+
+def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
+    """What is wrong with mappings of such types where messages are needed, also inside lists.
+
+    Each text goes on where the name of the value ends: ".x: ...", ", in one item: ...".
+    """
+    if isinstance(given, Listing) and isinstance(wanted, Listing):
+        return [f", in one item{text}" for text in misfits(given.item, wanted.item)]
+    if isinstance(given, Either):
+        return next((texts for kind in given.kinds if (texts := misfits(kind, wanted))), [])
+    if not isinstance(given, Record) or not isinstance(wanted, Message):
+        return []
+
+    from bt_actions.messages.conversion import dotted, examine
+
+    found: list[str] = []
+
+    def hole(item: object, kind: FieldType, path: tuple[str | int, ...]) -> bool:
+        if isinstance(item, dict):  # the mapping itself
+            return False
+        inner = item if isinstance(item, FieldType) else None
+        kinds = inner.kinds if isinstance(inner, Either) else (inner,)
+        wrong = [one for one in kinds if one != _TEXT and not fits(one, kind)]
+        if wrong:  # a text may name a constant
+            found.append(f".{dotted(path)}: a value of {kind} is needed, not of {wrong[0]}")
+        else:
+            found.extend(f".{dotted(path)}{text}" for text in misfits(inner, kind))
+        return True
+
+    problems = [one for part in _alone(given) for one in examine(wanted, part, hole)]
+    return [f".{one}" if one.path else f": {one.text}" for one in problems] + found
+
+
+def _alone(given: Record) -> list[dict[str, FieldType | None]]:
+    """A mapping as what can stand beside each other: of several, one may have angles."""
+    from bt_actions.messages.conveniences import ANGLES
+
+    items = dict(given.items)
+    if not given.sometimes or not any(name in ANGLES for name in items):
+        return [items]
+    angles = {name: kind for name, kind in items.items() if name in ANGLES}
+    return [angles, {name: kind for name, kind in items.items() if name not in ANGLES}]

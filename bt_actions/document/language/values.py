@@ -1,0 +1,359 @@
+"""Values as they are written in a tree: literals, and what is computed when it is needed.
+
+A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` stands inside a text;
+`$$` is a dollar sign. Nothing is evaluated here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from bt_actions.document.findings import DocumentError
+from bt_actions.document.findings.elsewhere import notation_here
+from bt_actions.document.language.bounds import MAX_ITEMS, refuse_large
+from bt_actions.document.yaml.braces import report_braces
+from bt_actions.document.yaml.compose import compose
+from bt_actions.document.yaml.cut import cut_hint, warn_cut
+from bt_actions.document.yaml.inner import inner_span
+from bt_actions.document.yaml.nodes import (
+    Listing,
+    Mapping,
+    Node,
+    Scalar,
+    beyond_floats,
+    data_of,
+    span_of,
+)
+from bt_actions.document.yaml.source import SUFFIXES, Source, read_source
+from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.values import MAX_ITEMS as MAX_TEXT
+from bt_actions.utilities.plain_data import numbers_only
+
+__all__ = [
+    "BAD",
+    "Computed",
+    "Interpolated",
+    "Lookup",
+    "computed_in",
+    "computes",
+    "constant_of",
+    "locate",
+    "names_file",
+    "names_value",
+    "read_data",
+    "read_expression",
+    "read_value",
+    "resolve",
+]
+
+Lookup = Callable[[str], object]
+
+
+class _Bad:
+    """Stands for a value that was already reported, so that nothing is reported after it."""
+
+    def __repr__(self) -> str:
+        return "BAD"
+
+
+BAD: Final = _Bad()
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """A value that an expression gives when it is needed; `start` is its place in the scalar."""
+
+    expression: Expression
+    node: Scalar
+    start: int = 0
+
+    def evaluate(self, variable: Lookup) -> object:
+        """The value. Raises ExpressionError."""
+        return self.expression.evaluate({}, variable)
+
+
+@dataclass(frozen=True, slots=True)
+class Interpolated:
+    """A text with values in it."""
+
+    parts: tuple[str | Computed, ...]
+    node: Scalar
+
+    def evaluate(self, variable: Lookup) -> str:
+        """The text. Raises ExpressionError, also for one longer than an expression may make it."""
+        texts, left = [], MAX_TEXT
+        for part in self.parts:
+            text = part if isinstance(part, str) else _as_text(part.evaluate(variable))
+            texts.append(text)
+            left -= len(text)
+            if left < 0:
+                raise ExpressionError(_TOO_LONG)
+        return "".join(texts)
+
+
+_TOO_LONG = f"the text would be longer than {MAX_TEXT:,} characters"
+_VARIABLE = re.compile(r"\$[A-Za-z_]\w*(?:\.\w+|\[-?\d+\])*", re.ASCII)
+_DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
+
+
+def read_value(node: Node, source: Source) -> object:
+    """Plain data with `Computed` and `Interpolated` in it, or BAD after reporting what is wrong."""
+    if isinstance(node, Scalar):
+        value = _read_scalar(node, source)
+        if isinstance(value, (str, Interpolated)):
+            warn_cut(node, source, "text")
+        elif isinstance(value, Computed) and value.start:  # $name alone may be a number
+            warn_cut(node, source, "expression")
+        return value
+    bad = False
+    if isinstance(node, Listing):
+        items = [read_value(item, source) for item in node.items]
+        bad = any(item is BAD for item in items)
+        return BAD if bad else items
+    assert isinstance(node, Mapping)
+    if report_braces(node, source):
+        return BAD
+    data: dict[str, object] = {}
+    for key, inner in node.pairs:
+        value = read_value(inner, source)
+        bad = bad or value is BAD
+        data[key.text] = value
+    return BAD if bad else data
+
+
+def _read_scalar(node: Scalar, source: Source) -> object:
+    text = node.text
+    if "$" not in text and not text.startswith(("=", "@")):
+        if beyond_floats(node):
+            source.report("BT204", span_of(node), f"{text} does not fit a float64")
+            return BAD
+        return node.value
+    if names_file(text):
+        return _read_file(node, source)
+    if text.startswith("= "):
+        return _computed(node, source, text[2:], 2)
+    if names_value(text):
+        return _computed(node, source, text, 0)
+    if node.plain and _lacks_space(text):
+        span = inner_span(node, source, 0, 1)
+        quotes = "" if "$" in text else ", or put it in quotes to mean the text"
+        hint = f"write '= {text[1:]}'{quotes}"
+        source.report("BT114", span, "'=' computes only with a space behind it", hint=hint)
+        return BAD
+    return _interpolated(node, source)
+
+
+def _lacks_space(text: str) -> bool:
+    """Whether a text is an expression but for the space behind its '='."""
+    return text.startswith("=") and computes(text[1:])
+
+
+def names_value(text: str) -> bool:
+    """Whether a text stands for one value: ``$name``, ``$name.field.0``."""
+    return _VARIABLE.fullmatch(text) is not None
+
+
+def computes(text: str) -> bool:
+    """Whether a text is an expression."""
+    try:
+        _expression(text, frozenset())
+    except ExpressionError:
+        return False
+    return True
+
+
+def names_file(text: str) -> bool:
+    """Whether a text stands for the data in a file: ``@points.yaml``."""
+    return text.startswith("@") and text.endswith(SUFFIXES)
+
+
+def read_data(path: Path, *, pipes: bool = False) -> object:
+    """The data in a YAML or JSON file; a dollar sign means nothing in it.
+
+    Raises DocumentError, with the place in that file, and ValueError for what is larger than any
+    value of a tree. `pipes` as for `read_source`.
+    """
+    source = read_source(path, pipes=pipes)
+    node = compose(source)
+    if source.findings:
+        raise DocumentError(source.findings)
+    data = None if node is None else data_of(node)
+    refuse_large(data)
+    return data
+
+
+def _read_file(node: Scalar, source: Source) -> object:
+    path = Path(node.text[1:])
+    if source.path is not None:
+        path = source.path.parent / path
+    if path not in source.files:
+        try:
+            if refusal := source.refusal(path):
+                raise ValueError(refusal)
+            source.files[path] = read_data(path)
+        except ValueError as error:
+            source.files[path] = error
+    data = source.files[path]
+    if not isinstance(data, ValueError):
+        if source.items <= MAX_ITEMS:
+            source.items += refuse_large(data)
+        if source.items <= MAX_ITEMS:
+            return data
+        data = ValueError(f"of data in files, a tree takes {MAX_ITEMS:,} items")
+    text = f"{path.name}: {data}"
+    if isinstance(data, DocumentError):
+        first = data.findings[0]
+        text = f"{path.name}:{first.line}:{first.column}: {first.message}"
+    source.report("BT209", span_of(node), text)
+    return BAD
+
+
+def _computed(node: Scalar, source: Source, text: str, start: int) -> object:
+    expression = read_expression(node, source, text, start, frozenset())
+    return BAD if expression is None else Computed(expression, node, start)
+
+
+def _interpolated(node: Scalar, source: Source) -> object:
+    parts: list[str | Computed] = []
+    at = 0
+    text = node.text
+    for match in _DOLLAR.finditer(text):
+        parts.append(text[at : match.start()])
+        at = match.end()
+        if match[0] == "$$":
+            parts.append("$")
+            continue
+        if match[1] is None:
+            span = inner_span(node, source, match.start(), match.end())
+            hint = notation_here(text, match.start())
+            if hint is None:
+                hint = "write $(name) inside a text, and $$ for a dollar sign"
+            if _lacks_space(text):
+                hint = f"write '= {text[1:]}' with a space to compute it"
+            elif computes(text):
+                hint = f"write '= {text}' to compute it, and $(name) inside a text"
+            source.report("BT115", span, "this dollar sign refers to nothing", hint=hint)
+            return BAD
+        written = "$" + match[1].strip()
+        if not names_value(written):
+            span = inner_span(node, source, match.start(), match.end())
+            hint = notation_here(text, match.start()) or "$(name) or $(name.field)"
+            source.report("BT115", span, f"{match[0]} holds no variable's name", hint=hint)
+            return BAD
+        part = _computed(node, source, written, match.start(1) - 1)
+        if part is BAD:
+            return BAD
+        assert isinstance(part, Computed)
+        parts.append(part)
+    parts.append(text[at:])
+    kept = tuple(part for part in parts if part != "")
+    if all(isinstance(part, str) for part in kept):
+        return "".join(str(part) for part in kept)
+    return Interpolated(kept, node)
+
+
+def read_expression(
+    node: Scalar, source: Source, text: str, start: int, roots: frozenset[str]
+) -> Expression | None:
+    """The expression in a part of a scalar, or None after reporting what is wrong with it."""
+    try:
+        return _expression(text, roots)
+    except ExpressionError as error:
+        span = inner_span(node, source, start + error.column, start + error.end_column)
+        hint = cut_hint(node, source) or notation_here(text, computes=True)
+        source.report("BT114", span, error.message, hint=hint)
+        return None
+
+
+@lru_cache(maxsize=4096)
+def _expression(text: str, roots: frozenset[str]) -> Expression:
+    """An expression never changes, and a tree says the same thing in many places."""
+    return Expression(text, roots=roots, constants=_named_constant)
+
+
+def _named_constant(name: str) -> object:
+    from bt_actions.messages.conveniences import (
+        constant,  # here, so that reading a tree needs no ROS
+    )
+
+    return constant(name, None)
+
+
+def locate(node: Node, path: tuple[str | int, ...], *, at_key: bool = False) -> Node:
+    """The YAML node at a path inside another, or the nearest there is on the way."""
+    for depth, step in enumerate(path):
+        last = depth == len(path) - 1
+        if isinstance(node, Mapping):
+            for key, value in node.pairs:
+                if key.text == step:
+                    if last and at_key:
+                        return key
+                    node = value
+                    break
+            else:
+                return node
+        elif isinstance(node, Listing) and isinstance(step, int) and step < len(node.items):
+            node = node.items[step]
+        else:
+            return node
+    return node
+
+
+def computed_in(value: object) -> Iterator[Computed]:
+    """Every computed part of a value, in the order it was written."""
+    if isinstance(value, Computed):
+        yield value
+    elif isinstance(value, Interpolated):
+        for part in value.parts:
+            if isinstance(part, Computed):
+                yield part
+    elif isinstance(value, MappingType):
+        for item in value.values():
+            yield from computed_in(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from computed_in(item)
+
+
+def constant_of(computed: Computed) -> object:
+    """The value of an expression over nothing but numbers and texts; None for any other."""
+    expression = computed.expression
+    if expression.names or expression.roots or expression.constants:
+        return None
+    try:
+        return computed.evaluate(lambda _name: None)
+    except ExpressionError:
+        return None
+
+
+def resolve(value: object, variable: Lookup) -> object:
+    """The value with everything in it computed. Raises ExpressionError."""
+    if isinstance(value, (Computed, Interpolated)):
+        return value.evaluate(variable)
+    if isinstance(value, MappingType):
+        return {key: resolve(item, variable) for key, item in value.items()}
+    if isinstance(value, list):
+        if numbers_only(value):
+            return [*value]
+        return [resolve(item, variable) for item in value]
+    return value
+
+
+def _as_text(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    from bt_actions.messages.conversion import to_plain  # here, so that reading a tree needs no ROS
+
+    try:
+        refuse_large(value, items=MAX_TEXT, characters=MAX_TEXT)  # an item takes a character
+        value = to_plain(value)
+        refuse_large(value, items=MAX_TEXT, characters=MAX_TEXT)
+    except ValueError:
+        raise ExpressionError(_TOO_LONG) from None
+    return str(value)

@@ -1,0 +1,143 @@
+"""Where trees are: a path, or the name of an installed tree."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from bt_actions.utilities.suggest import did_you_mean
+
+__all__ = ["TreeNotFoundError", "find_tree", "installed_trees", "tree_folder", "tree_folders"]
+
+_SUFFIXES = (".yaml", ".yml")
+_SEARCH_PATH = "BT_ACTIONS_TREE_PATH"
+
+
+class TreeNotFoundError(FileNotFoundError):
+    """There is no such tree; the text says where it was looked for."""
+
+
+def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = None) -> Path:
+    """The file of a tree: a path, `package://pkg/trees/x.yaml`, or an installed tree's name.
+
+    A path is looked for beside `beside` (the folder of an including file) or in the current
+    folder; a name then in `BT_ACTIONS_TREE_PATH`, in the checkout's own `trees/`, and in
+    `share/<package>/trees` of every installed package. Raises TreeNotFoundError.
+    """
+    wanted = os.fspath(name_or_path)
+    if wanted.startswith("package://"):
+        return _in_package(wanted)
+    if not wanted:
+        raise TreeNotFoundError("the name of a tree is needed, not an empty text")
+    path = Path(wanted)
+    base = Path() if beside is None else beside
+    candidates = [path if path.is_absolute() else base / path]
+    if path.suffix not in _SUFFIXES and candidates[0].name:
+        candidates += [candidates[0].with_name(path.name + suffix) for suffix in _SUFFIXES]
+    is_name = len(path.parts) == 1
+    if is_name and path.suffix in _SUFFIXES:
+        candidates += [folder / path for folder in tree_folders()]
+    elif is_name:
+        candidates += [
+            folder / (wanted + suffix) for folder in tree_folders() for suffix in _SUFFIXES
+        ]
+    exact = candidates[0]
+    for candidate in candidates:
+        if _is_file(candidate):
+            return candidate
+    if _is_there(exact):
+        return exact  # whoever reads it will say what it is
+    raise TreeNotFoundError(_nowhere(wanted, exact, is_name))
+
+
+def tree_folders() -> Iterator[Path]:
+    """The folders where trees are looked for by name, in order."""
+    for entry in os.environ.get(_SEARCH_PATH, "").split(os.pathsep):
+        if entry:
+            yield Path(entry)
+    yield Path(__file__).resolve().parents[3] / "trees"  # an editable install's copies may be old
+    for prefix in _prefixes():
+        share = prefix / "share"
+        yield share / "bt_actions" / "trees"
+        for package in _packages(prefix):
+            if package != "bt_actions":
+                yield share / package / "trees"
+
+
+def tree_folder(place: str | os.PathLike[str]) -> Path:
+    """A folder of trees: a path, or `package://pkg/trees`. Raises TreeNotFoundError."""
+    wanted = os.fspath(place)
+    if not wanted.startswith("package://"):
+        return Path(wanted)
+    package, _, inner = wanted.removeprefix("package://").partition("/")
+    for prefix in _prefixes():
+        candidate = prefix / "share" / package / inner
+        if package and ".." not in Path(inner).parts and candidate.is_dir():
+            return candidate
+    raise TreeNotFoundError(f"there is no folder {wanted!r}: it is written package://pkg/trees")
+
+
+def installed_trees() -> dict[str, Path]:
+    """Every tree that can be named, with its file."""
+    found: dict[str, Path] = {}
+    for folder in tree_folders():
+        try:
+            files = sorted(folder.iterdir())
+        except OSError:
+            continue
+        for file in files:
+            if file.suffix in _SUFFIXES:
+                found.setdefault(file.stem, file)
+    return found
+
+
+def _prefixes() -> Iterator[Path]:
+    seen = set()
+    for entry in (*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix):
+        if entry and entry not in seen:
+            seen.add(entry)
+            yield Path(entry)
+
+
+def _packages(prefix: Path) -> list[str]:
+    """The packages of a prefix, from the ament index."""
+    try:
+        index = prefix / "share" / "ament_index" / "resource_index" / "packages"
+        return sorted(entry.name for entry in index.iterdir())
+    except OSError:
+        return []
+
+
+def _in_package(wanted: str) -> Path:
+    package, _, inner = wanted.removeprefix("package://").partition("/")
+    if not package or not inner or ".." in Path(inner).parts:
+        raise TreeNotFoundError(f"{wanted!r} is no place: it is written package://pkg/trees/x.yaml")
+    for prefix in _prefixes():
+        candidate = prefix / "share" / package / inner
+        if _is_file(candidate):
+            return candidate
+    raise TreeNotFoundError(f"there is no {inner!r} in the package {package!r}")
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _is_there(path: Path) -> bool:
+    """Whether something has this path, or nobody can tell: its name is too long, say."""
+    try:
+        return path.exists()
+    except OSError:
+        return True
+
+
+def _nowhere(wanted: str, exact: Path, is_name: bool) -> str:
+    if not is_name:
+        return f"there is no tree {str(exact)!r}"
+    text = f"there is no tree {wanted!r} here, and none of that name is installed"
+    return text + did_you_mean(Path(wanted).stem, installed_trees())

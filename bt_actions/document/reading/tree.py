@@ -1,0 +1,134 @@
+"""A document after reading: what was said, with the YAML node each part came from.
+
+Plain values; nothing here checks or builds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from bt_actions.document.findings import Place
+from bt_actions.document.language.model import Kind
+from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
+from bt_actions.document.yaml.source import Source
+
+__all__ = ["Declared", "Document", "TreeNode"]
+
+
+class TreeNode:
+    """A node of the tree.
+
+    `values` holds what was read under each key (the kind's own key included), `written` the YAML
+    node of each. `alias` is the action's name in this document, where the node is one; `included`
+    the tree that a subtree stands for.
+    """
+
+    __slots__ = (
+        "alias",
+        "children",
+        "included",
+        "key",
+        "kind",
+        "name",
+        "node",
+        "source",
+        "values",
+        "written",
+    )
+
+    def __init__(self, kind: Kind | None, key: Scalar, node: Mapping, source: Source) -> None:
+        self.kind = kind
+        self.key = key
+        self.node = node
+        self.source = source
+        self.alias: str | None = None
+        self.name: str = ""
+        self.values: dict[str, object] = {}
+        self.written: dict[str, Node] = {}
+        self.children: list[TreeNode] = []
+        self.included: Document | None = None
+
+    @property
+    def place(self) -> Place:
+        """Where the node's kind is written, or the node begins whose kind is merged into it."""
+        node, key = self.node, self.key
+        begin, end = (node.line, node.column), (node.end_line, node.end_column)
+        at = key if begin <= (key.line, key.column) < end else node
+        return Place(self.source.name, at.line, at.column)
+
+    @property
+    def is_action(self) -> bool:
+        """Whether it sends a goal: under an action's name, with its type in place, or to a server
+        of trees."""
+        sends = self.kind is not None and self.kind.name in ("action", "run_tree")
+        return self.alias is not None or sends
+
+    def walk(self) -> Iterator[TreeNode]:
+        """This node and all below it, in the order of the text."""
+        stack = [self]
+        while stack:
+            node = stack.pop()
+            yield node
+            stack.extend(reversed(node.children))
+
+
+@dataclass(slots=True)
+class Declared:
+    """Something with a name: an input, an output, an action, a topic."""
+
+    name: str
+    values: dict[str, object]
+    key: Scalar
+    node: Node
+    source: Source
+
+    @property
+    def place(self) -> Place:
+        return Place(self.source.name, self.key.line, self.key.column)
+
+    def written(self, key: str) -> Node:
+        """The YAML node of one of its keys, or of the whole where it is written short."""
+        found = self.node.get(key) if isinstance(self.node, Mapping) else None
+        return self.node if found is None else found
+
+
+@dataclass(slots=True)
+class Document:
+    """A tree, or a library of actions and topics for trees to import."""
+
+    source: Source
+    node: Mapping
+    values: dict[str, object] = field(default_factory=dict)
+    name: str = ""
+    inputs: dict[str, Declared] = field(default_factory=dict)
+    outputs: dict[str, Declared] = field(default_factory=dict)
+    actions: dict[str, Declared] = field(default_factory=dict)
+    topics: dict[str, Declared] = field(default_factory=dict)
+    defaults: dict[str, object] = field(default_factory=dict)
+    settings: dict[str | None, dict[str, object]] = field(default_factory=dict)
+    """What each alias (None: no alias) has where a node says nothing; made when first asked for."""
+    root: TreeNode | None = None
+    imported: list[Document] = field(default_factory=list)
+    _nodes: tuple[TreeNode, ...] = ()
+
+    @property
+    def namespace(self) -> str:
+        value = self.values.get("namespace", "")
+        return value if isinstance(value, str) else ""
+
+    def with_imports(self) -> Iterator[Document]:
+        """This document and all that it imports, each once."""
+        waiting, seen = [self], set()
+        while waiting:
+            one = waiting.pop()
+            if id(one) not in seen:
+                seen.add(id(one))
+                yield one
+                waiting.extend(one.imported)
+
+    def nodes(self) -> tuple[TreeNode, ...]:
+        """All nodes of the tree, which was read to its end, in the order of the text."""
+        if not self._nodes and self.root is not None:
+            self._nodes = tuple(self.root.walk())
+        return self._nodes

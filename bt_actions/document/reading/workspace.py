@@ -1,0 +1,285 @@
+"""Opens a tree with all that it imports and includes; each file is read once.
+
+What cannot be opened is reported where it is named. Nothing is checked here but that the trees
+do not include themselves and do not unfold without bound.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from bt_actions.document.findings import DocumentError, Finding, Related, Span
+from bt_actions.document.findings.elsewhere import package_here
+from bt_actions.document.reading.find import TreeNotFoundError, find_tree
+from bt_actions.document.reading.read import read_document, read_root
+from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.yaml.nodes import Listing, Node, span_of
+from bt_actions.document.yaml.source import SUFFIXES, Source, read_source
+
+__all__ = ["MAX_LEVELS", "MAX_TREE_NODES", "Workspace"]
+
+MAX_TREE_NODES = 1_000_000
+"""Nodes of a tree after all that it includes was unfolded."""
+MAX_LEVELS = 200
+"""Nodes inside each other after all that a tree includes was unfolded: py_trees ticks and stops a
+tree by recursion, and Python has 1,000 levels of that for everything."""
+_MAX_CHAIN = 50
+_MAX_FILES = 2 * _MAX_CHAIN
+"""Trees inside each other, and then files that import each other."""
+
+
+class Workspace:
+    """The documents that belong to one or several trees."""
+
+    def __init__(self, within: Iterable[Path] | None = None) -> None:
+        """`within` are the folders in which every file must lie, links resolved; None: anywhere."""
+        self._within = None if within is None else tuple(each.resolve() for each in within)
+        self._documents: dict[tuple[Path, bool], Document | None] = {}
+        self._sources: list[Source] = []
+        self._sizes: dict[int, int] = {}
+        self._heights: dict[int, int] = {}
+        self._failed: dict[Path, DocumentError] = {}
+
+    def open(self, path: Path, name: str | None = None) -> Document | None:
+        """The tree in a file, with its imports and subtrees; None when there is none to speak of.
+
+        Raises DocumentError when the file cannot be read at all.
+        """
+        source = read_source(path, name)
+        source.within = self._within
+        if refusal := source.refusal(path):
+            source.report("BT209", Span(1, 1, 1, 2), refusal)
+            raise DocumentError(source.findings)
+        return self._open_tree(source, (_key(path),))
+
+    def open_source(self, source: Source) -> Document | None:
+        """The tree in a source that was read already (standard input, an editor's buffer)."""
+        chain = (_key(source.path),) if source.path is not None else ()
+        return self._open_tree(source, chain)
+
+    @property
+    def documents(self) -> list[Document]:
+        """Every document that was opened, in the order of opening."""
+        return [document for document in self._documents.values() if document is not None]
+
+    @property
+    def files(self) -> dict[Path, str]:
+        """Every file that was read, resolved, with its text; that of data files is empty."""
+        found = {_key(each.path): each.text for each in self._sources if each.path is not None}
+        return found | {_key(path): "" for each in self._sources for path in each.files}
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Everything found in any of them, by file and place."""
+        failed = [error.findings for error in self._failed.values()]
+        found = [one for findings in failed for one in findings if one.code == "BT101"]
+        for source in self._sources:
+            found += sorted(source.findings, key=lambda one: (one.line, one.column, one.code))
+        return list(dict.fromkeys(found))  # what an alias repeats is wrong once
+
+    @contextlib.contextmanager
+    def as_it_was(self) -> Iterator[None]:
+        """Forget in the end what is found meanwhile."""
+        before = [(source, len(source.findings), source.errors) for source in self._sources]
+        try:
+            yield
+        finally:
+            for source, findings, errors in before:
+                del source.findings[findings:]
+                source.errors = errors
+
+    def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
+        key = (_key(source.path or Path(source.name)), False)
+        if key in self._documents:
+            return self._documents[key]
+        self._sources.append(source)
+        document = read_document(source)
+        self._documents[key] = document
+        if document is None:
+            return None
+        self._import(document, chain)
+        read_root(document)
+        size = height = 0
+        levels = {id(document.root): 1}
+        for node in document.nodes():
+            size += 1
+            level = levels.pop(id(node))
+            for child in node.children:
+                levels[id(child)] = level + 1
+            if level > height:
+                height = level
+            if node.kind is not None and node.kind.name == "subtree":
+                node.included = self._include(node, chain)
+                if node.included is not None:
+                    size += self._sizes.get(id(node.included), 0)
+                    below = level + self._heights.get(id(node.included), 0)
+                    if below > MAX_LEVELS:
+                        message = f"the tree unfolds to more than {MAX_LEVELS} levels of nodes"
+                        source.report("BT105", span_of(node.key), message)
+                        node.included = None
+                        below = level
+                    height = max(height, below)
+                if size > MAX_TREE_NODES:
+                    message = f"the tree unfolds to more than {MAX_TREE_NODES:,} nodes"
+                    source.report("BT105", span_of(node.key), message)
+                    break
+        self._sizes[id(document)] = min(size, MAX_TREE_NODES + 1)
+        self._heights[id(document)] = height
+        return document
+
+    def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:
+        wanted = node.values.get("subtree")
+        if not isinstance(wanted, str):
+            return None
+        written = node.written["subtree"]
+        path = self._find(wanted, written, node.source)
+        if path is None:
+            return None
+        key = _key(path)
+        if key in chain:
+            names = [step.name for step in chain[chain.index(key) :]] + [key.name]
+            text = f"the tree includes itself: {' -> '.join(names)}"
+            node.source.report("BT210", span_of(written), text)
+            return None
+        if len(chain) >= _MAX_CHAIN:
+            text = f"more than {_MAX_CHAIN} trees inside each other"
+            node.source.report("BT105", span_of(written), text)
+            return None
+        if (key, False) in self._documents:
+            included = self._documents[key, False]
+        else:
+            source = self._read(path, written, node.source)
+            included = None if source is None else self._open_tree(source, (*chain, key))
+        if included is not None and included.node.get("root") is None:
+            node.source.report("BT209", span_of(written), f"{path.name} holds no tree")
+            return None
+        return included
+
+    def _find(self, wanted: str, written: Node, source: Source) -> Path | None:
+        beside = source.path.parent if source.path is not None else None
+        try:
+            path = find_tree(wanted, beside=beside)
+        except TreeNotFoundError as error:
+            hint = package_here(wanted)
+            text = f"there is no tree {wanted!r}" if hint else str(error)
+            source.report("BT209", span_of(written), text, hint=hint)
+            return None
+        if path.suffix not in SUFFIXES and _is_file(path):
+            text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"
+            source.report("BT209", span_of(written), text)
+            return None
+        if refusal := source.refusal(path):
+            source.report("BT209", span_of(written), refusal)
+            return None
+        return path
+
+    def _read(self, path: Path, written: Node, source: Source) -> Source | None:
+        key = _key(path)
+        if key not in self._failed:
+            try:
+                opened = read_source(path, _shown(path, source), pipes=False)
+                opened.within = self._within
+                return opened
+            except DocumentError as error:
+                self._failed[key] = error
+        first = self._failed[key].findings[0]
+        if first.code != "BT101":  # which is told where it stands in that file
+            source.report("BT209", span_of(written), f"{path.name or path}: {first.message}")
+        return None
+
+    def _import(self, document: Document, chain: tuple[Path, ...]) -> None:
+        """Take over the actions, topics and defaults of the files a document imports."""
+        names = document.values.get("import")
+        written = document.node.get("import")
+        if not isinstance(names, list) or written is None:
+            return
+        nodes = written.items if isinstance(written, Listing) else [written]
+        defaults: dict[str, object] = {}
+        for name, node in zip(names, nodes, strict=True):
+            library = self._library(str(name), node, document.source, chain)
+            if library is None:
+                document.source.unread.names = True
+                continue
+            document.imported.append(library)
+            for theirs, ours in (
+                (library.actions, document.actions),
+                (library.topics, document.topics),
+            ):
+                for declared in theirs.values():
+                    self._take_over(declared, ours, node, document)
+            defaults = merged(defaults, library.defaults)
+        document.defaults = merged(defaults, document.defaults)
+
+    def _take_over(
+        self, declared: Declared, ours: dict[str, Declared], node: Node, document: Document
+    ) -> None:
+        there = ours.setdefault(declared.name, declared)
+        if there is declared or there.source is document.source:
+            return  # a document's own words win over those that it imports
+        document.source.report(
+            "BT216", span_of(node), f"{declared.name!r} is declared by two imports",
+            related=Related(there.place, "the other is here"),
+        )  # fmt: skip
+
+    def _library(
+        self, name: str, node: Node, source: Source, chain: tuple[Path, ...]
+    ) -> Document | None:
+        path = self._find(name, node, source)
+        if path is None:
+            return None
+        key = _key(path)
+        if key in chain:
+            names = [step.name for step in chain[chain.index(key) :]] + [key.name]
+            source.report("BT210", span_of(node), f"a cycle of imports: {' -> '.join(names)}")
+            return None
+        if len(chain) >= _MAX_FILES:
+            text = f"more than {_MAX_FILES} files inside each other"
+            source.report("BT105", span_of(node), text)
+            return None
+        if (key, True) in self._documents:
+            return self._documents[key, True]
+        opened = self._read(path, node, source)
+        if opened is None:
+            return None
+        self._sources.append(opened)
+        library = read_document(opened, library=True)
+        self._documents[key, True] = library
+        if library is not None:
+            self._import(library, (*chain, key))
+        return library
+
+
+def merged(base: object, over: object) -> dict[str, object]:
+    """Two mappings of settings as one, key by key to any depth; `over` wins."""
+    result = dict(base) if isinstance(base, dict) else {}
+    for name, value in (over if isinstance(over, dict) else {}).items():
+        earlier = result.get(name)
+        both = isinstance(earlier, dict) and isinstance(value, dict)
+        result[name] = merged(earlier, value) if both else value
+    return result
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
+def _key(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return path
+
+
+def _shown(path: Path, source: Source) -> str:
+    """The file's name as a person would write it: as short as the including file's."""
+    if source.path is not None and not Path(source.name).is_absolute():
+        try:
+            return str(path.resolve().relative_to(Path.cwd()))
+        except ValueError:
+            return str(path)
+    return str(path)

@@ -1,0 +1,294 @@
+"""The text of a document, read within bounds. No YAML here.
+
+Reading never takes more than `MAX_BYTES` of memory, whatever the path leads to.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import time
+import unicodedata
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+from bt_actions.document.findings import DocumentError, Finding, Related, Severity, Span
+from bt_actions.document.findings.rules import RULES
+
+if TYPE_CHECKING:
+    from bt_actions.document.yaml.nodes import Node
+
+__all__ = [
+    "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
+    "read_source", "read_stream", "source_of", "spoken",
+]  # fmt: skip
+
+MAX_BYTES = 32 * 1024 * 1024
+"""The largest file that is read; a tree of 100,000 nodes has about a third of it."""
+MAX_ERRORS = 1000
+"""After so many errors in a file the checker stops: each costs time to explain."""
+SUFFIXES = (".yaml", ".yml", ".json")
+"""How the files end that a tree may name."""
+PIPE_PATIENCE = 5.0
+"""Seconds in which somebody must begin to write to a named pipe that is to be read."""
+Char = tuple[str, int, int]
+"""A character of a text, and the line and column where it is written, from 1."""
+_PAIR = re.compile(
+    r"(?<!\\)((?:\\\\)*)\\u(d[89ab][0-9a-f]{2})\\u(d[c-f][0-9a-f]{2})", re.IGNORECASE
+)
+"""A character as JSON may write it, and YAML may not: as two halves of UTF-16."""
+_FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_UNSEEN = re.compile("[\xa0\u1680\u2000-\u200d\u202f\u205f\u2060\u3000\ufeff]")
+"""Looks like a space, or like nothing."""
+
+
+class TooManyErrors(Exception):
+    """A document has more errors than anybody wants to read: they are in its source.
+
+    Whoever catches it must refuse the document: what follows in it was not looked at.
+    """
+
+
+@dataclass(slots=True)
+class Unread:
+    """What was reported and is read no further; `unread.py` says what follows from it."""
+
+    nodes: list[Node] = field(default_factory=list)
+    meant: set[str] = field(default_factory=set)
+    """Names that unknown ones probably stand for."""
+    names: bool = False
+    """Whether any name may have been declared: in a file that is not there, as a loop's item."""
+    variables: bool = False
+    """Whether a variable is unknown, and nothing says which is meant."""
+    actions: bool = False
+    """Whether a node's kind is unknown."""
+
+
+@dataclass(slots=True, eq=False)
+class Source:
+    """A document's text, the name it is known by, and the findings in it so far."""
+
+    name: str
+    text: str
+    path: Path | None = None
+    findings: list[Finding] = field(default_factory=list)
+    anchored: bool = False
+    """Whether the text names parts of itself (&name); known after it was composed."""
+    root: Node | None = None
+    """The text as YAML nodes, after it was composed."""
+    unread: Unread = field(default_factory=Unread)
+    settled: set[Span] = field(default_factory=set)
+    """Scalars about which enough was said."""
+    decoded: tuple[Node, list[Char]] | None = None
+    """The scalar that inner.py was last asked about, and where its characters are written."""
+    within: tuple[Path, ...] | None = None
+    """The folders, resolved, in which every file must lie that it names; None: anywhere."""
+    files: dict[Path, object] = field(default_factory=dict)
+    """What was read for it from other files as data, or the ValueError that came of it."""
+    items: int = 0
+    """Of such data, each counted as often as the document names it."""
+    errors: int = 0
+    """How many of the findings keep the tree from running."""
+    _lines: list[str] | None = None
+    _commented: frozenset[int] | None = None
+
+    @property
+    def lines(self) -> list[str]:
+        """The lines, without their ends."""
+        if self._lines is None:
+            self._lines = self.text.splitlines() if self.text else []
+        return self._lines
+
+    def line(self, number: int) -> str | None:
+        """Line `number` (from 1), or None past the end."""
+        lines = self.lines
+        return lines[number - 1] if 0 < number <= len(lines) else None
+
+    @property
+    def commented(self) -> frozenset[int]:
+        """The numbers of the lines that hold a '#'."""
+        if self._commented is None:
+            numbers = enumerate(self.lines, 1) if "#" in self.text else ()
+            self._commented = frozenset(number for number, line in numbers if "#" in line)
+        return self._commented
+
+    def refusal(self, path: Path) -> str:
+        """Why it may not name this file, wherever links lead; or ""."""
+        if self.within is None:
+            return ""
+        try:
+            resolved = path.resolve()
+        except (OSError, RuntimeError):
+            return f"{path.name} cannot be found"
+        if any(resolved.is_relative_to(folder) for folder in self.within):
+            return ""
+        return f"{path.name} lies outside of the folders whose trees are served"
+
+    def report(
+        self,
+        code: str,
+        span: Span,
+        message: str,
+        *,
+        hint: str | None = None,
+        related: Related | None = None,
+    ) -> None:
+        """File a finding; its severity is its rule's. Raises TooManyErrors with `MAX_ERRORS`."""
+        if span in self.settled:
+            return
+        is_error = RULES[code].severity is Severity.ERROR
+        if is_error:
+            hint = self._unseen(code, span, message) or hint
+            if self.errors >= MAX_ERRORS:
+                raise TooManyErrors
+            self.errors += 1
+            if self.errors == MAX_ERRORS:
+                rest = f"after {MAX_ERRORS:,} errors the rest of a file is not checked"
+                hint = f"{hint}; {rest}" if hint else rest
+        line = self.line(span.line)
+        if (span.end_line, span.end_column) <= (span.line, span.column):
+            span = Span(span.line, span.column, span.line, span.column + 1)
+        self.findings.append(
+            Finding(
+                self.name, span.line, span.column, span.end_line, span.end_column, code,
+                RULES[code].severity, message, hint, related, line,
+            )
+        )  # fmt: skip
+        if is_error and self.errors == MAX_ERRORS:
+            raise TooManyErrors
+
+    def _unseen(self, code: str, span: Span, message: str) -> str | None:
+        """Name what only looks like a space, and may be why an error is found here.
+
+        Looked for in the indentation and the place itself; what is no YAML may go wrong anywhere
+        on the line, or the one above.
+        """
+        line = self.line(span.line) or ""
+        end = span.end_column - 1 if span.end_line == span.line else len(line)
+        parts = [line[: len(line) - len(line.lstrip())], line[span.column - 1 : end]]
+        if code == "BT102":
+            parts = [line, self.line(span.line - 1) or ""]
+        odd = _UNSEEN.search("\n".join(parts))
+        if odd is None or spoken(odd[0]) in message:
+            return None
+        return f"{spoken(odd[0])} stands here: type this without it"
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether anything found so far keeps the tree from running."""
+        return self.errors > 0
+
+
+def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> Source:
+    """The source in a file. Raises DocumentError when it cannot be read as text.
+
+    Whoever writes to a pipe may keep its reader waiting: with `pipes=False` none is read, as where
+    the path stands in a tree and was not given by the user.
+    """
+    name = name or str(path)
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise _unreadable(name, "this is a directory, not a tree")
+        if stat.S_ISFIFO(mode) and not pipes:
+            raise _unreadable(name, "this is a pipe, which a tree cannot name")
+        if stat.S_ISFIFO(mode):
+            return source_of(_read_pipe(path, name), name, path)
+        if not stat.S_ISREG(mode):
+            raise _unreadable(name, "this is no regular file")
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except DocumentError:  # is a ValueError, too
+        raise
+    except FileNotFoundError:
+        raise _unreadable(name, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
+    return source_of(data, name, path)
+
+
+def read_stream(stream: BinaryIO | None, name: str) -> Source:
+    """The source in a stream; None is one that is closed. Raises DocumentError as `read_source`."""
+    if stream is None:
+        raise _unreadable(name, "this is closed: there is nothing to read")
+    try:
+        data = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
+    return source_of(data, name)
+
+
+def _read_pipe(path: Path, name: str) -> bytes:
+    """What comes through a pipe (`<(command)` of a shell is one), once somebody writes to it.
+
+    Opening it the ordinary way would wait for a writer without end.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    with open(descriptor, "rb") as stream:  # noqa: PTH123 - a descriptor has no path
+        deadline = time.monotonic() + PIPE_PATIENCE
+        first = _first_bytes(descriptor)
+        while first == b"" and time.monotonic() < deadline:
+            time.sleep(0.01)  # nothing tells of a writer who has only opened the pipe
+            first = _first_bytes(descriptor)
+        if first == b"":
+            raise _unreadable(name, f"nobody wrote to this pipe within {PIPE_PATIENCE:g} s")
+        os.set_blocking(descriptor, True)
+        return (first or b"") + stream.read(MAX_BYTES + 1)
+
+
+def _first_bytes(descriptor: int) -> bytes | None:
+    """What is in a pipe; nothing when nobody writes to it, None when a writer is still thinking."""
+    try:
+        return os.read(descriptor, MAX_BYTES)
+    except BlockingIOError:
+        return None
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
+    """The source in some bytes. Raises DocumentError when they are no usable text."""
+    if len(data) > MAX_BYTES:
+        raise _unreadable(name, f"this is larger than {MAX_BYTES // 1024 // 1024} MiB")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8", "replace")
+        line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+        raise _unreadable(
+            name, f"byte 0x{data[error.start]:02x} is no UTF-8", "BT101", line, column
+        ) from None
+    if path is not None and path.suffix == ".json":
+        text = _PAIR.sub(_joined, text)
+    source = Source(name, text, path)
+    bad = _FORBIDDEN.search(text)
+    if bad is not None:
+        line = text.count("\n", 0, bad.start()) + 1
+        column = bad.start() - (text.rfind("\n", 0, bad.start()) + 1) + 1
+        raise _unreadable(
+            name, f"the character U+{ord(bad[0]):04X} cannot stand in a YAML text", "BT101",
+            line, column,
+        )  # fmt: skip
+    return source
+
+
+def spoken(char: str) -> str:
+    """What to call a character that nobody sees."""
+    known = {"\t": "a tab", "\n": "a line break"}.get(char)
+    return known or f"U+{ord(char):04X} ({unicodedata.name(char, 'no name').lower()})"
+
+
+def _joined(pair: re.Match[str]) -> str:
+    return pair[1] + bytes.fromhex(pair[2] + pair[3]).decode("utf-16-be")
+
+
+def _unreadable(
+    name: str, message: str, code: str = "BT100", line: int = 1, column: int = 1
+) -> DocumentError:
+    return DocumentError(
+        [Finding(name, line, column, line, column + 1, code, RULES[code].severity, message)]
+    )
