@@ -31,7 +31,7 @@ def handle(end: End, look_out_left: float | None, state: State = State.CANCELING
     """One whose server has gone."""
     goal = Goal(b"1" * 16, "/move", LIMITS, Now(0.0, 0.0))
     goal.outcome, goal.end, goal.state, goal.lost = Outcome.SERVER_LOST, end, state, True
-    line: Any = SimpleNamespace(way=SimpleNamespace(in_doubt=lambda _: 0.0))
+    line: Any = SimpleNamespace(route=SimpleNamespace(in_doubt=lambda _: 0.0))
     made = GoalHandle(goal, line, line, None, "m")
     made.look_out_left = look_out_left
     return made

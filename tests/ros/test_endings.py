@@ -115,7 +115,7 @@ def test_a_deadline_that_passes_while_it_is_looked_at_is_judged_at_the_next_look
         moments = [now]
         with monkeypatch.context() as patched:
             patched.setattr(handle.traffic.clocks, "now", lambda: moments.pop() if moments else due)
-            handle.line.poll(handle)
+            handle.endpoint.poll(handle)
         assert handle.goal.state is State.EXECUTING
     leaf.stop(Status.INVALID)
     leaf.shutdown()

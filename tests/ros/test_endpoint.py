@@ -233,7 +233,7 @@ def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -
     goal = SimpleNamespace(state=State.WAITING_FOR_SERVER, postpone=given.append)
     handle: Any = SimpleNamespace(goal=goal, kept_since=None, kept_for=0.0)
     holds_back = True
-    line: Any = SimpleNamespace(way=SimpleNamespace(holds_back=lambda _: holds_back))
+    line: Any = SimpleNamespace(route=SimpleNamespace(holds_back=lambda _: holds_back))
     for now in (1.0, 1.2, 1.5):
         ActionEndpoint._give_back_time(line, handle, now)
     holds_back = False
@@ -283,7 +283,7 @@ def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
         is_parents=False,
         traffic=SimpleNamespace(clocks=clocks),
         pump=lambda: None,
-        way=SimpleNamespace(in_doubt=lambda _: doubt, holds_back=lambda _: doubt > 0.0),
+        route=SimpleNamespace(in_doubt=lambda _: doubt, holds_back=lambda _: doubt > 0.0),
         _apply=lambda *_: None,
     )
     line._bear_with = partial(ActionEndpoint._bear_with, line)
@@ -440,7 +440,7 @@ def test_who_waits_on_another_node_is_told_when_a_goal_changes(changes: bool) ->
         __hash__ = object.__hash__
 
     def line_of(traffic: Any, *, waits: bool = True) -> Any:
-        return SimpleNamespace(traffic=traffic, way=SimpleNamespace(is_waited_for=lambda: waits))
+        return SimpleNamespace(traffic=traffic, route=SimpleNamespace(is_waited_for=lambda: waits))
 
     def traffic_of(name: str) -> Any:
         return Stub(notify=lambda _: woken.append(name), note=lambda _: None)
@@ -487,7 +487,7 @@ def test_probes_of_long_ago_are_forgotten() -> None:
 def test_a_paused_goal_whose_deadline_has_passed_does_not_keep_the_alarm_awake() -> None:
     goal = SimpleNamespace(due_in=lambda _: 0.0)
     handle = SimpleNamespace(goal=goal, paused_at=1.0, accounted_for=True)
-    line: Any = SimpleNamespace(_look_at=10.0, orphaned=False, way=SimpleNamespace(sight=None))
+    line: Any = SimpleNamespace(_look_at=10.0, orphaned=False, route=SimpleNamespace(second=None))
     line._look_out = lambda _: None
     line.goals, line.traffic = {b"1": handle}, SimpleNamespace(clocks=SimpleNamespace(now=list))
     line.mind, line._bound_the_lost = (lambda _: None), (lambda: None)
@@ -515,7 +515,7 @@ def test_who_has_just_come_in_sight_may_be_followed_by_a_server_that_was_lost() 
     line: Any = SimpleNamespace(in_sight_since=0.0)
     line.shares_server_with, line.has_lost = (lambda _: False), (lambda _: True)
     goal, of_ticket = SimpleNamespace(busy=Busy.WAIT), SimpleNamespace(in_sight_since=9.5)
-    handle: Any = SimpleNamespace(goal=goal, line=of_ticket)
+    handle: Any = SimpleNamespace(goal=goal, endpoint=of_ticket)
     assert ActionEndpoint.may_come_back_for(line, handle, 9.4 + BESIDE)
     assert not ActionEndpoint.may_come_back_for(line, handle, 9.6 + BESIDE)
 

@@ -84,7 +84,7 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     assert journal.ends() == ["canceled", "succeeded"]
     assert journal.max_live == 1
     until(nobody_looks)
-    until(lambda: not rediscovery._sights, what="the participant is taken away with its last line")
+    until(lambda: not rediscovery._participants, what="the participant is taken away with its last line")
 
 
 @pytest.mark.parametrize("canceled", [False, True], ids=["it ends", "it is canceled"])
@@ -149,7 +149,7 @@ def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
     monkeypatch.setattr(_domain(node), "lost_sight", True)
     for each in rediscovery._lookouts.values():
         monkeypatch.setattr(each, "_told", False)
-    monkeypatch.setattr(rediscovery, "Sight", refused)
+    monkeypatch.setattr(rediscovery, "SecondParticipant", refused)
     monkeypatch.setattr(rediscovery, "FIRST_AFTER", 0.01)
     monkeypatch.setattr(rediscovery, "PAUSE", 0.01)
     leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=1.5))
