@@ -84,7 +84,7 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     assert journal.ends() == ["canceled", "succeeded"]
     assert journal.max_live == 1
     until(nobody_looks)
-    until(lambda: not rediscovery._participants, what="the participant is taken away with its last line")
+    until(lambda: not rediscovery._participants, what="the participant goes with its last user")
 
 
 @pytest.mark.parametrize("canceled", [False, True], ids=["it ends", "it is canceled"])
