@@ -7,8 +7,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from collections.abc import Iterator
 from enum import IntEnum
+from typing import NoReturn
+
+from bt_actions.cli.streams.results import results
 
 
 class Exit(IntEnum):
@@ -37,17 +41,21 @@ class BadInput(Exception):
         self.prefixed = prefixed
 
 
-def no_ros(error: ImportError) -> BadInput:
-    """Return what to say where ROS cannot be imported.
+@contextlib.contextmanager
+def importing_ros() -> Iterator[None]:
+    """Turn an import of ROS that fails into BadInput.
 
     Raises KeyboardInterrupt where that is why: a C extension makes an ImportError of it.
     """
-    if isinstance(error.__cause__, KeyboardInterrupt):
-        raise error.__cause__
-    return BadInput(
-        f"ROS 2 cannot be imported ({error}); source your workspace, or install bt_actions with "
-        "its dependencies"
-    )
+    try:
+        yield
+    except ImportError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            raise error.__cause__ from None
+        raise BadInput(
+            f"ROS 2 cannot be imported ({error}); source your workspace, or install bt_actions "
+            "with its dependencies"
+        ) from error
 
 
 HIGHEST_DOMAIN = 232
@@ -72,3 +80,11 @@ def starting_ros() -> Iterator[None]:
         yield
     except RuntimeError as error:  # rclpy's RCLError
         raise BadInput(f"ROS 2 cannot start: {str(error).splitlines()[0]}") from error
+
+
+def leave(code: Exit) -> NoReturn:
+    """Exit at once: threads of rclpy still run, and its teardown would wait for them."""
+    for stream in (results(), sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):
+            stream.flush()
+    os._exit(code)

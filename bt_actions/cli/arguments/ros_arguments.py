@@ -10,7 +10,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.cli.exits import BadInput, no_ros
+from bt_actions.cli.exits import BadInput, importing_ros
 from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
@@ -38,10 +38,8 @@ def parameters(words: Sequence[str], namespace: str = "", name: str = "") -> dic
         return {}
     if "--" in words:
         raise BadInput("--ros-args: all that follows is for ROS; give --ros-args last, without --")
-    try:
+    with importing_ros():
         from bt_actions.ros.parameters import parameters_in
-    except ImportError as error:
-        raise no_ros(error) from error
 
     try:
         return parameters_in(words, namespace, name)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import namespace
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
-from bt_actions.cli.exits import Exit, no_ros, starting_ros
+from bt_actions.cli.exits import Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart, results
 from bt_actions.cli.streams.writing import note
 from bt_actions.utilities.plain_text import as_json, clean
@@ -46,10 +46,8 @@ def run(args: argparse.Namespace) -> int:
     """Ask all servers in sight, and print what they say."""
     parameters(args.ros_args, args.namespace)
     keep_results_apart()
-    try:
+    with importing_ros():
         from bt_actions.serving.asking import trees_in_sight
-    except ImportError as error:
-        raise no_ros(error) from error
     with starting_ros():
         found = trees_in_sight(args.namespace)
     trees = {

@@ -20,7 +20,7 @@ from bt_actions.cli.arguments.options import (
     speed,
 )
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
-from bt_actions.cli.exits import BadInput, Exit, no_ros, starting_ros
+from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart
 
 if TYPE_CHECKING:
@@ -171,10 +171,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _outlook() -> Outlook:
-    try:
+    with importing_ros():
         from bt_actions.ros.naming import Outlook
-    except ImportError as error:
-        raise no_ros(error) from error
     with starting_ros():
         return Outlook()
 

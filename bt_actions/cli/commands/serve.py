@@ -10,21 +10,19 @@ import argparse
 import os
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import namespace
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
-from bt_actions.cli.commands.sim import say
+from bt_actions.cli.driving.serving import say, serve
+from bt_actions.cli.driving.signals import SAME_WISH
 from bt_actions.cli.driving.sweep import sweep
-from bt_actions.cli.exits import BadInput, Exit, no_ros, refuse_domain, starting_ros
+from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, refuse_domain
 from bt_actions.cli.streams.writing import note
-from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
     from bt_actions.cli.arguments.parser import Subparsers
     from bt_actions.cli.driving.signals import Signals
     from bt_actions.serving import TreeServer
@@ -90,59 +88,23 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it, or the executor dies."""
     options = _options(args, parameters(args.ros_args, args.namespace, name=NAME))
-    try:
-        from bt_actions.cli.driving.drive import leave
-        from bt_actions.cli.driving.signals import SAME_WISH, Signals
-        from bt_actions.ros.spinning import Spinner
-    except ImportError as error:
-        raise no_ros(error) from error
-
     code = _clean_up()
     if code is not Exit.SUCCESS:
         return code
-    with Signals() as signals:
-        errors: list[BaseException] = []
-
-        def died(error: BaseException) -> None:
-            errors.append(error)
-            signals.poke()
-
-        with starting_ros():
-            spinner = Spinner(None, None, name=NAME, namespace=args.namespace,
-                              died=died)  # fmt: skip
-        server = None
-        try:
-            server = _server(spinner.node, options)
-            spinner.start()
-            if options["managed"]:
-                say(f"unconfigured: {spinner.node.get_fully_qualified_name()}")
-            else:
-                assert server.lifecycle is not None
-                server.lifecycle.change("configure")
-                server.lifecycle.change("activate")
-                say(_ready(server))
-            while not errors and not signals.wait(None)[0]:
-                pass
-        finally:
-            if server is not None:
-                _drain(server, signals, time.monotonic() + SAME_WISH)
-                if server.stuck:
-                    for each in (*server.unaccounted, *server.stuck):
-                        note(f"bt-actions serve: may still be running: {each}")
-                    leave(Exit.UNKNOWN)
-            spinner.stop(server.close if server is not None else lambda: None)
-        for each in server.unaccounted:
-            note(f"bt-actions serve: may still be running: {each}")
-        if errors:
-            note(f"bt-actions serve: the executor died: {raised(errors[0])}")
-            code = Exit.FAILURE
-        code = Exit.UNKNOWN if server.unaccounted else code
-        signals.settle(code)
-    return code
+    return serve(
+        "serve",
+        lambda node: _server(node, options),
+        announce=lambda server: _announce(server, managed=options["managed"]),
+        drain=_drain,
+        conclude=_conclude,
+        name=NAME,
+        namespace=args.namespace,
+    )
 
 
-def _drain(server: TreeServer, signals: Signals, not_before: float) -> None:
-    """Drain all; one more signal ends the wait, but not one before that moment."""
+def _drain(server: TreeServer, signals: Signals) -> None:
+    """Drain all; one more signal ends the wait, and a run that does not end then is left."""
+    not_before = time.monotonic() + SAME_WISH
     drained = threading.Event()
 
     def drain() -> None:
@@ -156,11 +118,25 @@ def _drain(server: TreeServer, signals: Signals, not_before: float) -> None:
     while not drained.is_set():
         if signals.wait(None)[0] and time.monotonic() > not_before:
             server.abandon()
+    if server.stuck:
+        _tell((*server.unaccounted, *server.stuck))
+        leave(Exit.UNKNOWN)
+
+
+def _conclude(server: TreeServer, code: Exit) -> Exit:
+    _tell(server.unaccounted)
+    return Exit.UNKNOWN if server.unaccounted else code
+
+
+def _tell(unaccounted: Iterable[str]) -> None:
+    for each in unaccounted:
+        note(f"bt-actions serve: may still be running: {each}")
 
 
 def _clean_up() -> Exit:
     """Cancel what a killed server left, where one is on record; other starts lose no time."""
-    from bt_actions.serving.underway import left_underway
+    with importing_ros():
+        from bt_actions.serving.underway import left_underway
 
     refuse_domain()
     try:
@@ -218,7 +194,7 @@ def _checked(name: str, value: object) -> object:
     return value
 
 
-def _server(node: Node, options: Mapping[str, Any]) -> TreeServer:
+def _server(node: Any, options: Mapping[str, Any]) -> TreeServer:
     from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 
     from bt_actions.document import TreeNotFoundError
@@ -244,12 +220,18 @@ def _server(node: Node, options: Mapping[str, Any]) -> TreeServer:
         raise BadInput(f"--trees: {error}") from error
 
 
-def _ready(server: TreeServer) -> str:
+def _announce(server: TreeServer, *, managed: bool) -> None:
+    if managed:
+        say(f"unconfigured: {server.node.get_fully_qualified_name()}")
+        return
+    assert server.lifecycle is not None
+    server.lifecycle.change("configure")
+    server.lifecycle.change("activate")
     entries = server.catalog.entries()
     broken = [each.name for each in entries if each.tree is None]
     more = f", {len(broken)} broken: {listing(broken)}" if broken else ""
     name = f"{server.node.get_namespace().rstrip('/')}/run_tree"
-    return f"ready: {name}, {len(entries) - len(broken)} trees{more}"
+    say(f"ready: {name}, {len(entries) - len(broken)} trees{more}")
 
 
 def _count(text: str) -> int:

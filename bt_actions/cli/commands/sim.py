@@ -7,18 +7,14 @@ standard output that nobody reads any more does not end it: it is a server.
 from __future__ import annotations
 
 import argparse
-import contextlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import namespace, seconds, speed
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
-from bt_actions.cli.exits import BadInput, Exit, starting_ros
-from bt_actions.cli.streams.writing import note
-from bt_actions.utilities.plain_text import raised
+from bt_actions.cli.driving.serving import say, serve
+from bt_actions.cli.exits import BadInput, Exit
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
     from bt_actions.cli.arguments.parser import Subparsers
     from bt_actions.simulation import Simulation, WorldEvent
 
@@ -103,45 +99,24 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it, or the executor dies."""
-    from bt_actions.cli.driving.signals import Signals
-    from bt_actions.ros.spinning import Spinner
-
     parameters(args.ros_args)
-    with Signals() as signals:
-        errors: list[BaseException] = []
+    return serve(
+        "sim",
+        lambda node: _simulation(node, args),
+        announce=lambda simulation: _announce(simulation, args),
+        conclude=_conclude,
+        name="simulation",
+        executor=args.executor,
+    )
 
-        def died(error: BaseException) -> None:
-            errors.append(error)
-            signals.poke()
 
-        with starting_ros():
-            spinner = Spinner(None, args.executor, name="simulation", died=died)
-        simulation = None
-        try:
-            simulation = _simulation(spinner.node, args)
-            spinner.start()
-            _announce(simulation, args)
-            caught: list[object] = []
-            while not caught and not errors:
-                caught.extend(signals.wait(None)[0])
-        finally:
-            spinner.stop(simulation.close if simulation else lambda: None)
-        if errors:
-            note(f"bt-actions sim: the executor died: {raised(errors[0])}")
-        else:
-            say(simulation.describe())
-        code = Exit.FAILURE if errors else Exit.SUCCESS
-        signals.settle(code)
+def _conclude(simulation: Simulation, code: Exit) -> Exit:
+    if code is Exit.SUCCESS:
+        say(simulation.describe())
     return code
 
 
-def say(text: str) -> None:
-    """Print a line at once, whether or not anybody reads it."""
-    with contextlib.suppress(OSError, ValueError):
-        print(text, flush=True)
-
-
-def _simulation(node: Node, args: argparse.Namespace) -> Simulation:
+def _simulation(node: Any, args: argparse.Namespace) -> Simulation:
     from bt_actions.simulation import FaultError, Simulation
 
     namespaces = args.namespace or [""]

@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from signal import Signals as Signal
-from typing import TYPE_CHECKING, NoReturn, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from py_trees.common import Status
 
@@ -324,14 +324,6 @@ class Drive:
         if self._stop is not None and self._stop.code is Exit.SIGPIPE and code is not Exit.UNKNOWN:
             return Exit.SIGPIPE
         return code
-
-
-def leave(code: Exit) -> NoReturn:
-    """Exit at once: threads of rclpy still run, and its teardown would wait for them."""
-    for stream in (results(), sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError):
-            stream.flush()
-    os._exit(code)
 
 
 def _pipe_of_stdout() -> int:

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Self, TypeVar
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.cli.driving.drive import Drive, Ended, leave
+from bt_actions.cli.driving.drive import Drive, Ended
 from bt_actions.cli.driving.presence import Presence
 from bt_actions.cli.driving.signals import Signals
 from bt_actions.cli.driving.simulated import Wanted, remark, wanted
-from bt_actions.cli.exits import BadInput, Exit, no_ros, starting_ros
+from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, starting_ros
 from bt_actions.cli.streams.patient_file import gap_text
 from bt_actions.cli.streams.patient_output import PatientOutput
 from bt_actions.cli.streams.results import results
@@ -69,10 +69,8 @@ class Session:
         """`outlook` is where the node is made, called `name`; it is the session's to close.
 
         Raises BadInput when ROS is not there or cannot start, or a fault fits no server."""
-        try:
+        with importing_ros():
             import bt_actions.ros.spinning  # noqa: F401 - the runner imports it late
-        except ImportError as error:
-            raise no_ros(error) from error
         from bt_actions.running.runner import TreeRunner as Runner
 
         self.report = Report(root)

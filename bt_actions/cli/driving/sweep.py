@@ -11,7 +11,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
 from bt_actions.cli.driving.signals import SAME_WISH, settle
-from bt_actions.cli.exits import BadInput, Exit, no_ros, refuse_domain
+from bt_actions.cli.exits import BadInput, Exit, importing_ros, refuse_domain
 from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note, write
 from bt_actions.utilities.suggest import listing
 
@@ -70,10 +70,8 @@ def _sweep(
     namespace: str,
 ) -> tuple[Swept, list[str], list[str]]:
     """Look, and cancel; return what was seen, goals of others, and actions that are missing."""
-    try:
+    with importing_ros():
         from bt_actions.recovery.sweep import CannotStart, cleanup
-    except ImportError as error:
-        raise no_ros(error) from error
 
     refuse_domain()
     foreign: list[str] = []
