@@ -14,7 +14,9 @@ from bt_actions.behaviours.variables import Var
 from bt_actions.document import load_tree
 from bt_actions.goals.attempts import AttemptRecord
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.running.runner import GoalReport, TreeError, TreeRunner
+from bt_actions.running.goals import GoalReport
+from bt_actions.running.loop import TreeError
+from bt_actions.running.runner import TreeRunner
 
 __all__ = [  # noqa: RUF022 - grouped by use
     # leaves

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import threading
-import time
 import weakref
 from collections.abc import Callable, Iterator
 
@@ -13,8 +10,6 @@ from py_trees.common import Status
 from py_trees.composites import Composite
 from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
-
-from bt_actions.utilities.places import path_of
 
 
 def tick_once(tree: BehaviourTree) -> None:
@@ -34,65 +29,6 @@ def tick_once(tree: BehaviourTree) -> None:
     for handler in tree.post_tick_handlers:
         handler(tree)
     tree.count += 1
-
-
-class Patience:
-    """How long a tick may take that should have been the last.
-
-    While a behaviour does not return from it, nobody else can stop the tree. So whoever minds the
-    tree's goals asks here, on any thread and at any time, whether they are wanted still.
-    """
-
-    GRACE = 1.0
-    """Seconds for a tick to return when the tree is to end."""
-
-    def __init__(self, told: Callable[[str], None]) -> None:
-        """`told` is called, once a run, with what does not return."""
-        self._told = told
-        self._ends_at: float | None = None
-        self._ticks_on: int | None = None
-        self.gave_up = False
-        """Whether it was so in this run: what the tree says since is of no account."""
-
-    def begin(self, ends_at: float | None) -> None:
-        """A run begins on this thread; it is to end at `ends_at` (time.monotonic), or some time."""
-        self._ticks_on, self._ends_at, self.gave_up = threading.get_ident(), ends_at, False
-
-    def end_now(self) -> None:
-        """The run is to end; safe in a signal handler."""
-        ends_at, now = self._ends_at, time.monotonic()
-        self._ends_at = now if ends_at is None else min(ends_at, now)
-
-    def end(self) -> None:
-        """The last tick is over, and so is all that a behaviour does when it is stopped."""
-        self._ticks_on = None
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the last tick should have been over for long; safe in a signal handler."""
-        ends_at = self._ends_at
-        if self._ticks_on is None or ends_at is None:
-            return False
-        return time.monotonic() - ends_at >= self.GRACE
-
-    def gives_up(self) -> bool:
-        """Whether nobody waits for the last tick any more."""
-        if not self.is_over:
-            return False
-        if not self.gave_up:
-            self.gave_up = True
-            self._told(f"{self._stuck_in()} does not return from its tick: canceling all goals")
-        return True
-
-    def _stuck_in(self) -> str:
-        """Name the innermost behaviour that the ticking thread is in."""
-        frame = sys._current_frames().get(self._ticks_on or 0)  # noqa: SLF001 - documented
-        while frame is not None:
-            behaviour = frame.f_locals.get("self")
-            if isinstance(behaviour, Behaviour):
-                return "/".join(path_of(behaviour))
-            frame = frame.f_back
-        return "the tree"
 
 
 class Misbehaviour(Exception):

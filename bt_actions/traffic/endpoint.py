@@ -264,21 +264,9 @@ class ActionEndpoint:
         in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
         goal.hold(max(answers, in_doubt), now, in_all)
 
-    @staticmethod
-    def given_up(handle: GoalHandle) -> bool:
-        """Whether whoever began it has given it up; not where all stood still: a tick may return.
-
-        In this order: to ask is to give up.
-        """
-        still = alarm.stalls
-        cause = still.answers_take(time.monotonic()) > 0.0
-        return not handle.spared.bears(still, cause=cause) and handle.given_up
-
     def mind(self, handle: GoalHandle) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""
         try:
-            if self.given_up(handle):
-                self.tell(handle, Event.INTERRUPTED)
             self.poll(handle)
         except Exception as error:  # noqa: BLE001 - a mistake of ours: any
             self._warn_once("a goal could not be minded", error)

@@ -10,7 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
@@ -105,13 +105,6 @@ def disown() -> None:
     ledger.disown()
 
 
-class Beginner(Protocol):
-    """On whose behalf goals are begun: a runner of trees."""
-
-    def gives_up(self) -> bool:
-        """Whether it wants none of its goals any more, and cannot tell them so by itself."""
-
-
 @dataclass(eq=False, slots=True)
 class GoalHandle:
     """A goal on its way, with what its owner and its server need to know."""
@@ -125,8 +118,8 @@ class GoalHandle:
     """The leaf; None where it is gone, and a second server has taken its goal, too."""
     name: str
     """The leaf's."""
-    begun_by: Beginner | None = None
-    """What `Traffic.begun_by` said at the time; None where nobody did."""
+    begun_in: object = None
+    """What was ticking at the time (traffic/begun.py); None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
@@ -147,19 +140,10 @@ class GoalHandle:
     lease, or not be discovered yet. Both in seconds of the steady clock."""
 
     hidden: Leniency = field(init=False, default_factory=Leniency)
-    """With servers that are out of sight;"""
-
-    spared: Leniency = field(init=False, default_factory=Leniency)
-    """and with a run that seems to have given it up. Both after stalls of this process."""
+    """With servers that are out of sight, after stalls of this process."""
 
     def __post_init__(self) -> None:
         self.replies = Replies(self.goal)
-
-    @property
-    def given_up(self) -> bool:
-        """Whether it is to be interrupted, though no leaf has said so."""
-        begun_by = self.begun_by
-        return self.goal.outcome is None and begun_by is not None and begun_by.gives_up()
 
     @property
     def accounted_for(self) -> bool:

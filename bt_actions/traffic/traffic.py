@@ -15,10 +15,9 @@ from __future__ import annotations
 import atexit
 import contextlib
 import os
-import threading
 import time
 import weakref
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rclpy.expand_topic_name import expand_topic_name
@@ -35,10 +34,10 @@ from bt_actions.ros.log import log
 from bt_actions.ros.signals import ended_by_signals, insists
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import alarm, shared
+from bt_actions.traffic.begun import begun_in
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.shared import (
-    Beginner,
     Change,
     GoalHandle,
     Observer,
@@ -53,7 +52,6 @@ IN_FLIGHT = 8
 """Goal requests of this process under way at a server; its queue holds 10, and drops what is over
 silently."""
 _ON_NODE = "_bt_actions_traffic"
-_begins = threading.local()
 _contexts: weakref.WeakKeyDictionary[Any, _Participant] = weakref.WeakKeyDictionary()
 _closing = False  # the process ends: a tree that ticks on begins nothing any more
 
@@ -157,17 +155,6 @@ class Traffic:
 
     # A leaf's calls
 
-    @staticmethod
-    @contextlib.contextmanager
-    def begun_by(who: Beginner) -> Iterator[None]:
-        """Have what this thread begins meanwhile known as begun by `who` (GoalHandle.begun_by)."""
-        before = _who_begins()
-        _begins.who = who
-        try:
-            yield
-        finally:
-            _begins.who = before
-
     def begin(
         self,
         endpoint: ActionEndpoint,
@@ -192,9 +179,9 @@ class Traffic:
                 new_goal_id(), endpoint.name, timeouts, now,
                 resources=held, busy=busy, settles=settles,
             )  # fmt: skip
-            who = _who_begins()
+            began = begun_in.get()
             handle = GoalHandle(
-                goal, endpoint, self, owner, owner.name, who, attempt, keeps_feedback
+                goal, endpoint, self, owner, owner.name, began, attempt, keeps_feedback
             )
             handle.begun_at = time.monotonic()
             endpoint.goals[goal.id] = handle
@@ -228,7 +215,7 @@ class Traffic:
             if handle.goal.state is State.DONE:
                 return
             endpoint.poll(handle)
-            if _closing or endpoint.given_up(handle):
+            if _closing:
                 endpoint.tell(handle, Event.INTERRUPTED)
             if handle.goal.state is not State.WAITING_FOR_SERVER:
                 return
@@ -257,7 +244,7 @@ class Traffic:
         endpoint = handle.endpoint
         return (
             handle.goal.state is State.WAITING_FOR_SERVER
-            and not (_closing or endpoint.given_up(handle))
+            and not _closing
             and not endpoint.route.holds_back(time.monotonic())
             and not endpoint.orphaned
             and is_valid(self.node)
@@ -378,10 +365,6 @@ class Traffic:
                 alarm.forget(endpoint)
             setattr(self.node, _ON_NODE, None)
             ledger.close()
-
-
-def _who_begins() -> Beginner | None:
-    return getattr(_begins, "who", None)
 
 
 @atexit.register

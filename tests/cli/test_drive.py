@@ -21,8 +21,8 @@ from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.words import Closing
 from bt_actions.events import Event
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.running.goals import GoalReport
 from bt_actions.running.report import Report
-from bt_actions.running.runner import GoalReport
 from tests.cli.fakes import FakeAction, FakeRunner, Story
 from tests.support.waiting import until
 

@@ -34,7 +34,7 @@ from bt_actions.running.report import Report
 
 if TYPE_CHECKING:
     from bt_actions.events import Event
-    from bt_actions.running.runner import GoalReport
+    from bt_actions.running.goals import GoalReport
 
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""

@@ -35,7 +35,8 @@ from bt_actions.running.report import Report
 if TYPE_CHECKING:
     from bt_actions.events import Event
     from bt_actions.ros.naming import Outlook
-    from bt_actions.running.runner import GoalReport, TreeRunner
+    from bt_actions.running.goals import GoalReport
+    from bt_actions.running.runner import TreeRunner
     from bt_actions.simulation.faults import Fault
     from bt_actions.simulation.world import Part
 
@@ -252,7 +253,7 @@ def _bug(error: BaseException | None) -> str:
     """One line about an exception in a behaviour, with the place in the user's code."""
     if error is None:
         return ""
-    from bt_actions.running.runner import TreeError
+    from bt_actions.running.loop import TreeError
 
     cause = error.__cause__ or error
     frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)

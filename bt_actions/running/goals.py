@@ -1,0 +1,128 @@
+"""The goals of a tree's runs: which are its own, what is told of them, which are unaccounted for.
+
+A goal is the tree's where it began in one of its ticks, wherever its leaf is by now, or where its
+leaf is in the tree. Changes are noted on any thread, and told on the one that ticks. Sends nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from py_trees.trees import BehaviourTree
+
+from bt_actions.events import GoalChanged
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.traffic.begun import begun_in
+from bt_actions.utilities.places import root_of
+
+if TYPE_CHECKING:
+    from bt_actions.traffic.shared import Change, GoalHandle
+
+
+@dataclass(frozen=True, slots=True)
+class GoalReport:
+    """A goal that nobody can account for: it may still be running."""
+
+    name: str
+    server: str
+    goal_id: str
+    outcome: Outcome | None
+    reason: str
+
+
+class RunGoals:
+    """The goals of one tree, until each is over."""
+
+    def __init__(
+        self,
+        tree: BehaviourTree,
+        emit: Callable[[GoalChanged], None],
+        wake: Callable[[], None],
+        minded: Callable[[], None],
+    ) -> None:
+        """`wake` is called where there is something to tell, or to read.
+
+        `minded` is called, under the lock of the traffic, where one of ours has changed.
+        """
+        self._tree, self._emit, self._wake, self._minded = tree, emit, wake, minded
+        self._changes: deque[Change] = deque()
+        self._handles: set[GoalHandle] = set()
+        self.run_goes_on = False
+        """Between two runs only what earlier ones have left is of interest."""
+
+    @contextlib.contextmanager
+    def begun_here(self) -> Iterator[None]:
+        """What this thread begins meanwhile is ours."""
+        before = begun_in.set(self)
+        try:
+            yield
+        finally:
+            begun_in.reset(before)
+
+    @property
+    def not_over(self) -> list[GoalHandle]:
+        """Those that something is left to wait for."""
+        return [handle for handle in list(self._handles) if not handle.is_over]
+
+    @property
+    def wanted(self) -> list[GoalHandle]:
+        """Those that a leaf waits for."""
+        return [handle for handle in list(self._handles) if handle.goal.outcome is None]
+
+    @property
+    def unaccounted(self) -> list[GoalReport]:
+        """Those whose end is UNKNOWN, by now."""
+        return [
+            GoalReport(
+                handle.name,
+                handle.goal.server,
+                handle.goal.id.hex(),
+                handle.goal.outcome,
+                f"{handle.goal.reason}{handle.goal.cancel_said}",
+            )
+            for handle in list(self._handles)
+            if handle.goal.end is End.UNKNOWN
+            and (handle.goal.outcome is not None or not self.run_goes_on)
+        ]
+
+    def note(self, change: Change | None) -> None:
+        """Take note of a change of a goal of our node; called under the lock of the traffic."""
+        if change is not None and self._is_ours(change.handle):
+            self._handles.add(change.handle)
+            self._changes.append(change)
+            self._minded()
+        elif not self.run_goes_on:
+            return
+        self._wake()
+
+    def _is_ours(self, handle: GoalHandle) -> bool:
+        if handle in self._handles or (handle.begun_in is self and not handle.is_over):
+            return True  # a second server's share of one that is over is news
+        if not self.run_goes_on:
+            return False
+        owner = handle.owner
+        return handle.begun_in is self or (owner is not None and root_of(owner) is self._tree.root)
+
+    def tell(self, now: float) -> None:
+        """Tell what was noted, and forget what is over."""
+        while self._changes:
+            change = self._changes.popleft()
+            handle = change.handle
+            if handle.owner is not None:  # else its leaf was thrown away since
+                self._emit(
+                    GoalChanged(
+                        now,
+                        handle.owner,
+                        change.state.value,
+                        handle.attempt,
+                        change.outcome,
+                        change.end,
+                        change.reason,
+                        handle.goal.id.hex(),
+                    )
+                )
+            self._handles.difference_update([each for each in list(self._handles) if each.is_over])

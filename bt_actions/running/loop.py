@@ -1,0 +1,382 @@
+"""When to tick a tree, and how a run of it ends: one step after another, at times that are given.
+
+Ticks when something has happened, when a deadline falls due, and again at once while each tick
+changes a status; a heartbeat covers behaviours that only watch the clock. Whatever ends a run (an
+outcome, an interrupt, a timeout, an exception), the tree's goals are drained before it is over. No
+thread, no wait, no ROS: a thread steps it, or a test in virtual time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Duration, Status
+from py_trees.trees import BehaviourTree
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeStarted
+from bt_actions.running.goals import RunGoals
+from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, SetUp, tick_once
+from bt_actions.running.watchdog import Watchdog
+from bt_actions.utilities.places import culprit_of, path_of
+from bt_actions.utilities.plain_text import raised
+from bt_actions.utilities.stepping import Done, Sleep
+
+if TYPE_CHECKING:
+    from bt_actions.traffic.shared import GoalHandle
+    from bt_actions.traffic.traffic import Traffic
+
+BURST = 1000
+"""Ticks in a row, at most, while each changes a status."""
+LONGEST_WAIT = 3600.0
+"""Seconds, at most, between two looks at the tree, whatever the heartbeat is."""
+
+
+class TreeError(Exception):
+    """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
+
+
+class Draining(Protocol):
+    """Goals that are seen to their ends."""
+
+    def step(self, now: float, *, hurry: bool) -> Sleep | Done[Any]:
+        """Go on with it; with `hurry`, wait for nothing any more."""
+
+
+class Log(Protocol):
+    """Takes lines from any thread, and never waits."""
+
+    def warning(self, text: str) -> None:
+        """Of what should not be."""
+
+    def error(self, text: str) -> None:
+        """Of what must not be."""
+
+    def flush(self) -> None:
+        """Have what was said written, before more is told by other ways."""
+
+
+class _Abandoned(BaseException):
+    """Ends a tick."""
+
+
+class TickLoop:
+    """Runs one tree, again and again: `begin`, then `step` until it returns Done or raises.
+
+    Between two steps it wants to be left alone for as long as the first one says, or until `wake`
+    is called; a step that comes earlier does no harm.
+    """
+
+    def __init__(
+        self,
+        tree: BehaviourTree,
+        traffic: Traffic,
+        *,
+        node: Any,
+        steady: Callable[[], float],
+        drain: Callable[[list[GoalHandle]], Draining],
+        log: Log,
+        heartbeat: float = 0.1,
+        wake: Callable[[], None] = lambda: None,
+        ready: Callable[[], None] = lambda: None,
+        check: Callable[[], None] = lambda: None,
+        misbehaved: Callable[[], str] = lambda: "",
+    ) -> None:
+        """Let it run on what `node` stands for, which each behaviour is set up with.
+
+        Args:
+            tree: what is ticked.
+            traffic: of the node: where the tree's goals go.
+            node: what each behaviour is set up with.
+            steady: the steady clock that the times given to it are of.
+            drain: begins to see goals to their ends.
+            log: where lines go.
+            heartbeat: seconds after which it ticks though nothing has happened.
+            wake: is called on any thread, and in signal handlers, where a step is wanted now.
+            ready: is called in each run when the tree is set up, before the first tick.
+            check: is called before each tick; what it raises ends the run.
+            misbehaved: is asked after each behaviour's tick what that did wrong.
+        """
+        self.tree, self.heartbeat = tree, heartbeat
+        self._traffic, self._node, self._log = traffic, node, log
+        self._drain_of, self._wake = drain, wake
+        self._ready, self._check, self._misbehaved = ready, check, misbehaved
+        self._observers: list[Observer] = []
+        self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.mind())
+        self.watchdog = Watchdog(traffic, self.goals, steady, log.warning)
+        self._visitor = ChangeVisitor(self._set_up_rest, self._after_each)
+        self._set_up = SetUp()
+        self._doing = "setup"
+        self._stop_wanted = self.abandoned = self._pause_wanted = self._paused = False
+        self._leaving: BaseException | None = None
+        """What an observer, or a terminate(), raised to end the program: after the drain."""
+        self._has_begun = False
+        self._timeout: float | None = None
+        self._deadline = math.inf
+        self._now = 0.0
+        self._burst = 0
+        self._status = Status.INVALID
+        self._error: BaseException | None = None
+        self._drain: Draining | None = None
+        traffic.observe(self.goals.note)
+
+    def observe(self, callback: Observer) -> None:
+        """Call `callback` with each event, in the step; one that raises is removed."""
+        self._observers.append(callback)
+
+    # What anybody may ask for, on any thread
+
+    def interrupt(self, now: float, *, abandon: bool = False) -> None:
+        """End the run, or the next one; with `abandon`, also the drain. Safe in a handler."""
+        self.abandoned = self.abandoned or abandon
+        self.watchdog.end_by(now)
+        self._stop_wanted = True  # after it: where this run ends in between, the next is stopped
+        self._wake()
+
+    def pause(self, wanted: bool) -> None:
+        """Stop ticking, or tick on."""
+        self._pause_wanted = wanted
+        self._wake()
+
+    def is_to_end(self, now: float) -> bool:
+        """Whether the run was interrupted, or is out of time."""
+        return self._stop_wanted or now >= self._deadline
+
+    # A run
+
+    def begin(self, now: float, timeout: float | None = None) -> None:
+        """Begin a run on this thread, which is to end within `timeout` seconds."""
+        self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
+        self._leaving = self._error = self._drain = None
+        self._has_begun, self._status, self._burst = False, Status.INVALID, 0
+        self.goals.run_goes_on = True
+        self.watchdog.begin(self._deadline)
+
+    def step(self, now: float) -> Sleep | Done[Status]:
+        """Do what is to be done now (seconds, steady clock).
+
+        Returns how long there is nothing to do, unless something wakes it; in the end the tree's
+        status, INVALID when interrupted. In the end it raises, too: TimeoutError out of time, a
+        TreeError where a behaviour raised or had no status, or what else has ended the run.
+        """
+        self._now = now
+        if self._drain is None:
+            try:
+                if (seconds := self._go_on()) is not None:
+                    return Sleep(seconds)
+            except BaseException as error:  # noqa: BLE001 - raised again after the drain
+                self.fail(error)
+            self._stop()
+        return self._wind_up()
+
+    def fail(self, error: BaseException) -> None:
+        """Have the next step end the run, which raises `error` after the drain.
+
+        Raises it at once where that has begun.
+        """
+        if self._drain is not None:
+            raise error
+        self._error, self._status = error, Status.INVALID
+
+    def rest(self) -> None:
+        """Take note that the run is over; the caller holds the lock of the traffic."""
+        self._stop_wanted = self.abandoned = self._pause_wanted = False
+        self.goals.run_goes_on = False
+
+    def _go_on(self) -> float | None:
+        """Tick if that is wanted; return the seconds until the next look, None at the end."""
+        if self._error is not None:
+            return None
+        if not self._has_begun:
+            self._has_begun = True
+            self._visitor.forget()
+            self.tree.visitors.append(self._visitor)
+            self._guarded(self._set_up_all)
+            self._ready()
+            self._emit(TreeStarted(self._now))
+        self._check()
+        if self.is_to_end(self._now):
+            return None
+        self.goals.tell(self._now)
+        changed = False
+        if not self._held():
+            changed = self._tick()
+            if self.watchdog.gave_up:
+                return None
+            if self.tree.root.status in (Status.SUCCESS, Status.FAILURE):
+                self._status = self.tree.root.status
+                return None
+        self._burst = self._burst + 1 if changed else 0
+        if 0 < self._burst < BURST:
+            return 0.0
+        self._burst = 0
+        dues = [] if self._paused else self._dues()
+        return min(self.heartbeat, LONGEST_WAIT, *dues, max(0.0, self._deadline - self._now))
+
+    def _set_up_all(self) -> None:
+        """Set up the tree, in the first run, or what is new in it."""
+        self._doing = "setup"
+        tree = self.tree
+        if type(tree).setup is not BehaviourTree.setup and not self._set_up.has_begun:
+            tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
+            for _ in self._set_up.missing(tree.root):
+                pass
+        for behaviour in self._set_up.missing(tree.root):
+            behaviour.setup(node=self._node)
+        self._doing = "tick"
+
+    def _set_up_rest(self) -> None:
+        if not self._set_up.is_complete(self.tree.root):
+            self._set_up_all()
+
+    def _tick(self) -> bool:
+        """Tick once, and tell whether that changed a status."""
+        self._visitor.begin()
+        try:
+            with self.goals.begun_here():
+                self._guarded(lambda: tick_once(self.tree))
+        except _Abandoned:
+            pass
+        finally:
+            changed = self._visitor.finish()
+            self.goals.tell(self._now)
+            self._tell(changed)
+        return bool(changed)
+
+    def _after_each(self) -> str:
+        if self.watchdog.gives_up():
+            raise _Abandoned
+        return self._misbehaved()
+
+    def _dues(self) -> list[float]:
+        """The deadlines that running behaviours have of their own, as seconds from now."""
+        dues = []
+        for node in self._visitor.running:
+            due_in = getattr(node, "due_in", None)
+            due = due_in() if callable(due_in) else None
+            if isinstance(due, int | float):
+                dues.append(max(due, 0.001))
+        return dues
+
+    def _held(self) -> bool:
+        """Whether the tree is paused; carries a change of that over to goals not sent yet."""
+        if self._pause_wanted != self._paused:
+            self._paused = self._pause_wanted
+            (self._traffic.pause if self._paused else self._traffic.resume)(self.goals.not_over)
+        return self._paused
+
+    def _guarded(self, step: Callable[[], None]) -> None:
+        try:
+            step()
+        except Exception as error:
+            culprit = culprit_of(error)
+            where = f"{'/'.join(path_of(culprit))}" if culprit is not None else self.tree.root.name
+            if isinstance(error, Misbehaviour):
+                raise TreeError(f"{where}: {error}") from None
+            what = f"{self._doing} raised {type(error).__name__}: {error}"
+            raise TreeError(f"{where}: {what}") from error
+
+    # Its end
+
+    def _stop(self) -> None:
+        """Stop what still runs, and begin to drain."""
+        if self._visitor in self.tree.visitors:
+            self.tree.visitors.remove(self._visitor)
+        if self._paused:
+            self._traffic.resume(self.goals.not_over)
+            self._paused = False
+        self.goals.tell(self._now)  # a goal may have begun in a tick that raised
+        root = self.tree.root
+        if any(node.status is Status.RUNNING for node in root.iterate()):  # not the root, then
+            try:
+                root.stop(Status.INVALID)
+            except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
+                self._log.error(f"terminate of a behaviour raised: {raised(error)}")
+                self._leave_with(error)
+                self._let_go(culprit_of(error))
+        self.watchdog.end()
+        self._drain = self._drain_of(self.goals.not_over)
+
+    def _let_go(self, culprit: Behaviour | None) -> None:
+        """Stop what a terminate() that raised has kept from it, and interrupt every action."""
+        for node in self.tree.root.iterate():
+            if node.status is Status.RUNNING:
+                try:
+                    if node is not culprit:
+                        node.terminate(Status.INVALID)
+                except BaseException as error:  # noqa: BLE001 - the user's: any
+                    self._log.error(f"terminate of {node.name} raised: {raised(error)}")
+                    self._leave_with(error)
+                node.status = Status.INVALID
+            if isinstance(node, ActionBehaviour):
+                ActionBehaviour.terminate(node, Status.INVALID)
+
+    def _wind_up(self) -> Sleep | Done[Status]:
+        """Drain the tree's goals, and tell."""
+        assert self._drain is not None
+        self.goals.tell(self._now)
+        step = self._drain.step(self._now, hurry=self.abandoned)
+        self.goals.tell(self._now)
+        if isinstance(step, Sleep):
+            return step
+        self._tell(self._visitor.stopped())
+        self._log.flush()  # who tells of the end tells it last
+        self._emit(TreeFinished(self._now, self._status))
+        self.raise_what_ended_it()
+        if self._status is Status.INVALID and self._timeout is not None and not self._stop_wanted:
+            raise TimeoutError(f"{self.tree.root.name} did not finish within {self._timeout:g} s")
+        return Done(self._status)
+
+    def raise_what_ended_it(self) -> None:
+        """Raise what has ended the run, or is to end the program, if anything has; once."""
+        error, self._error, self._leaving = self._error or self._leaving, None, None
+        try:
+            if error is not None:
+                raise error
+        finally:
+            del error
+
+    def shutdown(self) -> None:
+        """Shut the tree down, if it was set up here: else another one may run it."""
+        if not self._set_up.has_begun:
+            return
+        try:
+            self.tree.shutdown()
+        except Exception as error:  # noqa: BLE001 - the user's: any
+            self._log.error(f"shutdown of a behaviour raised: {raised(error)}")
+            for behaviour in self.tree.root.iterate():  # ours must let go all the same
+                if isinstance(behaviour, ActionBehaviour):
+                    try:
+                        behaviour.shutdown()
+                    except Exception as again:  # noqa: BLE001 - the user's: any
+                        self._log.error(f"shutdown of {behaviour.name} raised: {raised(again)}")
+
+    def close(self, now: float) -> None:
+        """Listen to goals no more, and tell what has only now become known of them."""
+        self._traffic.unobserve(self.goals.note)
+        self.goals.tell(now)
+
+    # Who is told
+
+    def _tell(self, changes: list[tuple[Behaviour, Status]]) -> None:
+        for node, status in changes:
+            message = node.feedback_message
+            self._emit(NodeChanged(self._now, path_of(node), node, status, message))
+
+    def _emit(self, event: Event) -> None:
+        for observer in list(self._observers):
+            try:
+                observer(event)
+            except BaseException as error:  # noqa: BLE001 - the run goes on without it
+                self._observers.remove(observer)
+                self._log.error(f"an observer raised and was removed: {raised(error)}")
+                self._leave_with(error)
+
+    def _leave_with(self, error: BaseException) -> None:
+        """End the run, and then raise what is meant to end the program, as SystemExit is."""
+        if not isinstance(error, Exception):
+            self._leaving, self._stop_wanted = error, True
+            self._wake()
