@@ -49,6 +49,7 @@ class RunGoals:
         `minded` is called, under the lock of the traffic, where one of ours has changed.
         """
         self._tree, self._emit, self._wake, self._minded = tree, emit, wake, minded
+        self._token = object()  # in ours, which outlive the tree
         self._changes: deque[Change] = deque()
         self._handles: set[GoalHandle] = set()
         self.run_goes_on = False
@@ -57,7 +58,7 @@ class RunGoals:
     @contextlib.contextmanager
     def begun_here(self) -> Iterator[None]:
         """What this thread begins meanwhile is ours."""
-        before = begun_in.set(self)
+        before = begun_in.set(self._token)
         try:
             yield
         finally:
@@ -100,12 +101,14 @@ class RunGoals:
         self._wake()
 
     def _is_ours(self, handle: GoalHandle) -> bool:
-        if handle in self._handles or (handle.begun_in is self and not handle.is_over):
+        if handle in self._handles or (handle.begun_in is self._token and not handle.is_over):
             return True  # a second server's share of one that is over is news
         if not self.run_goes_on:
             return False
         owner = handle.owner
-        return handle.begun_in is self or (owner is not None and root_of(owner) is self._tree.root)
+        return handle.begun_in is self._token or (
+            owner is not None and root_of(owner) is self._tree.root
+        )
 
     def tell(self, now: float) -> None:
         """Tell what was noted, and forget what is over."""

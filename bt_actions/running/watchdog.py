@@ -68,12 +68,16 @@ class Watchdog:
         return self._ticks_on is not None and now - self._grace_from >= GRACE
 
     def gives_up(self) -> bool:
-        """Whether nobody waits for the last tick any more."""
+        """Whether nobody waits for the rest of this thread's tick any more."""
         endless = self._grace_from == math.inf  # as it mostly is, and a clock takes time
-        if not self.gave_up and not endless and self.is_overdue(self._steady()):
+        if not endless and self.is_overdue(self._steady()) and not self._goals.wanted:
+            self._give_up()  # else it is looked at, and whether this process stood still
+        return self.gave_up
+
+    def _give_up(self) -> None:
+        if not self.gave_up:
             self.gave_up = True
             self._warn(f"{self._stuck_in()} does not return from its tick: canceling all goals")
-        return self.gave_up
 
     def mind(self) -> None:
         """Look at the goals until none is wanted; the caller holds the lock."""
@@ -91,7 +95,8 @@ class Watchdog:
         if now - self._looked_at > LOOK + LATE and now >= self._ends_at and self._spared < SPARED:
             self._spared, self._grace_from = self._spared + 1, now
         self._looked_at = now
-        if wanted and self.gives_up():
+        if wanted and self.is_overdue(now):
+            self._give_up()
             for handle in wanted:
                 self._traffic.interrupt(handle)
         return LOOK

@@ -324,50 +324,6 @@ def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
     assert not ActionEndpoint._is_hidden(line, handle)
 
 
-def test_nobody_is_asked_whether_a_goal_is_wanted_where_a_tick_may_return(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Who is asked gives it up."""
-    asked: list[None] = []
-
-    class Asked:
-        spared = Leniency()
-
-        @property
-        def given_up(self) -> bool:
-            asked.append(None)
-            return True
-
-    still = Stalls()
-    still.lives(time.monotonic() - 2.0)
-    monkeypatch.setattr(alarm, "stalls", still)
-    assert not ActionEndpoint.given_up(Asked())  # type: ignore[arg-type]
-    assert not asked
-    monkeypatch.setattr(alarm, "stalls", Stalls())
-    assert ActionEndpoint.given_up(Asked())  # type: ignore[arg-type]
-
-
-def test_a_tick_that_stands_still_again_and_again_is_given_up_in_the_end(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """It holds Python's lock for half a second at a time, say."""
-    still = Stalls()
-    monkeypatch.setattr(alarm, "stalls", still)
-    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
-    handle: Any = SimpleNamespace(given_up=True, spared=Leniency())
-    still.lives(moment := 10.0)
-    for _ in range(AT_MOST):
-        still.lives(moment := moment + 0.5)
-        assert not ActionEndpoint.given_up(handle)
-    still.lives(moment := moment + 0.5)
-    assert ActionEndpoint.given_up(handle)
-    for _ in range(20):
-        still.lives(moment := moment + 0.1)
-    assert ActionEndpoint.given_up(handle)
-    still.lives(moment := moment + 0.5)
-    assert not ActionEndpoint.given_up(handle), "a new one"
-
-
 def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
