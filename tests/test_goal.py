@@ -12,7 +12,6 @@ import pytest
 
 import bt_actions.goals.deadlines
 import bt_actions.goals.goal
-from bt_actions.goals.deadlines import HELD_AT_MOST
 from bt_actions.goals.goal import (
     ASK_AGAIN,
     ASK_IN_ANY_CASE,
@@ -804,58 +803,6 @@ def test_what_was_held_for_a_server_out_of_sight_does_not_hold_up_its_answer() -
     life.goal.hold(4.0, life.now)
     life.on(Event.SERVER_READY)
     assert life.goal.deadline(life.now) == (Event.ACCEPT_DUE, LIMITS.accept)
-
-
-def test_what_is_held_again_and_again_takes_effect_in_the_end_unless_there_is_news() -> None:
-    life = executing(Timeouts(feedback=2.0))
-
-    def is_held() -> bool:
-        life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
-        life.goal.hold(1.0, life.now)
-        return CANCEL not in life.pass_time(0.0)
-
-    for _ in range(2):
-        assert all(is_held() for _ in range(int(HELD_AT_MOST)))
-        life.on(Event.FEEDBACK, "at last")
-    assert all(is_held() for _ in range(int(HELD_AT_MOST)))
-    assert not is_held()
-
-
-def test_who_holds_a_deadline_says_for_how_long_in_all() -> None:
-    life = executing(Timeouts(result=5.0))
-    life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
-    for _ in range(3):
-        life.goal.hold(1.0, life.now, 3.0)
-        assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 1.0)
-        assert CANCEL not in life.pass_time(0.9)
-        life.now = Now(life.now.steady + 0.1, life.now.ros + 0.1)
-    life.goal.hold(1.0, life.now, 3.0)
-    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 0.0)
-    life.goal.hold(1.0, life.now, HELD_AT_MOST)
-    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 1.0), "there is more to wait for now"
-
-
-def test_what_was_held_for_one_reason_may_still_be_for_another() -> None:
-    life = executing(Timeouts(result=5.0))
-    life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
-    for _ in range(10):
-        life.goal.hold(1.0, life.now, HELD_AT_MOST)
-    life.goal.hold(1.0, life.now, 3.0)
-    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 1.0)
-
-
-def test_no_feedback_puts_off_a_result_that_is_held_again_and_again() -> None:
-    life = executing(Timeouts(result=5.0, feedback=2.0))
-    life.pass_time(1.0)
-    for _ in range(int(HELD_AT_MOST)):
-        life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
-        life.goal.hold(1.0, life.now)
-        assert CANCEL not in life.pass_time(0.0)
-        life.on(Event.FEEDBACK, "it runs")
-    life.now = Now(life.now.steady + 5.0, life.now.ros + 5.0)
-    life.goal.hold(1.0, life.now)
-    assert life.goal.deadline(life.now) == (Event.RESULT_DUE, 0.0)
-    assert CANCEL in life.pass_time(0.0)
 
 
 def test_what_was_held_takes_effect_in_the_order_in_which_it_fell_due() -> None:

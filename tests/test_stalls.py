@@ -4,56 +4,56 @@ from __future__ import annotations
 
 import pytest
 
+from bt_actions.servers.reachability import DOUBT_LASTS
 from bt_actions.servers.stalls import (
     ANSWERS_TAKE,
-    AT_MOST,
     BACK_IN_SIGHT,
+    IN_A_ROW,
     OUT_OF_SIGHT,
     STOOD_STILL,
-    Leniency,
     Stalls,
 )
 
 
 @pytest.fixture
 def stalls() -> Stalls:
-    """Of a process that has lived for 10 seconds."""
+    """Of a process that lives, and means to sleep from second 10.0 to 10.2."""
     alive = Stalls()
-    for moment in range(101):
-        alive.lives(moment / 10)
+    alive.lives(10.0)
+    alive.sleeps(10.0, 10.2)
     return alive
 
 
 def test_who_is_in_time_waits_for_nothing(stalls: Stalls) -> None:
-    assert stalls.answers_take(10.2) == 0.0
-    assert not stalls.servers_take(10.2)
+    assert stalls.answers_take(10.1 + STOOD_STILL) == 0.0
+    assert not stalls.servers_take(10.1 + STOOD_STILL)
 
 
 def test_whoever_asks_first_notices(stalls: Stalls) -> None:
-    end = 10.0 + ANSWERS_TAKE
+    end = 10.3 + STOOD_STILL
     assert stalls.answers_take(end) == pytest.approx(ANSWERS_TAKE)
     assert stalls.answers_take(end + 0.2) == pytest.approx(ANSWERS_TAKE - 0.2)
     assert not stalls.servers_take(end), "no lease is so short"
-    assert (stalls.times, stalls.long_times) == (1, 0)
+    assert stalls.long_times == 0
 
 
-def test_a_short_one_takes_no_more_than_twice_its_time(stalls: Stalls) -> None:
-    still = STOOD_STILL + 0.1
-    assert stalls.answers_take(10.0 + still) == pytest.approx(2 * still)
+def test_who_is_asked_before_it_wakes_may_sleep_on(stalls: Stalls) -> None:
+    assert stalls.answers_take(10.1) == 0.0
+    assert stalls.answers_take(10.1 + STOOD_STILL) == 0.0
 
 
-def test_a_short_one_takes_nothing_from_the_grace_of_a_long_one(stalls: Stalls) -> None:
-    stalls.lives(20.0)
-    assert stalls.answers_take(20.31) == pytest.approx(ANSWERS_TAKE - 0.31)
+def test_who_works_means_to_be_done_at_once(stalls: Stalls) -> None:
+    stalls.lives(10.2)
+    assert stalls.answers_take(10.3 + STOOD_STILL)
 
 
-def test_servers_are_hidden_where_a_lease_may_have_run_out(stalls: Stalls) -> None:
-    end = 10.0 + OUT_OF_SIGHT + 0.1
+def test_servers_are_out_of_sight_where_a_lease_may_have_run_out(stalls: Stalls) -> None:
+    end = 10.3 + OUT_OF_SIGHT
     assert stalls.servers_take(end)
     assert stalls.long_times == 1
-    moment = end
-    while moment + 0.2 < end + BACK_IN_SIGHT:
-        moment += 0.2
+    for tenth in range(1, int(10 * BACK_IN_SIGHT)):
+        moment = end + tenth / 10
+        stalls.lives(moment)
         assert stalls.servers_take(moment)
         assert bool(stalls.answers_take(moment)) == (moment < end + ANSWERS_TAKE)
     assert not stalls.servers_take(end + BACK_IN_SIGHT)
@@ -63,7 +63,6 @@ def test_a_rest_is_no_standstill(stalls: Stalls) -> None:
     stalls.rests(10.0)
     assert stalls.answers_take(99.0) == 0.0
     assert not stalls.servers_take(99.0)
-    assert stalls.times == 0
 
 
 def test_after_a_rest_nobody_knows_whether_this_process_is_still_heard(
@@ -78,52 +77,56 @@ def test_after_a_rest_nobody_knows_whether_this_process_is_still_heard(
     assert stalls.long_times == 1
 
 
-def test_a_machine_that_was_suspended_stood_still_though_its_clock_did_not_go_on(
-    stalls: Stalls,
-) -> None:
-    asleep = [60.0]
-    stalls._take_asleep = lambda: asleep.pop() if asleep else 0.0
+def test_a_machine_that_was_suspended_stood_still_though_its_clock_did_not_go_on() -> None:
+    asleep = 0.0
+    stalls = Stalls(lambda now: now + asleep)
+    stalls.lives(10.0)
+    asleep = 60.0
     assert stalls.answers_take(10.1) == ANSWERS_TAKE
     assert stalls.servers_take(10.2) > 0.0
-    assert (stalls.times, stalls.long_times) == (1, 1)
+    assert stalls.long_times == 1
 
 
-def test_a_time_in_which_python_alone_stood_still_does_not_count(stalls: Stalls) -> None:
-    stalls._take_busy = lambda: 2.0
+def test_a_time_in_which_this_process_worked_does_not_count() -> None:
+    work = 0.0
+    stalls = Stalls(lambda now: now - work)
+    stalls.lives(10.0)
+    work = 2.0
     assert stalls.answers_take(12.0 + STOOD_STILL / 2) == 0.0
-    stalls._take_busy = lambda: 0.1
-    assert stalls.answers_take(12.2 + STOOD_STILL) == 0.0
     assert stalls.answers_take(15.0) == ANSWERS_TAKE, "it was stopped as well"
-    assert (stalls.times, stalls.long_times) == (1, 1)
 
 
-def test_leniency_bears_with_so_many_in_a_row_and_no_more(stalls: Stalls) -> None:
-    leniency, moment = Leniency(), 10.0
-    for _ in range(AT_MOST):
-        assert leniency.bears(stalls, cause=True)
-        stalls.lives(moment := moment + 1.0)
-    assert not leniency.bears(stalls, cause=True)
-    assert not leniency.bears(stalls, cause=True)
+def stand_still(stalls: Stalls, moment: float, seconds: float, then: float) -> float:
+    """Do so from this moment, and live on; return the moment after that."""
+    stalls.lives(moment)
+    stalls.lives(moment + seconds)
+    return moment + seconds + then
 
 
-def test_leniency_begins_anew_where_there_was_no_cause_for_it(stalls: Stalls) -> None:
-    leniency, moment = Leniency(), 10.0
-    assert not leniency.bears(stalls, cause=False)
-    for _ in range(2 * AT_MOST):
-        stalls.lives(moment := moment + 1.0)
-    assert leniency.bears(stalls, cause=True), "what was before it does not count"
-    for _ in range(AT_MOST):
-        stalls.lives(moment := moment + 1.0)
-    assert not leniency.bears(stalls, cause=True)
-    assert not leniency.bears(stalls, cause=False)
-    assert leniency.bears(stalls, cause=True)
-
-
-def test_many_of_them_use_up_nothing_of_what_the_next_one_is_granted(
-    stalls: Stalls,
+@pytest.mark.parametrize("seconds", [0.5, OUT_OF_SIGHT + 0.1])
+def test_stalls_in_a_row_are_borne_with_and_no_more_until_it_is_calm(
+    stalls: Stalls, seconds: float
 ) -> None:
-    moment = 10.0
+    is_long = seconds > OUT_OF_SIGHT
+    moment = 10.3
+    for _ in range(IN_A_ROW):
+        moment = stand_still(stalls, moment, seconds, 0.2)
+        assert stalls.answers_take(moment)
+        assert bool(stalls.servers_take(moment)) is is_long
     for _ in range(100):
-        stalls.lives(moment := moment + OUT_OF_SIGHT + 0.1)
-    assert stalls.answers_take(moment + 3.0) == ANSWERS_TAKE
-    assert stalls.servers_take(moment + 3.0) == BACK_IN_SIGHT
+        moment = stand_still(stalls, moment, seconds, 0.2)
+    assert not stalls.answers_take(moment)
+    assert not stalls.servers_take(moment)
+    assert stalls.long_times == (IN_A_ROW if is_long else 0)
+    stalls.sleeps(moment, moment + DOUBT_LASTS)
+    calm = stand_still(stalls, moment + DOUBT_LASTS, seconds, 0.0)
+    assert stalls.answers_take(calm)
+    assert bool(stalls.servers_take(calm)) is is_long
+
+
+def test_short_ones_use_up_nothing_of_what_a_long_one_is_granted(stalls: Stalls) -> None:
+    moment = 10.3
+    for _ in range(100):
+        moment = stand_still(stalls, moment, 0.5, 0.0)
+    moment = stand_still(stalls, moment, OUT_OF_SIGHT + 0.1, 0.0)
+    assert stalls.servers_take(moment) == pytest.approx(BACK_IN_SIGHT)

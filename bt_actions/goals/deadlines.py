@@ -9,9 +9,6 @@ from __future__ import annotations
 
 from bt_actions.goals.terms import ON_ROS_CLOCK, Event, Now
 
-HELD_AT_MOST = 30.0
-"""Seconds for which a deadline is held, one time after the other, until it takes effect."""
-
 
 class Deadlines:
     """Moments by which something must have happened, each named by the event that it is if not."""
@@ -20,13 +17,10 @@ class Deadlines:
         self._due: dict[Event, float] = {}
         self._ros_seen = now.ros
         self._not_before = float("-inf")
-        self._held: dict[Event, dict[float, float]] = {}  # at most, seconds in all since armed
-        self._at_most = HELD_AT_MOST
 
     def arm(self, event: Event, seconds: float | None, now: Now) -> None:
         """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
         if seconds is not None:
-            self._held.pop(event, None)
             self._due[event] = (now.ros if event in ON_ROS_CLOCK else now.steady) + seconds
 
     def disarm(self, event: Event) -> None:
@@ -40,18 +34,12 @@ class Deadlines:
     def left(self, now: Now) -> list[tuple[float, Event]]:
         """Return the seconds until each, the earliest first; negative where it has passed."""
         waits = sorted(((self._left(event, now), event) for event in self._due), key=_seconds)
-        held = self._not_before - now.steady
-        if held <= 0.0:
-            return waits
-        return sorted(
-            ((max(left, held) if self._may_hold(event) else left, event) for left, event in waits),
-            key=_seconds,
-        )
+        held = self._held(now)
+        return [(max(left, held), event) for left, event in waits] if held > 0.0 else waits
 
     def take_passed(self, event: Event, now: Now) -> bool:
         """Whether this one is still set and has passed; it is forgotten then."""
-        held = now.steady < self._not_before and self._may_hold(event)
-        if held or event not in self._due or self._left(event, now) > 0.0:
+        if event not in self._due or max(self._left(event, now), self._held(now)) > 0.0:
             return False
         del self._due[event]
         return True
@@ -61,25 +49,12 @@ class Deadlines:
         for event in self._due:
             self._due[event] += seconds
 
-    def hold(self, seconds: float, now: Now, at_most: float = HELD_AT_MOST) -> None:
-        """Let none take effect within so many seconds of the steady clock.
-
-        One that has passed, and was held so for `at_most` seconds in all, is not held any more
-        until it is armed anew. Each reason to hold has a time of its own.
-        """
-        self._at_most = at_most
-        for event in self._due:
-            if self._left(event, now) <= 0.0:
-                held = self._held.setdefault(event, {})
-                held[at_most] = held.get(at_most, 0.0) + seconds
+    def hold(self, seconds: float, now: Now) -> None:
+        """Let none take effect within so many seconds of the steady clock."""
         self._not_before = now.steady + seconds
 
-    def _may_hold(self, event: Event) -> bool:
-        return self.held(event, self._at_most) <= self._at_most
-
-    def held(self, event: Event, at_most: float) -> float:
-        """Return for how many seconds this one, which has passed, was held with that limit."""
-        return self._held.get(event, {}).get(at_most, 0.0)
+    def _held(self, now: Now) -> float:
+        return self._not_before - now.steady
 
     def follow(self, now: Now) -> None:
         """Where the ROS clock has jumped back, let the deadlines on it jump with it."""

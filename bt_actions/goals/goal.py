@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bt_actions.goals.deadlines import HELD_AT_MOST, Deadlines
+from bt_actions.goals.deadlines import Deadlines
 from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
 from bt_actions.goals.terms import (
     CANCEL_ACCEPTED,
@@ -281,12 +281,9 @@ class Goal:
         if self.state in (State.QUEUED, State.WAITING_FOR_SERVER):
             self._deadlines.postpone(seconds)
 
-    def hold(self, seconds: float, now: Now, at_most: float = HELD_AT_MOST) -> None:
-        """Let no deadline take effect for so many seconds: what is awaited may be on its way.
-
-        None is held for more than `at_most` seconds in all.
-        """
-        self._deadlines.hold(seconds, now, at_most)
+    def hold(self, seconds: float, now: Now) -> None:
+        """Let no deadline take effect for so many seconds: what is awaited may be on its way."""
+        self._deadlines.hold(seconds, now)
 
     # Steps of the table: each decides, acts on the goal, and returns the next state
 

@@ -33,7 +33,7 @@ from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
 from bt_actions.recovery.unanswered import Unanswered
 from bt_actions.ros.action_view import STATUS, ActionView
 from bt_actions.ros.workarounds import participant
-from bt_actions.servers.stalls import AT_MOST, STOOD_STILL, Stalls
+from bt_actions.servers.stalls import Stalls
 
 TURN = 0.05
 """Seconds between two looks for what has come in;"""
@@ -264,21 +264,19 @@ class _Sweep:
 
         Because of a stall, or of a server in sight that does not answer.
         """
-        began = looked = last = time.monotonic()
+        began = looked = time.monotonic()
         until = began + self._look
         while not self._stopped():
             now = time.monotonic()
+            stood_still = still.lives(now)
             held = max(still.answers_take(now), still.servers_take(now))
             if still.long_times and breaks_off:
                 return False  # what was sent meanwhile may be lost
-            if still.times <= AT_MOST:
-                if held > 0.0:  # what there is may not be in sight again
-                    until = max(until, now + held)
-                if now - last > STOOD_STILL:
-                    self._deadline += now - last
-                    self._awaits_until += now - last
+            if held > 0.0:  # what there is may not be in sight again
+                until = max(until, now + held)
+            self._deadline += stood_still
+            self._awaits_until += stood_still
             self._turn(still)
-            last = time.monotonic()  # its own work is no stall
             lacks = self._lacks()
             self._looked_out |= now >= self._deadline
             looking = now < self._deadline and (now < until or bool(lacks))

@@ -12,9 +12,7 @@ import threading
 import time
 from typing import Protocol
 
-from bt_actions.ros.collector import Collector
 from bt_actions.ros.log import log
-from bt_actions.ros.suspended import Suspended
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.shared import lock
 from bt_actions.utilities.plain_text import raised
@@ -34,8 +32,15 @@ class Attended(Protocol):
         """Do what is due and return the seconds until there is more."""
 
 
-_collector = Collector()
-stalls = Stalls(_collector.take, Suspended().take)
+_SINCE_BOOT = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+
+
+def _idle(_: float) -> float:
+    """Return the seconds without work, also those in which the machine was suspended."""
+    return time.clock_gettime(_SINCE_BOOT) - time.process_time()
+
+
+stalls = Stalls(_idle)
 """Of this process while a goal is open; under the lock."""
 _open: set[Attended] = set()
 _bell = threading.Condition(lock)
@@ -69,7 +74,6 @@ def disown() -> None:
     global _thread
     _open.clear()
     _thread = None
-    _collector.unwatch()
     stalls.rests(time.monotonic())
 
 
@@ -89,14 +93,6 @@ def wake_by(moment: float) -> None:
 
 
 def _attend() -> None:
-    _collector.watch()
-    try:
-        _attend_until_idle()
-    finally:
-        _collector.unwatch()
-
-
-def _attend_until_idle() -> None:
     global _thread, _wakes_at
     with lock:
         busy_at = time.monotonic()
@@ -111,9 +107,10 @@ def _attend_until_idle() -> None:
                 except Exception as error:  # noqa: BLE001 - the last guard of every deadline
                     log.error(f"{endpoint!r}: {raised(error)}")
             now = time.monotonic()
-            _wakes_at = min(now + wait, _wakes_at)
             stalls.lives(now)
-            _bell.wait(max(SHORTEST, _wakes_at - now))
+            _wakes_at = max(now + SHORTEST, min(now + wait, _wakes_at))
+            stalls.sleeps(now, _wakes_at)
+            _bell.wait(_wakes_at - now)
             stalls.lives(time.monotonic())
         stalls.rests(time.monotonic())
         _thread = None

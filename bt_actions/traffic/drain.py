@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable
 
 from bt_actions.goals.goal import ASK_AGAIN
 from bt_actions.goals.terms import Event, State
-from bt_actions.servers.stalls import AT_MOST
 from bt_actions.traffic import alarm
 from bt_actions.traffic.shared import GoalHandle, changed, lock
 
@@ -75,17 +74,16 @@ class _Patience:
 
     def __init__(self, waits: list[GoalHandle]) -> None:
         self._deadline = 0.0
-        self._first, self._began = alarm.stalls.times, time.monotonic()
+        self._began = time.monotonic()
         self._lost: set[GoalHandle] = set()
         self._were_back: set[GoalHandle] = set()
         self._allow({handle for handle in waits if not handle.looked_out_for})
 
     def is_over(self, waits: list[GoalHandle]) -> bool:
         """Whether nobody waits any longer for these goals."""
-        still, now = alarm.stalls, time.monotonic()
+        now = time.monotonic()
         doubts = (handle.endpoint.route.in_doubt(now) for handle in waits)
-        held = max(still.answers_take(now), *doubts)
-        if held > 0.0 and still.times - self._first <= AT_MOST:
+        if max(alarm.stalls.answers_take(now), *doubts) > 0.0:
             self._deadline = max(self._deadline, now + ASK_AGAIN)
         self._lost.update(handle for handle in waits if handle.goal.lost)
         back = {handle for handle in self._lost if not handle.goal.lost}

@@ -14,7 +14,6 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goals.deadlines import HELD_AT_MOST
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
@@ -31,7 +30,6 @@ from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.log import log
 from bt_actions.servers.presence import LEASE, PROBES_KEPT, Server, ServerWatch
 from bt_actions.servers.replies import Told
-from bt_actions.servers.stalls import ANSWERS_TAKE_IN_ALL
 from bt_actions.traffic import alarm, shared
 from bt_actions.traffic.ended import Past
 from bt_actions.traffic.predecessors import Predecessors
@@ -248,21 +246,16 @@ class ActionEndpoint:
         """See to it that no deadline counts the time in which a goal is not sent on our account."""
         waits = handle.goal.state is State.WAITING_FOR_SERVER
         if waits and handle.kept_since is not None:
-            more = min(now - handle.kept_since, HELD_AT_MOST - handle.kept_for)
-            handle.goal.postpone(more)
-            handle.kept_for += more
+            handle.goal.postpone(now - handle.kept_since)
         handle.kept_since = now if waits and self.route.holds_back(now) else None
 
     def _bear_with(self, goal: Goal, now: Now) -> None:
         """Hold deadlines that have passed while a stall may be why nothing has come in."""
-        answers = alarm.stalls.answers_take(now.steady)
         waits = goal.state is State.WAITING_FOR_SERVER
         open_question = self.route.holds_back if waits else self.route.in_doubt
         in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
-        if waits:
-            in_doubt = max(in_doubt, alarm.stalls.servers_take(now.steady))
-        in_all = HELD_AT_MOST if in_doubt else ANSWERS_TAKE_IN_ALL
-        goal.hold(max(answers, in_doubt), now, in_all)
+        servers = alarm.stalls.servers_take(now.steady) if waits else 0.0
+        goal.hold(max(alarm.stalls.answers_take(now.steady), servers, in_doubt), now)
 
     def mind(self, handle: GoalHandle) -> None:
         """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""
@@ -666,14 +659,10 @@ class ActionEndpoint:
                 self._pass_on(handle, handle.replies.looked(self.watch, now))
 
     def _is_hidden(self, handle: GoalHandle) -> bool:
-        """Whether a server of this goal may be out of sight because this process stood still.
-
-        Not for ever, where it does so again and again and the server is not seen in between.
-        """
-        still, sent_to, now = alarm.stalls, handle.replies.sent_to, time.monotonic()
+        """Whether a server of this goal may be out of sight because this process stood still."""
+        sent_to, now = handle.replies.sent_to, time.monotonic()
         in_sight = sent_to <= self.watch.gids and not self.watch.gone(now, sent_to)
-        cause = not in_sight and still.servers_take(now) > 0.0
-        return handle.hidden.bears(still, cause=cause)
+        return not in_sight and alarm.stalls.servers_take(now) > 0.0
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""

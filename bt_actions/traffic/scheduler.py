@@ -80,3 +80,4 @@ class Scheduler:
         now = self._steady()
         self.wakes_at = min(now + wait, self.wakes_at)
         self._stalls.lives(now)
+        self._stalls.sleeps(now, self.wakes_at)

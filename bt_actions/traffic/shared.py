@@ -19,7 +19,6 @@ from bt_actions.goals.terms import State
 from bt_actions.recovery.ledger import Ledger
 from bt_actions.ros.log import log
 from bt_actions.servers.replies import Replies
-from bt_actions.servers.stalls import Leniency
 from bt_actions.traffic.cancel_queue import Cancels
 
 if TYPE_CHECKING:
@@ -130,17 +129,12 @@ class GoalHandle:
     look_out_left: float | None = None
     """Seconds for which a server that went away with it is looked out for yet; None: none did."""
     kept_since: float | None = None
-    """Since when it is not sent though a server is in sight (Route.holds_back), steady clock;"""
-    kept_for: float = 0.0
-    """and for how many seconds it was kept in all, which its deadline does not count."""
+    """Since when it is not sent though a server is in sight (Route.holds_back), steady clock."""
     paused_at: float | None = None
     begun_at: float = NEVER
     not_gone_before: float = NEVER
     """Until when it is no news that its server is not shown: it may be stopped for less than its
     lease, or not be discovered yet. Both in seconds of the steady clock."""
-
-    hidden: Leniency = field(init=False, default_factory=Leniency)
-    """With servers that are out of sight, after stalls of this process."""
 
     def __post_init__(self) -> None:
         self.replies = Replies(self.goal)

@@ -20,7 +20,7 @@ from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import Command, Event, Now, State
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.servers.reachability import Reachability
-from bt_actions.servers.stalls import ANSWERS_TAKE, ANSWERS_TAKE_IN_ALL, Stalls
+from bt_actions.servers.stalls import IN_A_ROW, Stalls
 from bt_actions.traffic import alarm, shared, traffic
 from bt_actions.traffic import ended as past
 from bt_actions.traffic import endpoint as endpoint
@@ -189,6 +189,7 @@ class Caller:
         """Every goal that was ever begun, the oldest first."""
         self.closed = False
         self.froze = False
+        self._freezes = 0
         self.misfortunes: set[str] = set()
         self._clients: list[ModelClient] = []
         self._moments = 0
@@ -417,12 +418,13 @@ class Caller:
         So do servers that it sees, beyond their lease.
         """
         self.froze = True
+        self._freezes += 1
         alarm.stalls.lives(self.moment())
         before = {
             handle: handle.goal.state
             for handle in self.handles
             if handle.goal.state in (State.WAITING_FOR_SERVER, State.SENDING, State.EXECUTING)
-            and not (handle.ledger.crowded or self._falters(handle) or self._was_patient(handle))
+            and not (handle.ledger.crowded or self._falters(handle))
         }
         world, hidden = self.world, set[tuple[bytes, int]]()
         if seconds > LEASE:
@@ -432,7 +434,7 @@ class Caller:
         world.now = Now(world.now.steady + seconds, world.now.ros + seconds * world.pace)
         self._attend()
         for handle, state in before.items():
-            if handle.goal.state is not state:
+            if handle.goal.state is not state and self._freezes <= IN_A_ROW:
                 raise Violation(f"who was frozen looks first for what came meanwhile: {handle}")
         world.overlooked -= hidden
         for message in world._deliverable():
@@ -444,12 +446,6 @@ class Caller:
         """Whether its server is in sight without its services, which no stall does."""
         where = handle.endpoint.name, handle.node
         return bool(self.world.shown(*where)) and not self.world.ready(*where)
-
-    @staticmethod
-    def _was_patient(handle: GoalHandle) -> bool:
-        """Whether a deadline of it was held for as long as stalls in a row are borne with."""
-        deadlines, longest = handle.goal._deadlines, ANSWERS_TAKE_IN_ALL - ANSWERS_TAKE
-        return any(deadlines.held(event, ANSWERS_TAKE_IN_ALL) > longest for event in Event)
 
     def due_in(self) -> float:
         """Return the seconds until something is due (half a second where nothing is)."""

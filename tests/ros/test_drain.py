@@ -22,7 +22,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Any:
     clock = SimpleNamespace(now=100.0)
     clock.monotonic = lambda: clock.now
     monkeypatch.setattr(draining, "time", clock)
-    still = SimpleNamespace(times=0, answers_take=lambda _: 0.0)
+    still = SimpleNamespace(answers_take=lambda _: 0.0)
     monkeypatch.setattr(draining.alarm, "stalls", still)
     return clock
 

@@ -6,7 +6,6 @@ real servers, and tests/machine with whole histories.
 
 from __future__ import annotations
 
-import copy
 import time
 from collections import deque
 from collections.abc import Callable
@@ -17,7 +16,6 @@ from typing import Any
 import pytest
 
 from bt_actions import End, Outcome
-from bt_actions.goals.deadlines import HELD_AT_MOST
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, Timeouts
 from bt_actions.goals.terms import (
@@ -29,14 +27,13 @@ from bt_actions.goals.terms import (
     State,
 )
 from bt_actions.servers.presence import PROBES_KEPT, Server, ServerWatch
-from bt_actions.servers.stalls import ANSWERS_TAKE_IN_ALL, AT_MOST, Leniency, Stalls
+from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import alarm, shared, traffic
 from bt_actions.traffic import endpoint as module
 from bt_actions.traffic.cancel_queue import Cancels
 from bt_actions.traffic.endpoint import (
     BESIDE,
     LEASE,
-    LOOK_WHILE_RUNNING,
     SILENT_FOR,
     ActionEndpoint,
 )
@@ -199,18 +196,6 @@ def test_a_line_without_goals_is_not_late(monkeypatch: pytest.MonkeyPatch) -> No
     assert seen.alone
 
 
-STILL = Stalls()
-"""Of 1 s, which hides no server."""
-STILL.lives(0.0)
-STILL.lives(1.0)
-
-
-LONG = Stalls()
-"""Of 3 s, which may hide servers for 4."""
-LONG.lives(-1.8)
-LONG.lives(1.2)
-
-
 @pytest.mark.parametrize(
     ("now", "hidden", "left"),
     [(10.2, 0.0, 2.8), (14.0, 0.0, 2.6), (14.0, 4.0, 3.0)],
@@ -231,7 +216,7 @@ def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -
     """Nor does it while the tree is paused, which gives that time back itself."""
     given: list[float] = []
     goal = SimpleNamespace(state=State.WAITING_FOR_SERVER, postpone=given.append)
-    handle: Any = SimpleNamespace(goal=goal, kept_since=None, kept_for=0.0)
+    handle: Any = SimpleNamespace(goal=goal, kept_since=None)
     holds_back = True
     line: Any = SimpleNamespace(route=SimpleNamespace(holds_back=lambda _: holds_back))
     for now in (1.0, 1.2, 1.5):
@@ -240,88 +225,9 @@ def test_no_deadline_counts_the_time_in_which_nothing_is_sent_on_our_account() -
     ActionEndpoint._give_back_time(line, handle, 1.6)
     ActionEndpoint._give_back_time(line, handle, 9.0)
     assert given == pytest.approx([0.2, 0.3, 0.1])
-    holds_back = True
-    for now in (10.0, 10.1, 1000.0, 1000.1):
-        ActionEndpoint._give_back_time(line, handle, now)
-    assert sum(given) == pytest.approx(HELD_AT_MOST), "and not for ever"
     goal.state = State.EXECUTING
     ActionEndpoint._give_back_time(line, handle, 9.1)
     assert handle.kept_since is None
-
-
-@pytest.mark.parametrize(
-    ("state", "still", "doubt", "seconds", "in_all"),
-    [
-        (State.WAITING_FOR_SERVER, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
-        (State.EXECUTING, STILL, 0.0, 0.8, ANSWERS_TAKE_IN_ALL),
-        (State.WAITING_FOR_SERVER, LONG, 0.0, 4.0, HELD_AT_MOST),
-        (State.EXECUTING, LONG, 0.0, 1.0, ANSWERS_TAKE_IN_ALL),
-        (State.EXECUTING, Stalls(), 5.0, LOOK_WHILE_RUNNING, HELD_AT_MOST),
-    ],
-    ids=[
-        "a server",
-        "an answer",
-        "a hidden server",
-        "an answer, long",
-        "who may not hear us",
-    ],
-)
-def test_a_deadline_is_held_after_a_standstill_whatever_it_waits_for(
-    monkeypatch: pytest.MonkeyPatch,
-    state: State,
-    still: Stalls,
-    doubt: float,
-    seconds: float,
-    in_all: float,
-) -> None:
-    held: list[tuple[float, float]] = []
-    goal = SimpleNamespace(
-        state=state, due_in=lambda _: 0.0, hold=lambda s, _, in_all: held.append((s, in_all))
-    )
-    clocks = SimpleNamespace(now=lambda: Now(1.2, 1.2))
-    line: Any = SimpleNamespace(
-        is_parents=False,
-        traffic=SimpleNamespace(clocks=clocks),
-        pump=lambda: None,
-        route=SimpleNamespace(in_doubt=lambda _: doubt, holds_back=lambda _: doubt > 0.0),
-        _apply=lambda *_: None,
-    )
-    line._bear_with = partial(ActionEndpoint._bear_with, line)
-    line._give_back_time = partial(ActionEndpoint._give_back_time, line)
-    handle: Any = SimpleNamespace(goal=goal, paused_at=None, kept_since=None, kept_for=0.0)
-    with lock:  # an alarm that is still awake would live in it
-        monkeypatch.setattr(alarm, "stalls", copy.copy(still))
-        ActionEndpoint.poll(line, handle)
-    assert held == [(pytest.approx(seconds), in_all)]
-
-
-def test_a_server_that_a_standstill_has_hidden_is_not_lost_and_is_in_the_end(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Also where another one, which may have the goal too, is in sight."""
-    still = Stalls()
-    monkeypatch.setattr(alarm, "stalls", still)
-    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment))
-    handle: Any = SimpleNamespace(
-        replies=SimpleNamespace(sent_to=frozenset({OURS, NEW})), hidden=Leniency()
-    )
-    line: Any = SimpleNamespace(watch=watch(NEW))
-    still.lives(moment := 10.0)
-    assert not ActionEndpoint._is_hidden(line, handle)
-    for _ in range(AT_MOST):
-        still.lives(moment := moment + 3.0)
-        assert ActionEndpoint._is_hidden(line, handle)
-    still.lives(moment := moment + 3.0)
-    assert not ActionEndpoint._is_hidden(line, handle)
-    for _ in range(50):
-        still.lives(moment := moment + 0.1)
-    assert not ActionEndpoint._is_hidden(line, handle), (
-        "a calm, in which the other may turn out a ghost"
-    )
-    still.lives(moment := moment + 3.0)
-    assert ActionEndpoint._is_hidden(line, handle)
-    line.watch = watch(OURS, NEW)
-    assert not ActionEndpoint._is_hidden(line, handle)
 
 
 def test_the_node_that_adopts_a_goal_tells_that_it_is_accounted_for(

@@ -104,7 +104,7 @@ def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
                 monkeypatch.setattr(client, request, lambda *_: client.reachability.asked(now()))
             monkeypatch.setattr(client, "take_data", lambda: None)
             monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
-            monkeypatch.setattr(alarm.stalls, "_lived_at", now() - 5.0)
+            monkeypatch.setattr(alarm.stalls, "_due", alarm.stalls._idle(now()) - 5.0)
         if canceled:
             runner.interrupt()
         runner.wait(40.0)
