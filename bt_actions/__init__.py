@@ -6,9 +6,9 @@ _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout
 
 # ruff: noqa: E402 - see above
 import bt_actions.behaviours.ports as _ports  # noqa: F401 - makes the tags of XML trees known
-from bt_actions.behaviours.action import ActionBehaviour, Progress
-from bt_actions.behaviours.gripper import Gripper
-from bt_actions.behaviours.move_robot import MoveRobot
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.progress import Progress
+from bt_actions.behaviours.robot import Gripper, MoveRobot
 from bt_actions.behaviours.run_tree import RunTree
 from bt_actions.behaviours.variables import Var
 from bt_actions.document import load_tree

@@ -62,7 +62,6 @@ STRAYS = {
 FILES = sorted(ROOT.rglob("*.py"))
 LONGEST, MOST_FILES = 400, 20
 LONG = {
-    "behaviours/action.py",
     "document/findings/pages.py",
     "document/language/model.py",
     "document/reading/read.py",

@@ -8,21 +8,19 @@ stand only the visit to the leaf, its attempts, and what the tree sees of them.
 
 from __future__ import annotations
 
-import random
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Access, Status
 
-from bt_actions.behaviours.conditions import condition_of, function_of, unknown_field
 from bt_actions.behaviours.node import backend_in
-from bt_actions.behaviours.variables import key, resolve, variables_in, write
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.behaviours.progress import DEADLINES, Progress
+from bt_actions.behaviours.reading import Reading
+from bt_actions.behaviours.variables import key, resolve, variables_in
 from bt_actions.goals.attempts import AttemptRecord, Attempts
+from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.goals.terms import Event
 from bt_actions.messages.conversion import MessageError, fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
@@ -31,33 +29,6 @@ from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:
     from bt_actions.traffic.shared import GoalHandle
-    from bt_actions.traffic.traffic import Traffic
-
-CHANCE = random.Random()
-"""Varies the pauses before retries; one for all leaves, as a seed costs more than a leaf."""
-DEADLINES = {
-    Event.QUEUE_DUE: "queue",
-    Event.SERVER_DUE: "server",
-    Event.ACCEPT_DUE: "accept",
-    Event.RESULT_DUE: "result",
-    Event.FEEDBACK_DUE: "feedback",
-    Event.CANCEL_DUE: "cancel",
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """What an action is doing at this moment."""
-
-    state: str
-    """A goal's state, or IDLE before the first visit, BACKOFF between two attempts."""
-    attempt: int
-    attempts: int
-    feedback: Any
-    """The latest feedback message, or None."""
-    seconds_left: float | None
-    deadline: str
-    """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
 
 
 class ActionBehaviour(Behaviour):
@@ -115,26 +86,21 @@ class ActionBehaviour(Behaviour):
         self.resources = frozenset(resources or ())
         self.on_feedback = on_feedback
         self.expect = expect
-        self._expect = condition_of(expect, "expect")
-        self._expect_text = expect if isinstance(expect, str) else getattr(expect, "text", "")
-        self._when = condition_of(self.retry.when, "retry.when")
         self.save = dict(save or {})
-        self._save = {key: function_of(place, "save") for key, place in self.save.items()}
-        self._to_save: dict[str, Any] = {}
+        self._reading = Reading(expect, self.save, self.retry.when, self.names)
         self._shown_feedback: tuple[Any, str] = (None, "")
         self._backend: Backend | None = None
-        self._traffic: Traffic | None = None
         self._endpoint: Any = None
         self._handle: GoalHandle | None = None
         self._left_behind: list[GoalHandle] = []
-        self._attempts = Attempts(self.retry, self._when, CHANCE)
+        self._attempts = Attempts(self.retry, self._reading.when)
         self._tree_closed = False
         self._started = 0.0
         self._outcome: Outcome | None = None
         self.blackboard = self.attach_blackboard_client()
         for variable in variables_in(goal):
             self.blackboard.register_key(variable, Access.READ)
-        for target in self._save:
+        for target in self.save:
             self.blackboard.register_key(key(target), Access.WRITE)
 
     # What a caller may read after a tick
@@ -178,23 +144,17 @@ class ActionBehaviour(Behaviour):
 
     def progress(self) -> Progress:
         """Return what the action is doing at this moment; safe to call from any thread."""
-        handle, traffic = self._handle, self._traffic
+        handle, backend = self._handle, self._backend
         attempts = self.retry.attempts
-        if traffic is None or handle is None:
+        if backend is None or handle is None:
             return Progress("IDLE", self.attempt, attempts, None, None, "")
-        now = traffic.clocks.now()
+        now = backend.clock.now()
         if self.status is Status.RUNNING and self._filed(handle):
             left = self._attempts.pause_left(now, look_only=True)
             return Progress("BACKOFF", self.attempt, attempts, None, left, "backoff")
-        from bt_actions.traffic.shared import lock
-
-        goal = handle.goal
-        with lock:  # its deadlines change with what arrives, on other threads
-            deadline = goal.deadline(now)
-        what, left_or_none = (
-            ("", None) if deadline is None else (DEADLINES[deadline[0]], deadline[1])
-        )
-        return Progress(goal.state.value, self.attempt, attempts, goal.feedback, left_or_none, what)
+        goal, deadline = handle.goal, backend.traffic.deadline(handle, now)
+        what, due = ("", None) if deadline is None else (DEADLINES[deadline[0]], deadline[1])
+        return Progress(goal.state.value, self.attempt, attempts, goal.feedback, due, what)
 
     @property
     def drained(self) -> bool:
@@ -208,9 +168,9 @@ class ActionBehaviour(Behaviour):
 
     def due_in(self) -> float | None:
         """Return the seconds until this leaf needs a tick though nothing has happened."""
-        if self._traffic is None or self._handle is None or not self._filed(self._handle):
+        if self._backend is None or self._handle is None or not self._filed(self._handle):
             return None  # while a goal is open, traffic/traffic.py minds its deadlines
-        return self._attempts.pause_left(self._traffic.clocks.now())
+        return self._attempts.pause_left(self._backend.clock.now())
 
     # py_trees' contract
 
@@ -226,56 +186,50 @@ class ActionBehaviour(Behaviour):
         if isinstance(self.action_type, str):
             self.action_type = interface(self.action_type, "action")
         self._check_fields()
-        traffic = backend.traffic
-        if traffic is self._traffic:
-            return
-        self._leave_endpoint()
-        self._endpoint = traffic.endpoint(self.action_type, self.action_name)
-        self._backend, self._traffic = backend, traffic
+        if backend is not self._backend:
+            self._leave_endpoint()
+            self._endpoint = backend.traffic.endpoint(self.action_type, self.action_name)
+            self._backend = backend
 
     def initialise(self) -> None:
         """Begin a visit. What an earlier one left behind is drained beside it."""
-        self._require_setup()
+        backend = self._require_setup()
         if self._handle is not None and not self._filed(self._handle):
             ActionBehaviour.terminate(self, Status.INVALID)  # the first tick of a visit broke off
-        self._attempts = Attempts(self.retry, self._when, CHANCE)
+        self._attempts = Attempts(self.retry, self._reading.when)
         self._outcome = None
-        self._left_behind, self._handle = self.open_handles(), None
-        self._begin()
+        self._begin(backend)
 
     def update(self) -> Status:
         """Take the goal as far as it goes at this moment; begins one attempt at most."""
-        self._require_setup()
+        backend = self._require_setup()
         if self._outcome is not None:
             self.initialise()  # shut down while RUNNING, and set up again: another visit
-        traffic, handle = self._traffic, self._handle
-        assert traffic is not None
+        traffic, handle = backend.traffic, self._handle
         assert handle is not None
         begun = False
         while True:
             if self._filed(handle):
-                left = self._attempts.pause_left(traffic.clocks.now())
+                left = self._attempts.pause_left(backend.clock.now())
                 if left > 0.0 or begun:
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
                     return Status.RUNNING
-                handle, begun = self._begin(), True
+                handle, begun = self._begin(backend), True
             traffic.advance(handle, self._make_message)
             settled = traffic.is_settled(handle)  # then all of its feedback is here
             for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
                 message = handle.feedback.popleft()
-                if self.on_feedback is not None:
+                if self.on_feedback is not None and not self._is_over():
                     self.on_feedback(message)
-                if self._is_over():
-                    return Status.FAILURE
             if self._is_over():
                 return Status.FAILURE
             if not settled:
                 self.feedback_message = self._in_words(handle)
                 return Status.RUNNING
-            record = self._judge(handle)
-            if self._is_over():
-                return Status.FAILURE
-            again = self._attempts.again(record, traffic.clocks.now())
+            record = self._judge(handle, backend)
+            again = not self._is_over() and self._attempts.again(
+                record, backend.clock.now(), backend.randomness
+            )
             if self._is_over():
                 return Status.FAILURE
             if not again:
@@ -284,14 +238,14 @@ class ActionBehaviour(Behaviour):
     def terminate(self, new_status: Status) -> None:
         """Let go at once of a goal that is still open; it is canceled and drained."""
         handle = self._handle
-        if self._traffic is None or handle is None:
+        if self._backend is None or handle is None:
             return
         if self._filed(handle):
             if self._outcome is None and self.history:
                 self._outcome = self.history[-1].outcome  # stopped in the pause before a retry
             return
         if new_status is Status.INVALID or handle.goal.outcome is None:
-            self._traffic.interrupt(handle)
+            self._backend.traffic.interrupt(handle)
             self.file_interrupted()
 
     def shutdown(self) -> None:
@@ -300,13 +254,12 @@ class ActionBehaviour(Behaviour):
         py_trees calls this leaf by leaf, and calls no terminate before; users destroy the node on
         the next line. So the first leaf closes for all, under one deadline.
         """
-        if self._traffic is None:
+        if self._backend is None:
             return
         if not self._tree_closed:
-            from bt_actions.traffic.drain import drain
-
-            leaves = list(_leaves_of_tree(self))
-            drain([handle for leaf in leaves for handle in leaf.open_handles()])
+            tree = root_of(self).iterate()
+            leaves = [leaf for leaf in tree if isinstance(leaf, ActionBehaviour)]
+            self._backend.drain([handle for leaf in leaves for handle in leaf.open_handles()])
             for leaf in leaves:
                 leaf.file_interrupted()
                 leaf._tree_closed = True  # noqa: SLF001 - of our own kind
@@ -317,7 +270,7 @@ class ActionBehaviour(Behaviour):
 
         Also those that a second server has taken when they had ended here.
         """
-        handles = [*self._left_behind, *([self._handle] if self._handle is not None else [])]
+        handles = [*self._left_behind, *([self._handle] if self._handle else [])]
         if self._endpoint is not None:
             handles += [handle for handle in self._endpoint.goals_of(self) if handle not in handles]
         return [handle for handle in handles if not handle.is_over]
@@ -325,20 +278,20 @@ class ActionBehaviour(Behaviour):
     def file_interrupted(self) -> None:
         """Record that the visit ended before its outcome: its goal was canceled, or is drained."""
         handle = self._handle
-        if self._traffic is None or handle is None or self._filed(handle):
+        if self._backend is None or handle is None or self._filed(handle):
             return
-        goal = handle.goal
-        outcome, reason = goal.outcome, goal.reason
+        outcome, reason = handle.goal.outcome, handle.goal.reason
         if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
             outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
-        now = self._traffic.clocks.now().ros
-        self.history.append(
-            AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
-        )
+        self.history.append(self._record(handle.goal, outcome, reason, self._backend))
         self._outcome = outcome
         self.feedback_message = f"{outcome}: {reason}"
 
     # What a leaf for actions of one type may know better
+
+    def names(self, result: Any) -> Mapping[str, object]:
+        """What expressions may name, of a result; of None, with any value."""
+        return {"result": result}
 
     def settles(self, result: Any) -> bool:
         """Whether a result says that nothing the goal began still runs; else its end is UNKNOWN.
@@ -355,16 +308,16 @@ class ActionBehaviour(Behaviour):
 
     # Within
 
-    def _require_setup(self) -> None:
-        if self._traffic is None:
+    def _require_setup(self) -> Backend:
+        if self._backend is None:
             raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
+        return self._backend
 
-    def _begin(self) -> GoalHandle:
-        assert self._traffic is not None
+    def _begin(self, backend: Backend) -> GoalHandle:
         self._tree_closed = False
         self._left_behind = self.open_handles()
-        self._started = self._traffic.clocks.now().ros
-        self._handle = self._traffic.begin(
+        self._started = backend.clock.now().ros
+        self._handle = backend.traffic.begin(
             self._endpoint,
             self,
             self.timeouts,
@@ -378,7 +331,7 @@ class ActionBehaviour(Behaviour):
 
     def _is_over(self) -> bool:
         """Whether code of the user's has ended the visit: stopped this leaf, or shut it down."""
-        return self._outcome is not None or self._traffic is None
+        return self._outcome is not None or self._backend is None
 
     def _filed(self, handle: GoalHandle) -> bool:
         """Whether this attempt is over and in the history."""
@@ -386,70 +339,49 @@ class ActionBehaviour(Behaviour):
         return bool(history) and history[-1].goal is handle.goal
 
     def _make_message(self) -> Any:
-        assert self._backend is not None
-        assert not isinstance(self.action_type, str)
+        action: Any = self.action_type
         data = self.goal() if callable(self.goal) else self.goal
-        goal_type: type[Any] = self.action_type.Goal  # type: ignore[attr-defined]
-        return fill(goal_type, resolve(data), now=self._backend.clock.stamp)
+        return fill(action.Goal, resolve(data), now=self._require_setup().clock.stamp)
 
     def _check_fields(self) -> None:
-        """Find before anything moves what would be found when a goal is sent, or has ended."""
         action: Any = self.action_type
         if isinstance(self.goal, Mapping) and not variables_in(self.goal):
             try:
                 fill(action.Goal, self.goal)
             except MessageError as error:
                 raise ValueError(f"{self.name}: goal: {error}") from error
-        saved = (("save", place) for place in self.save.values())
-        for what, text in (("expect", self.expect), ("retry.when", self.retry.when), *saved):
-            if not isinstance(text, str):
-                continue
-            if wrong := unknown_field(Expression(text), "result", action.Result):
-                raise ValueError(f"{self.name}: {what}: {wrong}")
+        if wrong := self._reading.unknown_field(action.Result):
+            raise ValueError(f"{self.name}: {wrong}")
 
-    def _judge(self, handle: GoalHandle) -> AttemptRecord:
-        assert self._traffic is not None
+    def _judge(self, handle: GoalHandle, backend: Backend) -> AttemptRecord:
         goal = handle.goal
         outcome, reason = goal.outcome, goal.reason
         assert outcome is not None
         if outcome is Outcome.SUCCEEDED:
-            why = self._read_result(goal.result)
-            if why:
+            if why := self._read_result(goal.result):
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why
         elif more := self.explain(outcome, goal.result):
             reason += f"; {more}"
-        now = self._traffic.clocks.now().ros
+        return self._record(handle.goal, outcome, reason, backend)
+
+    def _record(self, goal: Goal, outcome: Outcome, reason: str, backend: Backend) -> AttemptRecord:
+        now = backend.clock.now().ros
         return AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:
         self._outcome = record.outcome
-        tries = (
-            f" (attempt {record.attempt} of {self.retry.attempts})" if record.attempt > 1 else ""
-        )
+        number, of = record.attempt, self.retry.attempts
+        tries = f" (attempt {number} of {of})" if number > 1 else ""
         told = f": {record.reason}" if record.reason else ""
         self.feedback_message = f"{record.outcome}{tries}{told}"
         if record.outcome is not Outcome.SUCCEEDED:
             return Status.FAILURE
-        for target, value in self._to_save.items():
-            write(target, value)
+        self._reading.write()
         return Status.SUCCESS
 
     def _read_result(self, result: Any) -> str:
-        """Check the result and read from it what is to be saved; return what is wrong with it."""
-        try:
-            if self._expect is not None and not self._expect(result):
-                return self._unexpected(result)
-        except ExpressionError as error:
-            return str(error)
-        try:
-            self._to_save = {key: value(result) for key, value in self._save.items()}
-        except ValueError as error:  # ExpressionError, or what is saved does not fit
-            return str(error)
-        return ""
-
-    def _unexpected(self, result: Any) -> str:
-        wanted = f"{self._expect_text} was expected" if self._expect_text else "not as expected"
-        return f"{wanted}, but the result is: {shorten(result)}"
+        """Read the result; return what is wrong with it."""
+        return self._reading.read(result)
 
     def _in_words(self, handle: GoalHandle) -> str:
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
@@ -461,14 +393,8 @@ class ActionBehaviour(Behaviour):
         return f"{state}{tries}{self._shown_feedback[1]}"
 
     def _leave_endpoint(self) -> None:
-        if self._traffic is not None:
+        if self._backend is not None:
             open_here = self.open_handles()  # a second server's share, too
             self._left_behind = [each for each in open_here if each is not self._handle]
-            self._traffic.leave(self._endpoint)
-        self._traffic = self._endpoint = None
-
-
-def _leaves_of_tree(leaf: Behaviour) -> Iterator[ActionBehaviour]:
-    for behaviour in root_of(leaf).iterate():
-        if isinstance(behaviour, ActionBehaviour):
-            yield behaviour
+            self._backend.traffic.leave(self._endpoint)
+        self._backend = self._endpoint = None

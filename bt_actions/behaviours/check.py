@@ -7,6 +7,7 @@ from collections.abc import Callable
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_actions.behaviours.variables import read
 from bt_actions.expressions.expression import Expression, ExpressionError
 
 __all__ = ["Check"]
@@ -35,7 +36,7 @@ class Check(Behaviour):
         if isinstance(expression, str):
             expression = Expression(expression, roots=())
         self.expression = expression
-        self._variable = _from_blackboard if variable is None else variable
+        self._variable = variable or read
 
     def update(self) -> Status:
         try:
@@ -45,9 +46,3 @@ class Check(Behaviour):
             return Status.FAILURE
         self.feedback_message = "" if holds else f"{self.expression.text.strip()} is false"
         return Status.SUCCESS if holds else Status.FAILURE
-
-
-def _from_blackboard(name: str) -> object:
-    from bt_actions.behaviours.variables import read
-
-    return read(name)

@@ -12,6 +12,7 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.clock import Countdown, NodeTime
 from bt_actions.behaviours.gate import Gate
 from bt_actions.expressions.expression import ExpressionError
+from bt_actions.utilities.units import parse_duration
 
 __all__ = ["Deadline", "While"]
 
@@ -117,6 +118,4 @@ def drained(node: Behaviour) -> bool:
 
 def seconds(value: object) -> float:
     """A duration that was computed. Raises ValueError."""
-    from bt_actions.utilities.units import parse_duration
-
     return parse_duration(value)

@@ -14,9 +14,10 @@ from typing import Any
 from py_trees.common import Access
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.variables import Var, read, resolve, variables_in
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.behaviours.variables import Var, resolve, variables_in
+from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
+from bt_actions.messages.conversion import to_plain
 
 __all__ = ["CANCEL", "TYPE", "RunTree", "roots_of"]
 
@@ -24,8 +25,6 @@ TYPE = "bt_actions_interfaces/action/RunTree"
 CANCEL = 15.0
 """Seconds for a run to end when it is canceled: it sees its own goals to their ends first, within
 5 s each where their trees say nothing else."""
-ROOTS = frozenset({"result", "outputs"})
-Place = str | Callable[[Any], Any]
 
 
 class RunTree(ActionBehaviour):
@@ -44,10 +43,10 @@ class RunTree(ActionBehaviour):
         goal_name: what the server calls the goal where it rejects it; the leaf's name where not
             given.
         timeout: as for any action; `cancel` is 15 s where nothing else is said.
-        expect, save: as for any action, with ``outputs`` (what the tree gave its outputs, a
-            mapping) beside ``result``: ``save={"at": "outputs.at"}``.
 
-    Other keyword arguments are those of ActionBehaviour.
+    Other keyword arguments are those of ActionBehaviour; `expect`, `save` and `retry.when` may name
+    ``outputs`` (what the tree gave its outputs, a mapping) beside ``result``:
+    ``save={"at": "outputs.at"}``.
     """
 
     def __init__(
@@ -59,8 +58,6 @@ class RunTree(ActionBehaviour):
         server: str = "run_tree",
         goal_name: str = "",
         timeout: Timeouts | float | None = None,
-        expect: Callable[[Any], bool] | str | None = None,
-        save: Mapping[str, Place] | None = None,
         **kwargs: Any,
     ) -> None:
         def goal() -> dict[str, object]:
@@ -70,23 +67,21 @@ class RunTree(ActionBehaviour):
 
         if not isinstance(timeout, Timeouts):
             timeout = Timeouts(result=timeout, cancel=CANCEL)
-        places = (save or {}).items()
         super().__init__(
             name,
             TYPE,
             server,
             goal,
             timeout=timeout,
-            expect=_Of(expect, "expect", condition=True) if isinstance(expect, str) else expect,
-            save={
-                key: _Of(place, "save") if isinstance(place, str) else place
-                for key, place in places
-            },
             **kwargs,
         )
         for given in (tree, inputs):
             for variable in variables_in(given):
                 self.blackboard.register_key(variable, Access.READ)
+
+    def names(self, result: Any) -> Mapping[str, object]:
+        """The result, and the outputs of the tree."""
+        return roots_of(result)
 
     def settles(self, result: Any) -> bool:
         """Whether the server accounts for every goal of the run."""
@@ -101,46 +96,22 @@ class RunTree(ActionBehaviour):
     def _read_result(self, result: Any) -> str:
         if not result.settled:
             return f"the run left goals whose end is not known: {result.error_msg}"
-        try:
-            return super()._read_result(result)
-        except _NoOutputs as error:
-            return str(error)
-
-
-class _Of:
-    """An expression over `result` and `outputs`, as a function of the result."""
-
-    def __init__(self, text: str, what: str, *, condition: bool = False) -> None:
-        try:
-            expression = Expression(text, roots=ROOTS)
-        except ExpressionError as error:
-            raise ValueError(f"{what}: {error}") from error
-        self.text = text
-        self._compute = expression.holds if condition else expression.evaluate
-
-    def __call__(self, result: Any) -> Any:
-        return self._compute(roots_of(result), read)
-
-
-class _NoOutputs(ValueError):
-    """A server sent outputs that are no mapping as JSON."""
+        return super()._read_result(result)
 
 
 def roots_of(result: Any) -> dict[str, object]:
     """What expressions over a result may name. Raises ValueError for outputs that are none."""
     try:
-        outputs = json.loads(result.outputs or "{}")
+        outputs = json.loads(getattr(result, "outputs", "") or "{}")
     except (ValueError, RecursionError) as error:
-        raise _NoOutputs(f"the server's outputs are no JSON: {error}") from None
+        raise ExpressionError(f"the server's outputs are no JSON: {error}") from None
     if not isinstance(outputs, dict):
-        raise _NoOutputs("the server's outputs are no mapping")
+        raise ExpressionError("the server's outputs are no mapping")
     return {"result": result, "outputs": outputs}
 
 
 def inputs_text(values: object) -> str:
     """Inputs as RunTree has them. Raises ValueError for what cannot be sent, and says where."""
-    from bt_actions.messages.conversion import to_plain
-
     if not isinstance(values, Mapping):
         raise ValueError(f"inputs are a mapping of names to values, not {values!r:.40}")
     plain = to_plain(values)

@@ -9,8 +9,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.clock import Countdown, NodeTime
-from bt_actions.behaviours.conditions import condition_of
 from bt_actions.behaviours.node import backend_in
+from bt_actions.behaviours.reading import condition_of
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
 from bt_actions.messages.conversion import fill
@@ -163,7 +163,7 @@ class CallService(Behaviour):
         if self._when is None or self.response is None:
             return True
         try:
-            return self._when(self.response)
+            return bool(self._when(self.response))
         except ExpressionError as error:  # counts as no, as in goals/attempts.py
             self.feedback_message += f"; retry.when: {error.message}"
             return False

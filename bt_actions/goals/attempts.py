@@ -57,14 +57,11 @@ class AttemptRecord:
 class Attempts:
     """The tries of one visit to a leaf."""
 
-    def __init__(
-        self, retry: Retry, when: Callable[[Any], bool] | None, chance: random.Random
-    ) -> None:
+    def __init__(self, retry: Retry, when: Callable[[Any], bool] | None) -> None:
         """`when` is `retry.when` made callable; if it raises, that counts as no."""
         self.retry = retry
         self.history: list[AttemptRecord] = []
         self._when = when
-        self._chance = chance
         self._resume_at: float | None = None
         self._ros_seen = 0.0
 
@@ -73,12 +70,12 @@ class Attempts:
         """The number of the attempt that is under way or comes next, from 1."""
         return len(self.history) + 1
 
-    def again(self, record: AttemptRecord, now: Now) -> bool:
+    def again(self, record: AttemptRecord, now: Now, chance: random.Random) -> bool:
         """File `record`; return whether there will be another attempt after a pause."""
         self.history.append(record)
         if len(self.history) >= self.retry.attempts or not self._worth_it(record):
             return False
-        self._resume_at = now.ros + self.retry.pause(len(self.history), self._chance)
+        self._resume_at = now.ros + self.retry.pause(len(self.history), chance)
         self._ros_seen = now.ros
         return True
 

@@ -6,7 +6,7 @@ Only puts together what the rest of ros/ has.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rclpy.node import Node
@@ -15,7 +15,8 @@ from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.log import log
 from bt_actions.ros.service_client import ServiceClient
 from bt_actions.ros.topics import Publisher, Subscription
-from bt_actions.traffic.shared import lock
+from bt_actions.traffic.drain import drain
+from bt_actions.traffic.shared import GoalHandle, lock
 from bt_actions.traffic.traffic import Traffic
 
 __all__ = ["RosBackend"]
@@ -57,6 +58,12 @@ class RosBackend:
     def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
         """Become a publisher on a topic."""
         return Publisher(self.node, self.traffic, message_type, topic, qos)
+
+    def drain(
+        self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
+    ) -> list[GoalHandle]:
+        """Cancel these goals and wait for their ends; it does not matter whether anybody spins."""
+        return drain(handles, hurry)
 
     def wake(self) -> None:
         """Have whoever runs a tree on this node tick it soon; callable from any thread."""

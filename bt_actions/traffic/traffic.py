@@ -27,7 +27,7 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.goals.policy import Busy, End, Timeouts
 from bt_actions.goals.resources import Answer
-from bt_actions.goals.terms import Event, State
+from bt_actions.goals.terms import Event, Now, State
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.log import log
@@ -239,6 +239,12 @@ class Traffic:
         """Whether its outcome is decided, and what is known of its end then is, too."""
         with lock:  # a goal takes one step at a time
             return handle.goal.outcome is not None
+
+    @staticmethod
+    def deadline(handle: GoalHandle, now: Now) -> tuple[Event, float] | None:
+        """Its next deadline, and the seconds until then; these change with what arrives."""
+        with lock:
+            return handle.goal.deadline(now)
 
     def _may_send(self, handle: GoalHandle) -> bool:
         endpoint = handle.endpoint

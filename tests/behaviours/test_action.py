@@ -9,7 +9,7 @@ from py_trees.common import Status
 from rclpy.executors import SingleThreadedExecutor
 
 from bt_actions import ActionBehaviour, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
-from bt_actions.behaviours import action
+from bt_actions.wiring import backend_of
 from tests.support.trees import state, together
 from tests.support.waiting import until
 
@@ -65,20 +65,15 @@ def test_constants_of_a_result_are_known(node: Any, name: str) -> None:
 def test_the_first_leaf_that_is_shut_down_closes_for_the_whole_tree(
     node: Any, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    walks = []
-    original = action._leaves_of_tree
-
-    def walk(leaf: Any) -> Any:
-        walks.append(leaf)
-        return original(leaf)
-
-    monkeypatch.setattr(action, "_leaves_of_tree", walk)
+    drains = []
+    backend = backend_of(node)
+    monkeypatch.setattr(backend, "drain", drains.append)
     leaves = [MoveRobot(f"m{n}", 1.0, action_name=name) for n in range(20)]
     root = py_trees.composites.Sequence("all", memory=True, children=list(leaves))
     with TreeRunner(root, node=node) as runner:
         runner.interrupt()
         runner.run()
-    assert len(walks) == 1
+    assert len(drains) == 1
 
 
 def test_a_tick_begins_one_more_attempt_at_most(node: Any, name: str) -> None:
@@ -102,8 +97,7 @@ def test_a_visit_whose_first_tick_breaks_off_is_interrupted_by_the_next(
     journal = host.open(name)
     leaf = MoveRobot("m", 3.0, action_name=name)
     leaf.setup(node=node)
-    traffic = leaf._traffic
-    assert traffic is not None
+    traffic = backend_of(node).traffic
     until(lambda: leaf._endpoint is not None and leaf._endpoint.client.server_is_ready())
     advance = traffic.advance
 

@@ -405,7 +405,7 @@ def test_what_an_action_saves_is_converted_and_fails_it_where_that_cannot_be(loa
     )
     assert isinstance(leaf, ActionBehaviour)
     assert leaf._read_result(Fibonacci.Result(sequence=[7, 8])) == ""
-    assert sorted(map(repr, leaf._to_save.values())) == ["7.0", "8"]
+    assert sorted(map(repr, leaf._reading.to_save.values())) == ["7.0", "8"]
     assert leaf._read_result(Fibonacci.Result(sequence=[7, 300])).startswith("narrow: ")
 
 

@@ -315,7 +315,7 @@ class Caller:
                 self._judge_attempt(leaf, leaf.attempts, leaf.handle)
                 return
         if leaf.attempts is None:
-            leaf.attempts = Attempts(leaf.plan.retry, None, self._chance)
+            leaf.attempts = Attempts(leaf.plan.retry, None)
             leaf.visits += 1
         if leaf.handle is None:
             if leaf.attempts.pause_left(self.world.now) > 0.0:
@@ -337,7 +337,7 @@ class Caller:
         if outcome is Outcome.SUCCEEDED and self.takes("unexpected"):
             outcome = Outcome.UNEXPECTED_RESULT
         record = AttemptRecord(attempts.attempt, outcome, goal.reason, 0.0, 0.0, None, goal)
-        again = attempts.again(record, self.world.now)
+        again = attempts.again(record, self.world.now, self._chance)
         self.judge.noted(leaf, self.seen[goal.id], record, again)
         leaf.handle = None
         if not again:

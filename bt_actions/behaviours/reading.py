@@ -1,0 +1,107 @@
+"""What a leaf makes of a result: whether it is as expected, and what of it is saved. No ROS.
+
+Conditions and places may be given as functions of the result, or as text: there ``$x`` is a
+variable on the blackboard, and ``result`` what the server gave.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from bt_actions.behaviours.variables import read, write
+from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.suggest import did_you_mean
+
+__all__ = ["Reading", "condition_of"]
+
+Names = Callable[[Any], Mapping[str, object]]
+"""From a result to what an expression over it may name; called with None, what it could name."""
+Given = Callable[[Any], Any] | str
+
+
+def only_result(result: Any) -> Mapping[str, object]:
+    return {"result": result}
+
+
+def function_of(
+    given: Given, what: str, names: Names = only_result, *, condition: bool = False
+) -> Callable[[Any], Any]:
+    """Return what was given as a function of the result.
+
+    Raises ValueError for what is none, naming `what` it was given for. A function made from text
+    raises ExpressionError where it cannot be computed.
+    """
+    if callable(given):
+        return given
+    if not isinstance(given, str):
+        raise ValueError(f"{what} must be a callable on the result or an expression as text")
+    try:
+        expression = Expression(given, roots=names(None))
+    except ExpressionError as error:
+        raise ValueError(f"{what}: {error}") from error
+    compute = expression.holds if condition else expression.evaluate
+    return lambda result: compute(names(result), read)
+
+
+def condition_of(
+    given: Given | None, what: str, names: Names = only_result
+) -> Callable[[Any], bool] | None:
+    """As `function_of`, for a condition, or None."""
+    return None if given is None else function_of(given, what, names, condition=True)
+
+
+class Reading:
+    """The `expect`, `save` and `retry.when` of an action; a result is read first, saved later."""
+
+    def __init__(
+        self,
+        expect: Given | None,
+        save: Mapping[str, Given],
+        when: Given | None,
+        names: Names = only_result,
+    ) -> None:
+        """Raises ValueError for what is neither a function nor an expression."""
+        self._names = names
+        self._given = [("expect", expect), ("retry.when", when)]
+        self._given += (("save", place) for place in save.values())
+        self._expect = condition_of(expect, "expect", names)
+        self._expect_text = expect if isinstance(expect, str) else getattr(expect, "text", "")
+        self._save = {key: function_of(place, "save", names) for key, place in save.items()}
+        self.when = condition_of(when, "retry.when", names)
+        self.to_save: dict[str, Any] = {}
+        """What the last result gave, by blackboard key."""
+
+    def unknown_field(self, result_type: Any) -> str:
+        """Say which field one of them reads that a result of this type has not; or ""."""
+        fields = result_type.get_fields_and_field_types()
+        for what, text in self._given:
+            tree = Expression(text, roots=self._names(None)).tree if isinstance(text, str) else None
+            for node in ast.walk(tree) if tree is not None else ():
+                if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                    known = node.attr in fields or hasattr(result_type, node.attr)  # a constant
+                    if node.value.id == "result" and not known:
+                        hint = did_you_mean(node.attr, fields)
+                        return f"{what}: result has no field {node.attr!r}{hint}"
+        return ""
+
+    def read(self, result: Any) -> str:
+        """Check the result and read from it what is to be saved; return what is wrong with it."""
+        try:
+            if self._expect is not None and not self._expect(result):
+                wanted = f"{self._expect_text} was" if self._expect_text else "something else was"
+                return f"{wanted} expected, but the result is: {shorten(result)}"
+        except ExpressionError as error:
+            return str(error)
+        try:
+            self.to_save = {key: value(result) for key, value in self._save.items()}
+        except ValueError as error:  # ExpressionError, or what is saved does not fit
+            return str(error)
+        return ""
+
+    def write(self) -> None:
+        """Save it."""
+        for target, value in self.to_save.items():
+            write(target, value)
