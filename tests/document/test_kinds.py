@@ -12,7 +12,7 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from bt_actions.document import Severity, check_source, source_of, tree_outputs
-from bt_actions.document.language.model import KINDS, Kind
+from bt_actions.document.language.kinds import KINDS, Kind
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]
@@ -320,3 +320,14 @@ def test_what_a_tree_wrote_is_forgotten_when_nothing_of_it_is_left(load: Load) -
     load(text % 4)
     assert names() == {"forgotten0"}
     assert tree_outputs(kept) == {"n": 1}
+
+
+def test_a_blackboard_of_its_own_numbers_its_loads_from_the_first(
+    load: Load, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def keys() -> list[str]:
+        monkeypatch.setattr(Blackboard, "storage", {})
+        tick(load("tree: t\noutputs: {n: int32}\nroot: {set: {n: 1}}\n"))
+        return list(Blackboard.storage)
+
+    assert keys() == keys()

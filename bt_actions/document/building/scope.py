@@ -15,9 +15,17 @@ from py_trees.blackboard import Blackboard
 
 __all__ = ["Scope"]
 
-_loads = itertools.count(1)
-_gone: deque[str] = deque()
-"""Prefixes of which no scope is left; the collector may come in the middle of a tick."""
+_LOADS = "/bt/loads"
+"""The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""
+
+
+class _Loads:
+    """What tells the trees of a blackboard apart, and which of them are gone. Atomic steps only."""
+
+    def __init__(self) -> None:
+        self.numbers = itertools.count(1)
+        self.gone: deque[str] = deque()
+        """Prefixes of which no scope is left; the collector may come in the middle of a tick."""
 
 
 class Scope:
@@ -37,17 +45,18 @@ class Scope:
 
         Its variables are forgotten at a later load, when nothing of the tree is left.
         """
+        loads = Blackboard.storage.setdefault(_LOADS, _Loads())
         while True:
             try:
-                prefix = f"{_gone.popleft()}/"
+                prefix = f"{loads.gone.popleft()}/"
             except IndexError:
                 break
             for key in [key for key in list(Blackboard.storage) if key.startswith(prefix)]:
                 Blackboard.unset(key)
             for key in [key for key in list(Blackboard.metadata) if key.startswith(prefix)]:
                 Blackboard.metadata.pop(key, None)
-        scope = cls(f"/bt/{_safe(tree)}/{next(_loads)}")
-        weakref.finalize(scope, _gone.append, scope.prefix).atexit = False
+        scope = cls(f"/bt/{_safe(tree)}/{next(loads.numbers)}")
+        weakref.finalize(scope, loads.gone.append, scope.prefix).atexit = False
         return scope
 
     def inner(self, tree: str) -> Scope:
