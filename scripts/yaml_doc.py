@@ -16,21 +16,18 @@ from pathlib import Path
 
 from bt_actions.document.findings.pages import PAGES
 from bt_actions.document.findings.rules import RULES
-from bt_actions.document.language.model import (
+from bt_actions.document.language.keys import (
     ACTION_KEYS,
     ALIAS,
     INPUT,
-    KINDS,
     OUTPUT,
     RETRY,
     SERVICE_RETRY,
-    SERVICE_TIMEOUT,
     TIMEOUT,
     TOP_KEYS,
     TOPIC,
-    Group,
-    Kind,
 )
+from bt_actions.document.language.kinds import KINDS, SERVICE_TIMEOUT, Group, Kind
 from bt_actions.document.language.scalars import Text
 from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import Key, Record
@@ -45,7 +42,7 @@ PAGES_FILE = "bt_actions/document/findings/pages.py"
 HEAD = f"""\
 # Trees in YAML
 
-<!-- Made by scripts/yaml_doc.py from bt_actions/document/language/model.py. Do not edit. -->
+<!-- Made by scripts/yaml_doc.py from bt_actions/document/language/. Do not edit. -->
 
 A tree is a YAML file. `bt-actions check` finds what is wrong with it before a robot moves,
 `bt-actions format` puts it in canonical form, and `bt-actions schema` prints a JSON Schema for

@@ -62,9 +62,6 @@ STRAYS = {
 FILES = sorted(ROOT.rglob("*.py"))
 LONGEST, MOST_FILES = 400, 20
 LONG = {
-    "document/findings/pages.py",
-    "document/language/model.py",
-    "document/reading/read.py",
     "goals/goal.py",
     "recovery/sweep.py",
     "traffic/endpoint.py",

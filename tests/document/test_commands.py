@@ -16,7 +16,8 @@ import yaml
 from bt_actions.cli import main
 from bt_actions.document import check_source, source_of
 from bt_actions.document.findings.reports import as_github, as_json, as_sarif, as_text
-from bt_actions.document.language.model import KINDS, TOP_KEYS
+from bt_actions.document.language.keys import TOP_KEYS
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.schema import json_schema
 
 WRONG = """\

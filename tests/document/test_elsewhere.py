@@ -7,7 +7,7 @@ import re
 import pytest
 
 from bt_actions.document.findings import elsewhere
-from bt_actions.document.language.model import KINDS
+from bt_actions.document.language.kinds import KINDS
 from tests.document.test_wrong_documents import findings_of
 
 WORDS = {

@@ -17,7 +17,7 @@ from py_trees.common import Status
 from bt_actions import TreeRunner
 from bt_actions.document import check_file, load_tree, tree_outputs
 from bt_actions.document.formatting.format import format_source
-from bt_actions.document.language.model import KINDS
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.yaml.source import read_source
 from tests.support.waiting import until
 

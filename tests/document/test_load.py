@@ -26,7 +26,7 @@ from bt_actions.document import (
     tree_outputs,
 )
 from bt_actions.document.building.build import BUILDERS
-from bt_actions.document.language.model import KINDS
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.goals.policy import Retry, Timeouts
 from tests.document.conftest import tick
 

@@ -16,7 +16,8 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from bt_actions.document import DocumentError, tree_outputs
-from bt_actions.document.language.model import KINDS, NODE, NODES, TOP_KEYS
+from bt_actions.document.language.keys import NODE, NODES, TOP_KEYS
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.scalars import Condition, Duration, Place, Text
 from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import Key, ListOf, ListValue, OneOf, Record, Table, Values

@@ -13,7 +13,7 @@ import pytest
 from bt_actions.cli import main
 from bt_actions.document import check_file
 from bt_actions.document.findings.pages import PAGES
-from bt_actions.document.language.model import KINDS
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.schema import json_schema
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar

@@ -12,7 +12,7 @@ from collections import Counter
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.formatting.key_order import forms
 from bt_actions.document.formatting.layout import FormatError, Layout
-from bt_actions.document.language.model import TOP_KEYS
+from bt_actions.document.language.keys import TOP_KEYS
 from bt_actions.document.yaml.comments import comments_of, scalars_of
 from bt_actions.document.yaml.compose import compose, compose_written
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar

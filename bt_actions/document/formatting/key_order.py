@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from collections.abc import Mapping as MappingType
 
-from bt_actions.document.language.model import ACTION_KEYS, KINDS, NODE, NODES
+from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar

@@ -5,7 +5,8 @@ An action's alias is the file's own word, so a node may have one key that the sc
 
 from __future__ import annotations
 
-from bt_actions.document.language.model import ACTION_KEYS, KINDS, LIBRARY_KEYS, TOP_KEYS, Kind
+from bt_actions.document.language.keys import ACTION_KEYS, LIBRARY_KEYS, TOP_KEYS
+from bt_actions.document.language.kinds import KINDS, Kind
 from bt_actions.document.language.shape import Schema
 from bt_actions.document.language.shapes import Key, keys_schema
 

@@ -1,7 +1,7 @@
 """The forms of values with parts: lists, tables, records, data with variables in it.
 
-`model.py` says which key has which form. A form reports what is wrong to the source and then gives
-BAD; it knows nothing of the rest of the document.
+`keys.py` and `kinds.py` say which key has which form. A form reports what is wrong to the source
+and then gives BAD; it knows nothing of the rest of the document.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from bt_actions.document.findings import Place
-from bt_actions.document.language.model import Kind
+from bt_actions.document.language.kinds import Kind
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 

@@ -13,7 +13,8 @@ from pathlib import Path
 from bt_actions.document.findings import DocumentError, Finding, Related, Span
 from bt_actions.document.findings.elsewhere import package_here
 from bt_actions.document.reading.find import TreeNotFoundError, find_tree
-from bt_actions.document.reading.read import read_document, read_root
+from bt_actions.document.reading.nodes import read_root
+from bt_actions.document.reading.read import read_document
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.yaml.nodes import Listing, Node, span_of
 from bt_actions.document.yaml.source import SUFFIXES, Source, read_source

@@ -19,6 +19,7 @@ __all__ = [
     "beyond_floats",
     "data_of",
     "span_of",
+    "start_of",
 ]
 
 _NUMBER_START = frozenset("0123456789+-.")
@@ -93,6 +94,11 @@ class Alias(Node):
 def span_of(node: Node) -> Span:
     """The range of a node."""
     return Span(node.line, node.column, node.end_line, node.end_column)
+
+
+def start_of(node: Node) -> Span:
+    """The first character of a node."""
+    return Span(node.line, node.column, node.line, node.column + 1)
 
 
 def beyond_floats(node: Scalar) -> bool:

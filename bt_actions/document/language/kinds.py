@@ -1,7 +1,7 @@
-"""The language of trees in one place: which kinds of nodes there are, which keys, of which form.
+"""The kinds of nodes: which keys each has, of which form, and what it is for.
 
-Reading, checking, the JSON Schema and the reference (docs/yaml.md) are all made from this. What a
-kind does when it is built stands in `building/` under the same name; a test compares the two.
+What a kind does when it is built stands in `building/` under the same name; a test compares the
+two.
 """
 
 from __future__ import annotations
@@ -11,6 +11,21 @@ from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 
+from bt_actions.document.language.keys import (
+    ACTION_SERVER,
+    ACTION_TYPE,
+    DOING,
+    NAMESPACE,
+    NODE,
+    NODES,
+    POLICIES,
+    QOS,
+    RESULT,
+    SERVICE_RETRY,
+    TIMEOUT,
+    TOPIC_NAME,
+    keyed,
+)  # fmt: skip
 from bt_actions.document.language.ros_names import RosName
 from bt_actions.document.language.scalars import (
     Choice,
@@ -24,21 +39,24 @@ from bt_actions.document.language.scalars import (
     Text,
     TypeName,
     Whole,
-)
+)  # fmt: skip
 from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import (
     AnyValue,
     Key,
-    ListOf,
     ListValue,
     OneOf,
     Record,
     Table,
     Values,
-)
-from bt_actions.goals.policy import RETRYABLE, Busy
+)  # fmt: skip
 
-__all__ = ["ACTION_KEYS", "ALIAS", "KINDS", "LIBRARY_KEYS", "TOP_KEYS", "Group", "Kind"]
+__all__ = ["KINDS", "SERVICE_TIMEOUT", "Group", "Kind"]
+
+_LEVEL = Choice(("debug", "info", "warn", "error", "fatal"))
+_MESSAGE = frozenset({"message"})
+_RUN = frozenset({"result", "outputs"})
+_NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
 
 
 class Group(StrEnum):
@@ -66,150 +84,9 @@ class Kind:
         return isinstance(self.value, NodeName)
 
 
-def _keys(*keys: Key) -> Mapping[str, Key]:
-    return MappingProxyType({key.name: key for key in keys})
-
-
-_RESULT = frozenset({"result"})
-_MESSAGE = frozenset({"message"})
-_RUN = frozenset({"result", "outputs"})
-_NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
-_CHILD = "child"
-_CHILDREN = "children"
-
-TIMEOUT = Record(
-    "a duration or a mapping of deadlines",
-    _keys(
-        Key("queue", Duration(or_none=True), "For the resource to become free.", default="10 s"),
-        Key("server", Duration(or_none=True), "For a server to be there.", default="5 s"),
-        Key("accept", Duration(or_none=True), "From the goal to its acceptance.", default="5 s"),
-        Key("result", Duration(or_none=True), "From acceptance to the result.", default="none"),
-        Key("feedback", Duration(or_none=True), "The longest silence.", default="none"),
-        Key("cancel", Duration(or_none=True), "From canceling to the end.", default="5 s"),
-    ),
-    short="result",
-)
-_TRIES = (
-    Key("attempts", Whole(1), "All tries, the first among them.", default="1"),
-    Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
-    Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
-    Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
-    Key("jitter", Quantity(0.0, 1.0), "By how much of itself a pause varies.", default="0"),
-)
-_OUTCOMES = ListOf(Choice(tuple(sorted(outcome.value for outcome in RETRYABLE))), single=True)
-_WHEN = Key("when", Condition(_RESULT), "Try again only if this holds for the result.")
-RETRY = Record(
-    "a number of attempts or a mapping",
-    _keys(*_TRIES, Key("outcomes", _OUTCOMES, "After which outcomes to try again."), _WHEN),
-    short="attempts",
-)
-SERVICE_RETRY = Record("a number of attempts or a mapping", _keys(*_TRIES, _WHEN), short="attempts")
-NAMESPACE = RosName("a namespace", namespace=True)
-_POLICIES = (
-    Key("timeout", TIMEOUT, "How long each phase may take; a bare duration is the result's."),
-    Key("retry", RETRY, "How often to try; a bare number is the attempts."),
-    Key("busy", Choice(tuple(busy.value for busy in Busy)), "What to do while the server is taken.",
-        default="wait"),
-)  # fmt: skip
-_DOING = (
-    Key("goal", Values(), "The fields of the goal; what is not named keeps its default."),
-    *_POLICIES,
-    Key("expect", Condition(_RESULT), "What the result must be, beyond the server's word."),
-    Key("save", Table(Place(_RESULT)), "Names to keep parts of the result under."),
-    Key("resources", ListOf(Text("a text")),
-        "What the goal occupies, in place of its server; named as servers are.",
-        default="the server's name"),
-    Key("namespace", NAMESPACE, "Put before a relative name of a server or resource."),
-)  # fmt: skip
-ACTION_KEYS = _keys(*_DOING)
-"""What may stand beside an action's alias."""
-_TYPE = Key("type", TypeName("action"), "The action's type.", required=True)
-_SERVER = RosName("the name of an action server")
-ALIAS = Record(
-    "an action: its type, server and settings",
-    _keys(_TYPE, Key("server", _SERVER, "The action's name.", required=True), *_DOING),
-)
-INPUT = Record(
-    "the type of an input",
-    _keys(
-        Key("type", TypeName("value"), "What the value is.", required=True),
-        Key("default", AnyValue(), "The value where none is given; without it one must be."),
-        Key("unit", Text(), "For people."),
-        Key("description", Text(), "For people."),
-    ),
-    short="type",
-)
-OUTPUT = Record(
-    "the type of an output",
-    _keys(
-        Key("type", TypeName("value"), "What the value is.", required=True),
-        Key("unit", Text(), "For people."),
-        Key("description", Text(), "For people."),
-    ),
-    short="type",
-)
-QOS = Choice(("default", "sensor", "latched", "best_effort", "services"))
-_TOPIC = RosName("the name of a topic")
-TOPIC = Record(
-    "a topic: its name and type",
-    _keys(
-        Key("topic", _TOPIC, "The topic's name.", required=True),
-        Key("type", TypeName("msg"), "The message's type.", required=True),
-        Key("qos", QOS, "How it is subscribed to.", default="default"),
-        Key("max_age", Duration(or_none=True), default="none",
-            doc="A value older than this, by the node's clock, counts as missing."),
-        Key("namespace", NAMESPACE, "Put before a relative topic name."),
-    ),
-)  # fmt: skip
-DEFAULTS = Record("a mapping of settings", _keys(*_POLICIES))
-_DESCRIPTION = Key("description", Text(), "What it is for.")
-_IMPORT = Key("import", ListOf(Text("a path, as a text"), single=True), "Files with more of these.")
-_SHARED = (
-    Key("actions", Table(ALIAS), "This tree's words for the actions it uses."),
-    Key("topics", Table(TOPIC), "Latest values, read as `$name.field`; missing ones fail a check."),
-    Key("defaults", DEFAULTS, "Settings for all actions that do not say otherwise."),
-)
-
-
-class _NodeShape:
-    """A node of the tree; `read.py` reads it, since it needs the whole document."""
-
-    words = "a node"
-
-    def read(self, node: object, source: object) -> object:
-        raise AssertionError("nodes are read by read.py")
-
-    def schema(self) -> dict[str, object]:
-        return {"$ref": "#/$defs/node"}
-
-
-class _NodesShape(_NodeShape):
-    words = "a list of nodes"
-
-    def schema(self) -> dict[str, object]:
-        return {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/node"}}
-
-
-NODE: Shape = _NodeShape()
-NODES: Shape = _NodesShape()
-TOP_KEYS = _keys(
-    Key("tree", Name(), "The tree's name.", required=True),
-    _DESCRIPTION,
-    _IMPORT,
-    Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
-    Key("inputs", Table(INPUT), "Values that whoever runs the tree gives."),
-    Key("outputs", Table(OUTPUT), "Values that the tree gives back."),
-    *_SHARED,
-    Key("root", NODE, "The root node.", required=True),
-)
-"""What may stand at the top of a tree."""
-LIBRARY_KEYS = _keys(_DESCRIPTION, _IMPORT, *_SHARED)
-"""What may stand at the top of a file that is only imported."""
-
-LEVELS = ("debug", "info", "warn", "error", "fatal")
 SERVICE_TIMEOUT = Record(
     "a duration or a mapping of deadlines",
-    _keys(
+    keyed(
         Key("server", Duration(or_none=True), "For the service to be there.", default="5 s"),
         Key("response", Duration(or_none=True), "For the answer.", default="5 s"),
     ),
@@ -219,12 +96,12 @@ _POLICY = OneOf(
     Choice(("all", "one")),
     Record(
         "{at_least: N}",
-        _keys(Key("at_least", Whole(1), "So many must succeed.", required=True)),
+        keyed(Key("at_least", Whole(1), "So many must succeed.", required=True)),
     ),
 )
 _LIST = ListValue()
-_CHILDREN_KEY = Key(_CHILDREN, NODES, "The nodes it holds.", required=True)
-_CHILD_KEY = Key(_CHILD, NODE, "The node it holds.", required=True)
+_CHILDREN_KEY = Key("children", NODES, "The nodes it holds.", required=True)
+_CHILD_KEY = Key("child", NODE, "The node it holds.", required=True)
 _MEMORY = Key(
     "memory",
     Flag(),
@@ -234,16 +111,16 @@ _MEMORY = Key(
 
 
 def _composite(name: str, doc: str, example: str, *keys: Key) -> Kind:
-    return Kind(name, Group.COMPOSITE, NodeName(), doc, _keys(_CHILDREN_KEY, *keys), example)
+    return Kind(name, Group.COMPOSITE, NodeName(), doc, keyed(_CHILDREN_KEY, *keys), example)
 
 
 def _decorator(name: str, doc: str, example: str, *keys: Key) -> Kind:
-    return Kind(name, Group.DECORATOR, NodeName(), doc, _keys(_CHILD_KEY, *keys), example)
+    return Kind(name, Group.DECORATOR, NodeName(), doc, keyed(_CHILD_KEY, *keys), example)
 
 
 def _leaf(name: str, value: Shape, doc: str, example: str, *keys: Key) -> Kind:
     named = isinstance(value, NodeName)
-    return Kind(name, Group.LEAF, value, doc, _keys(*keys, *(() if named else (_NAME,))), example)
+    return Kind(name, Group.LEAF, value, doc, keyed(*keys, *(() if named else (_NAME,))), example)
 
 
 def _all() -> Iterable[Kind]:
@@ -321,7 +198,7 @@ def _all() -> Iterable[Kind]:
         Condition(),
         "Ticks its child as long as the expression is true, asked before each tick; stops it and "
         "fails when it is not.",
-        _keys(_CHILD_KEY, _NAME),
+        keyed(_CHILD_KEY, _NAME),
         "while: $level > 0.2\nchild:\n  success: Work",
     )
     yield _leaf(
@@ -330,9 +207,9 @@ def _all() -> Iterable[Kind]:
         "Sends a goal to an action; the same as a name under `actions`, with type and server here.",
         "action: To the part\ntype: robot_control_interfaces/action/MoveRobot\n"
         "server: move_robot\ngoal: {distance: 2.0}\ntimeout: 30 s",
-        _TYPE,
-        Key("server", _SERVER, "The action's name.", required=True),
-        *_DOING,
+        ACTION_TYPE,
+        Key("server", ACTION_SERVER, "The action's name.", required=True),
+        *DOING,
     )
     yield _leaf(
         "run_tree",
@@ -342,14 +219,14 @@ def _all() -> Iterable[Kind]:
         "run_tree: Fetch the part\ntree: fetch\nserver: /r1/run_tree\ninputs: {pick_at: 2.0}\n"
         "save: {at: outputs.at}",
         Key("tree", Text(values=True), "The tree's name at that server.", required=True),
-        Key("server", _SERVER, "The server's action.", default="run_tree"),
+        Key("server", ACTION_SERVER, "The server's action.", default="run_tree"),
         Key("inputs", Values(), "Values for the tree's inputs."),
         Key("timeout", TIMEOUT, "As for an action, but `cancel` is 15 s where nothing is said: "
             "the run sees its own goals to their ends first."),
-        *_POLICIES[1:],
+        *POLICIES[1:],
         Key("expect", Condition(_RUN), "What must hold of `result`, or of `outputs`."),
         Key("save", Table(Place(_RUN)), "Names to keep parts of the outputs under."),
-        *_DOING[-2:],
+        *DOING[-2:],
     )  # fmt: skip
     yield _leaf(
         "service",
@@ -362,13 +239,13 @@ def _all() -> Iterable[Kind]:
         Key("request", Values(), "The fields of the request."),
         Key("timeout", SERVICE_TIMEOUT, "How long to wait; a bare duration is the answer's."),
         Key("retry", SERVICE_RETRY, "How often to try; a bare number is the attempts."),
-        Key("expect", Condition(_RESULT), "What the answer must be."),
-        Key("save", Table(Place(_RESULT)), "Names to keep parts of the answer under."),
+        Key("expect", Condition(RESULT), "What the answer must be."),
+        Key("save", Table(Place(RESULT)), "Names to keep parts of the answer under."),
         Key("namespace", NAMESPACE, "Put before a relative name."),
     )
     yield _leaf(
         "publish",
-        _TOPIC,
+        TOPIC_NAME,
         "Publishes a message. While a process is new (3.5 s), who listens may not be discovered "
         "yet, so it waits for one until then; where nobody listens it succeeds with a warning.",
         "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
@@ -395,7 +272,7 @@ def _all() -> Iterable[Kind]:
         "Succeeds with the first message, since it started, that fits.",
         "wait_for_message: The door opens\ntopic: door\ntype: std_msgs/msg/Bool\n"
         "until: message.data\ntimeout: 60 s",
-        Key("topic", _TOPIC, "The topic.", required=True),
+        Key("topic", TOPIC_NAME, "The topic.", required=True),
         Key("type", TypeName("msg"), "The message's type.", required=True),
         Key("until", Condition(_MESSAGE), "What the message must be.", default="any message"),
         Key("timeout", Duration(or_none=True), "After which it fails.", default="none"),
@@ -424,7 +301,12 @@ def _all() -> Iterable[Kind]:
         Text(values=True),
         "Writes a line to the log.",
         "log: The level is $(level)\nlevel: warn",
-        Key("level", Choice(tuple(LEVELS)), "How grave it is.", default="info"),
+        Key(
+            "level",
+            Choice(("debug", "info", "warn", "error", "fatal")),
+            "How grave it is.",
+            default="info",
+        ),
     )
     yield _leaf(
         "python",

@@ -1,0 +1,115 @@
+"""The pages of the rules about hazards, as in `pages.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bt_actions.document.findings.page import SUCCESS, Page, moving, tree
+
+__all__ = ["HAZARD_PAGES"]
+
+HAZARD_PAGES: Mapping[str, Page] = {
+    "BT301": Page(
+        "An action without a result timeout waits for ever on a server that hangs. Where that is "
+        "meant, say so: {result: none}.",
+        moving("root: {move: Go}\n").replace("    timeout: 30 s\n", ""),
+        moving("root: {move: Go}\n"),
+    ),
+    "BT302": Page(
+        "When this is reached, no path through the tree has written the variable. What an action "
+        "saves is there when it has succeeded: not for the next child of a 'fallback'.",
+        moving("root:\n  sequence: Work\n  children:\n    - check: $at > 1.0\n"
+               "    - move: Go\n      save: {at: result.final_pose}\n"),
+        moving("root:\n  sequence: Work\n  children:\n    - move: Go\n"
+               "      save: {at: result.final_pose}\n    - check: $at > 1.0\n"),
+    ),
+    "BT303": Page(
+        "Two branches of a 'parallel' need one resource: an action server, or what 'resources' "
+        "names in its place. One of them waits for the other, or fails when its queue timeout "
+        "passes.",
+        moving("root:\n  parallel: Both\n  children: [{move: Left}, {move: Right}]\n"),
+        moving("root:\n  sequence: One after the other\n  children: [{move: Left},"
+               " {move: Right}]\n"),
+    ),
+    "BT304": Page(
+        "A retry without 'attempts' never gives up, and a tree around it never gets on.",
+        tree("inputs: {ready: bool}\nroot:\n  retry: Until ready\n  child: {check: $ready}\n"),
+        tree("inputs: {ready: bool}\nroot:\n  retry: Until ready\n  attempts: 5\n"
+             "  child: {check: $ready}\n"),
+    ),
+    "BT305": Page(
+        "The child before this one always ends the composite: a 'fallback' stops at the first "
+        "success, a 'sequence' at the first failure.",
+        tree("root:\n  sequence: Work\n  children: [{failure: Give up}, {success: Done}]\n"),
+        tree("root:\n  sequence: Work\n  children: [{success: Done}, {failure: Give up}]\n"),
+    ),
+    "BT306": Page(
+        "A composite with 'memory: false' begins with its first child at each tick. What takes "
+        "time and has finished is thereby started again while a later child runs: an action is "
+        "sent, a service is called, a wait begins. The later child is interrupted, for ever. A "
+        "child that may pass without it, such as a fallback of a check and an action, is fine.",
+        moving("root:\n  sequence: Work\n  memory: false\n  children: [{move: Go}, {wait: 5 s}]\n"),
+        moving("inputs: {ready: bool}\nroot:\n  sequence: Work\n  memory: false\n"
+               "  children: [{check: $ready}, {move: Go}]\n"),
+    ),
+    "BT307": Page(
+        "The node stops what it holds before the deadlines for results and answers, the waits and "
+        "the retries in there can pass. What an action may take besides, for its queue, server and"
+        " acceptance, is not counted.",
+        moving("root:\n  timeout: Short\n  after: 5 s\n  child: {move: Go}\n"),
+        moving("root:\n  timeout: Long enough\n  after: 40 s\n  child: {move: Go}\n"),
+    ),
+    "BT308": Page(
+        "Nothing in the tree reads this input, so giving it does nothing.",
+        tree("inputs: {speed: float64}\n" + SUCCESS),
+        tree("inputs: {speed: float64}\nroot: {check: $speed > 0.0}\n"),
+    ),
+    "BT309": Page(
+        "The tree declares an action or a topic that no node uses.",
+        moving(SUCCESS),
+        moving("root: {move: Go}\n"),
+    ),
+    "BT310": Page(
+        "A node writes a variable that nothing reads, and that is no output.",
+        tree("root: {set: {count: 1}}\n"),
+        tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
+    ),
+    "BT311": Page(
+        "The tree promises an output that none of its nodes writes.",
+        tree("outputs: {count: int32}\n" + SUCCESS),
+        tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
+    ),
+    "BT312": Page(
+        "A 'for_each' gives its item, or its index, the name of an input, of a topic, or of the "
+        "item of a loop around it: who reads it afterwards may read the wrong one.",
+        tree("inputs: {limit: float64}\nroot:\n  for_each: Limit\n  in: [1.0, 2.0]\n"
+             "  as: limit\n  child: {check: $limit > 0.0}\n"),
+        tree("inputs: {limit: float64}\nroot:\n  for_each: Item\n  in: [1.0, 2.0]\n"
+             "  as: value\n  child: {check: $limit > $value}\n"),
+    ),
+    "BT313": Page(
+        "The items of a list are mappings, and this key is not in every one of them; what reads it"
+        " fails there. Where that is meant, ask first: 'at' in $item and $item.at > 1.",
+        tree("root:\n  for_each: Stop\n  in: [{at: 1.0}, {to: 2.0}]\n"
+             "  child: {check: $item.at > 0.0}\n"),
+        tree("root:\n  for_each: Stop\n  in: [{at: 1.0}, {at: 2.0}]\n"
+             "  child: {check: $item.at > 0.0}\n"),
+    ),
+    "BT314": Page(
+        "A check fails while nothing has come on the topic that it reads. Inverted, that is a "
+        "success, although nobody knows: a door that was never heard of is not open. A 'not' in "
+        "the check itself fails as long as there is no value.",
+        tree("topics: {door: {topic: door_closed, type: std_msgs/msg/Bool}}\n"
+             "root:\n  invert: Open\n  child: {check: $door.data}\n"),
+        tree("topics: {door: {topic: door_closed, type: std_msgs/msg/Bool}}\n"
+             "root: {check: not $door.data}\n"),
+    ),
+    "BT315": Page(
+        "A text holds the name of a variable as other languages mark it, or a value is nothing but"
+        " such names: both stay text. The value of a variable is $name, or $(name) inside a text, "
+        "and what is to be computed begins with '= '. Quotes say that a bare name is meant as "
+        "text.",
+        tree('inputs: {part: string}\nroot: {log: "Part {part}"}\n'),
+        tree("inputs: {part: string}\nroot: {log: Part $(part)}\n"),
+    ),
+}  # fmt: skip

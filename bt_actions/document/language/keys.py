@@ -1,0 +1,168 @@
+"""The keys of trees: at the top, beside actions, topics, inputs and outputs, each with its form.
+
+Which kinds of nodes there are is said in `kinds.py`. Reading, checking, the JSON Schema and the
+reference (docs/yaml.md) are all made from these two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from bt_actions.document.language.ros_names import RosName
+from bt_actions.document.language.scalars import (
+    Choice,
+    Condition,
+    Duration,
+    Name,
+    Place,
+    Quantity,
+    Text,
+    TypeName,
+    Whole,
+)
+from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.shapes import AnyValue, Key, ListOf, Record, Table, Values
+from bt_actions.goals.policy import RETRYABLE, Busy
+
+__all__ = [
+    "ACTION_KEYS", "ACTION_SERVER", "ACTION_TYPE", "ALIAS", "DOING", "INPUT", "LIBRARY_KEYS",
+    "NAMESPACE", "NODE", "NODES", "OUTPUT", "POLICIES", "QOS", "RESULT", "RETRY", "SERVICE_RETRY",
+    "TIMEOUT", "TOPIC", "TOPIC_NAME", "TOP_KEYS", "keyed",
+]  # fmt: skip
+
+
+def keyed(*keys: Key) -> Mapping[str, Key]:
+    return MappingProxyType({key.name: key for key in keys})
+
+
+RESULT = frozenset({"result"})
+
+TIMEOUT = Record(
+    "a duration or a mapping of deadlines",
+    keyed(
+        Key("queue", Duration(or_none=True), "For the resource to become free.", default="10 s"),
+        Key("server", Duration(or_none=True), "For a server to be there.", default="5 s"),
+        Key("accept", Duration(or_none=True), "From the goal to its acceptance.", default="5 s"),
+        Key("result", Duration(or_none=True), "From acceptance to the result.", default="none"),
+        Key("feedback", Duration(or_none=True), "The longest silence.", default="none"),
+        Key("cancel", Duration(or_none=True), "From canceling to the end.", default="5 s"),
+    ),
+    short="result",
+)
+_TRIES = (
+    Key("attempts", Whole(1), "All tries, the first among them.", default="1"),
+    Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
+    Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
+    Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
+    Key("jitter", Quantity(0.0, 1.0), "By how much of itself a pause varies.", default="0"),
+)
+_OUTCOMES = ListOf(Choice(tuple(sorted(outcome.value for outcome in RETRYABLE))), single=True)
+_WHEN = Key("when", Condition(RESULT), "Try again only if this holds for the result.")
+RETRY = Record(
+    "a number of attempts or a mapping",
+    keyed(*_TRIES, Key("outcomes", _OUTCOMES, "After which outcomes to try again."), _WHEN),
+    short="attempts",
+)
+SERVICE_RETRY = Record("a number of attempts or a mapping", keyed(*_TRIES, _WHEN), short="attempts")
+NAMESPACE = RosName("a namespace", namespace=True)
+POLICIES = (
+    Key("timeout", TIMEOUT, "How long each phase may take; a bare duration is the result's."),
+    Key("retry", RETRY, "How often to try; a bare number is the attempts."),
+    Key("busy", Choice(tuple(busy.value for busy in Busy)), "What to do while the server is taken.",
+        default="wait"),
+)  # fmt: skip
+DOING = (
+    Key("goal", Values(), "The fields of the goal; what is not named keeps its default."),
+    *POLICIES,
+    Key("expect", Condition(RESULT), "What the result must be, beyond the server's word."),
+    Key("save", Table(Place(RESULT)), "Names to keep parts of the result under."),
+    Key("resources", ListOf(Text("a text")),
+        "What the goal occupies, in place of its server; named as servers are.",
+        default="the server's name"),
+    Key("namespace", NAMESPACE, "Put before a relative name of a server or resource."),
+)  # fmt: skip
+ACTION_KEYS = keyed(*DOING)
+"""What may stand beside an action's alias."""
+ACTION_TYPE = Key("type", TypeName("action"), "The action's type.", required=True)
+ACTION_SERVER = RosName("the name of an action server")
+ALIAS = Record(
+    "an action: its type, server and settings",
+    keyed(ACTION_TYPE, Key("server", ACTION_SERVER, "The action's name.", required=True), *DOING),
+)
+INPUT = Record(
+    "the type of an input",
+    keyed(
+        Key("type", TypeName("value"), "What the value is.", required=True),
+        Key("default", AnyValue(), "The value where none is given; without it one must be."),
+        Key("unit", Text(), "For people."),
+        Key("description", Text(), "For people."),
+    ),
+    short="type",
+)
+OUTPUT = Record(
+    "the type of an output",
+    keyed(
+        Key("type", TypeName("value"), "What the value is.", required=True),
+        Key("unit", Text(), "For people."),
+        Key("description", Text(), "For people."),
+    ),
+    short="type",
+)
+QOS = Choice(("default", "sensor", "latched", "best_effort", "services"))
+TOPIC_NAME = RosName("the name of a topic")
+TOPIC = Record(
+    "a topic: its name and type",
+    keyed(
+        Key("topic", TOPIC_NAME, "The topic's name.", required=True),
+        Key("type", TypeName("msg"), "The message's type.", required=True),
+        Key("qos", QOS, "How it is subscribed to.", default="default"),
+        Key("max_age", Duration(or_none=True), default="none",
+            doc="A value older than this, by the node's clock, counts as missing."),
+        Key("namespace", NAMESPACE, "Put before a relative topic name."),
+    ),
+)  # fmt: skip
+DEFAULTS = Record("a mapping of settings", keyed(*POLICIES))
+_DESCRIPTION = Key("description", Text(), "What it is for.")
+_IMPORT = Key("import", ListOf(Text("a path, as a text"), single=True), "Files with more of these.")
+_SHARED = (
+    Key("actions", Table(ALIAS), "This tree's words for the actions it uses."),
+    Key("topics", Table(TOPIC), "Latest values, read as `$name.field`; missing ones fail a check."),
+    Key("defaults", DEFAULTS, "Settings for all actions that do not say otherwise."),
+)
+
+
+class _NodeShape:
+    """A node of the tree; `reading/nodes.py` reads it, since it needs the whole document."""
+
+    words = "a node"
+
+    def read(self, node: object, source: object) -> object:
+        raise AssertionError("nodes are read by reading/nodes.py")
+
+    def schema(self) -> dict[str, object]:
+        return {"$ref": "#/$defs/node"}
+
+
+class _NodesShape(_NodeShape):
+    words = "a list of nodes"
+
+    def schema(self) -> dict[str, object]:
+        return {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/node"}}
+
+
+NODE: Shape = _NodeShape()
+NODES: Shape = _NodesShape()
+TOP_KEYS = keyed(
+    Key("tree", Name(), "The tree's name.", required=True),
+    _DESCRIPTION,
+    _IMPORT,
+    Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
+    Key("inputs", Table(INPUT), "Values that whoever runs the tree gives."),
+    Key("outputs", Table(OUTPUT), "Values that the tree gives back."),
+    *_SHARED,
+    Key("root", NODE, "The root node.", required=True),
+)
+"""What may stand at the top of a tree."""
+LIBRARY_KEYS = keyed(_DESCRIPTION, _IMPORT, *_SHARED)
+"""What may stand at the top of a file that is only imported."""

@@ -1,0 +1,335 @@
+"""From YAML nodes to the nodes of a tree: their kinds, and the forms of their keys.
+
+Reports what is wrong as `read.py` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+from itertools import chain
+
+from bt_actions.document.findings import Place, Related
+from bt_actions.document.findings.elsewhere import kind_here
+from bt_actions.document.language.keys import ACTION_KEYS
+from bt_actions.document.language.kinds import KINDS, Kind
+from bt_actions.document.language.scalars import Name
+from bt_actions.document.language.shape import words_for, wrong_form
+from bt_actions.document.language.shapes import (
+    Key,
+    Table,
+    report_unknown_key,
+    required_in,
+)
+from bt_actions.document.language.values import BAD
+from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.reading.unread import Doubts
+from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
+from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
+
+__all__ = ["NODE_KEYS", "read_root"]
+
+_CHILDREN = ("child", "children")
+NODE_KEYS = frozenset(
+    {*ACTION_KEYS, *_CHILDREN, *(key for kind in KINDS.values() for key in kind.keys)}
+)
+"""All that may stand in a node beside its kind."""
+_BESIDE_CHILD = frozenset({"timeout", "retry"})
+"""Kinds only beside `child:`; settings of an action elsewhere."""
+_BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
+"""Kinds that are taken for keys in a node whose kind stands behind 'type:'."""
+_FIELDS = ("goal", "request", "message")
+"""Keys for the fields of what a node sends."""
+
+
+def read_root(document: Document) -> None:
+    """Read the nodes of a document whose actions are all known (its imports' among them)."""
+    written = document.node.get("root")
+    if written is not None:
+        document.root = _Reader(document).tree(written)
+
+
+class _Reader:
+    """Reads nodes. No recursion: trees inside each other are read while others wait."""
+
+    def __init__(self, document: Document) -> None:
+        self._source = document.source
+        self._actions = document.actions
+        self._doubts = Doubts(document)
+        actions = document.node.get("actions")
+        own = actions.pairs if isinstance(actions, Mapping) else []
+        self._refused = {key.text for key, _ in own} & NODE_KEYS
+        """Names of actions that were reported: what looks like a key may be meant for one."""
+        self._waiting: list[tuple[TreeNode, Node]] = []
+        """Children to be read, each with its parent; the next is the last."""
+
+    def tree(self, written: Node) -> TreeNode | None:
+        """The tree that begins with a node."""
+        root = self.node(written)
+        while self._waiting:
+            parent, item = self._waiting.pop()
+            child = self.node(item)
+            if child is not None:
+                parent.children.append(child)
+        return root
+
+    def node(self, written: Node) -> TreeNode | None:
+        """A node by itself; its children wait."""
+        node = self._node(written)
+        if node is None:
+            self._source.unread.nodes.append(written)
+        return node
+
+    def _node(self, written: Node) -> TreeNode | None:
+        source = self._source
+        if not isinstance(written, Mapping):
+            hint = None
+            if isinstance(written, Scalar):
+                word, _, name = written.text.partition(":")
+                if word in KINDS or word in self._actions:
+                    hint = f"write '{word}: {name or 'name'}'"
+            message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
+            source.report("BT111", span_of(written), message, hint=hint)
+            return None
+        key = None if self._typed(written) else self._kind_key(written)
+        if key is None:
+            self._only_children(written)
+            return None
+        kind = KINDS.get(key.text)
+        node = TreeNode(kind, key, written, source)
+        if kind is None:
+            node.alias = key.text
+            self._fill(node, ACTION_KEYS, _ACTION_NAME, _ACTION_NEEDS)
+        else:
+            self._fill(node, kind.keys, kind, _NEEDS[kind.name])
+        return node
+
+    def _typed(self, written: Mapping) -> bool:
+        """Whether a node says its kind behind 'type:', which is reported."""
+        said = written.get("type")
+        if not isinstance(said, Scalar) or "/" in said.text:
+            return False
+        kinds = {folded(kind): kind for kind in (*KINDS, *self._actions)}
+        word, here = kinds.get(folded(said.text)), kind_here(said.text)
+        keys = {key.text for key, _ in written.pairs if key.text in kinds.values()}
+        if not (word or (here and "action" not in keys)) or keys - _BESIDE_TYPE:
+            return False
+        name, action = written.get("name"), written.get("action")
+        if word == "action" and isinstance(action, Scalar):
+            if action.text in self._actions or name is not None:
+                word = action.text
+            else:
+                name = action
+        if word:
+            here = f"write '{word}: {name.text if isinstance(name, Scalar) else '...'}'"
+        key = next(key for key, inner in written.pairs if inner is said)
+        self._source.report("BT111", span_of(key), "a node's kind is its key", hint=here)
+        self._source.unread.actions = True
+        return True
+
+    def _kind_key(self, written: Mapping) -> Scalar | None:
+        """The one key that is a kind or an alias, or None after reporting."""
+        kinds = [key for key, _ in written.pairs if key.text in KINDS or key.text in self._actions]
+        if len(kinds) == 1 and kinds[0].text not in _BESIDE_CHILD:
+            return kinds[0]
+        has_child = any(key.text == "child" for key, _ in written.pairs)
+        found = [key for key in kinds if has_child or key.text not in _BESIDE_CHILD]
+        if len(found) > 1 and has_child:
+            found = [key for key in found if key.text not in _BESIDE_CHILD] or found[:1]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            first, second = found[0], found[1]
+            place = Place(self._source.name, first.line, first.column)
+            self._source.report(
+                "BT112", span_of(second),
+                f"a node is one thing: this is a {first.text!r} and a {second.text!r}",
+                hint="begin a new item with '-'", related=Related(place, "the first is here"),
+            )  # fmt: skip
+            return None
+        words = [key for key, _ in written.pairs if key.text not in NODE_KEYS]
+        beside = [key for key, _ in written.pairs if key.text in _BESIDE_CHILD]
+        if (
+            len(beside) == 1
+            and not words
+            and (
+                written.get("children") is not None
+                or self._holds_nodes(written.get(beside[0].text))
+            )
+        ):
+            return beside[0]  # with what it holds in the place of 'child'
+        self._report_no_kind(written, words)
+        return None
+
+    def _report_no_kind(self, written: Mapping, words: list[Scalar]) -> None:
+        if not words and any(key.text in self._refused for key, _ in written.pairs):
+            self._source.unread.actions = True
+            return
+        words = words or [key for key, _ in written.pairs if kind_here(key.text)]
+        if not words:
+            hint = "one key of a node is its kind, such as 'sequence: name'"
+            self._source.report("BT111", start_of(written), "this node has no kind", hint=hint)
+            return
+        self._source.unread.actions = True
+        if any(self._doubts.declares(word.text) for word in words):
+            return
+        known = [*KINDS, *self._actions]
+        meant = (word for word in words if kind_here(word.text) or closest(word.text, known))
+        key = next(meant, words[0])
+        same = folded(key.text) in map(folded, known)
+        here = None if same else kind_here(key.text)
+        near = f"; {here}" if here else did_you_mean(key.text, known)
+        own = listing(self._actions)
+        hint = f"this tree's actions are {own}" if own else "this tree declares no actions"
+        message = f"no kind of node and no action is called {key.text!r}{near}"
+        self._source.report("BT201", span_of(key), message, hint=None if near else hint)
+
+    def _only_children(self, written: Mapping) -> None:
+        """What is below a node that could not be read is read for its own sake."""
+        for name in _CHILDREN:
+            inner = written.get(name)
+            if inner is not None:
+                self._children(TreeNode(None, Scalar(), written, self._source), name, inner)
+
+    def _fill(
+        self, node: TreeNode, keys: MappingType[str, Key], kind: Kind, needs: tuple[Key, ...]
+    ) -> None:
+        source = self._source
+        unknown = False
+        beside: list[tuple[Scalar, Node]] = []
+        for key, inner in chain(node.node.pairs, beside):
+            name = key.text
+            if key is node.key:
+                node.written[name] = inner
+                hint = None
+                if not isinstance(inner, Scalar):
+                    hint = self._below_name(node, inner, kind, keys, beside)
+                if hint is None:
+                    value = kind.value.read(inner, source)
+                else:
+                    value = wrong_form(kind.value, inner, source, hint=hint)
+                node.values[name] = value
+                if kind.named_by_value and isinstance(value, str):
+                    node.name = value
+                if value is BAD:
+                    source.unread.nodes.append(inner)
+            elif name in _CHILDREN and name in keys:
+                node.written[name] = inner
+                self._children(node, name, inner)
+            else:
+                known = keys.get(name)
+                if known is None:
+                    unknown = True
+                    self._report_unknown(node, key, keys)
+                    source.unread.nodes += (key, inner)
+                    if name in _CHILDREN:
+                        self._children(TreeNode(None, key, node.node, source), name, inner)
+                    continue
+                node.written[name] = inner
+                value = node.values[name] = known.shape.read(inner, source)
+                if value is BAD:
+                    source.unread.nodes.append(inner)
+                    source.unread.names |= isinstance(known.shape, Name)
+        own = node.values.get("name")
+        if isinstance(own, str):
+            node.name = own
+        if unknown:
+            return
+        for wanted in needs:
+            if wanted.name not in node.written:
+                source.report(
+                    "BT108", span_of(node.key),
+                    f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,
+                )  # fmt: skip
+                source.unread.nodes.append(node.key)
+
+    def _below_name(
+        self,
+        node: TreeNode,
+        inner: Node,
+        kind: Kind,
+        keys: MappingType[str, Key],
+        beside: list[tuple[Scalar, Node]],
+    ) -> str | None:
+        """What to write for a collection that stands below a kind's word, in the place of a name.
+
+        It is read on as if it stood where it belongs: keys that belong beside the word are added to
+        `beside`. None, where nobody can tell what is meant.
+        """
+        if isinstance(kind.value, Table):
+            return None
+        write = f"write '{node.key.text}: {'name' if kind.named_by_value else '...'}'"
+        held = next((name for name in _CHILDREN if name in keys), None)
+        fields = next((name for name in _FIELDS if name in keys), None)
+        if isinstance(inner, Mapping):
+            names = {key.text for key, _ in inner.pairs}
+            known = names & {*keys, "name"}
+            if known and (fields is None or known == names or known & {fields, "type"}):
+                beside += [pair for pair in inner.pairs if pair[0].text != "name"]
+                name = inner.get("name")
+                if isinstance(name, Scalar) and kind.named_by_value:
+                    write = f"write '{node.key.text}: {name.text}'"
+                return f"{write}, and the keys beside it"
+            if fields is not None:
+                return f"{write}, and the fields beside it, under '{fields}:'"
+        if held is None or not kind.named_by_value or node.node.get(held) is not None:
+            return None
+        if not self._holds_nodes(inner):
+            return None
+        node.written[held] = inner
+        items = inner.items if isinstance(inner, Listing) else [inner]
+        self._waiting += [(node, item) for item in reversed(items)]
+        what = "list" if held == "children" else "node"
+        if what == "node" and len(items) > 1:
+            what = "'sequence' of these nodes"
+        return f"{write}, and the {what} beside it, under '{held}:'"
+
+    def _holds_nodes(self, inner: Node | None) -> bool:
+        """Whether this is a list, or a node, rather than a setting."""
+        return isinstance(inner, Listing) or (
+            isinstance(inner, Mapping)
+            and any(
+                key.text in KINDS or key.text in _CHILDREN or key.text in self._actions
+                for key, _ in inner.pairs
+            )
+        )
+
+    def _report_unknown(self, node: TreeNode, key: Scalar, keys: MappingType[str, Key]) -> None:
+        if key.text in _CHILDREN:
+            other = "child" if key.text == "children" else "children"
+            hint = f"it holds {other!r}" if other in keys else "it is a leaf"
+            message = f"{node.key.text!r} has no {key.text!r}"
+            self._source.report("BT107", span_of(key), message, hint=hint)
+        else:
+            hint = None
+            if key.text == "name" and "name" not in keys:
+                hint = f"the name stands behind '{node.key.text}:'"
+            report_unknown_key(key, keys, self._source, hint)
+
+    def _children(self, node: TreeNode, name: str, inner: Node) -> None:
+        if name == "child":
+            if isinstance(inner, Listing):
+                message = "'child' is one node, not a list"
+                self._source.report("BT109", span_of(inner), message, hint="use a sequence")
+                self._source.unread.nodes.append(inner)
+                written: list[Node] = inner.items
+            else:
+                written = [inner]
+        elif not isinstance(inner, Listing):
+            message = f"a list of nodes is needed, not {words_for(inner)}"
+            hint = "each child begins with '- '" if isinstance(inner, Mapping) else None
+            self._source.report("BT109", span_of(inner), message, hint=hint)
+            self._source.unread.nodes.append(inner)
+            return
+        else:
+            written = inner.items
+            if not written:
+                self._source.report("BT110", span_of(inner), "there must be a child at least")
+                self._source.unread.nodes.append(inner)
+        self._waiting += [(node, item) for item in reversed(written)]
+
+
+_ACTION_NAME = KINDS["sequence"]
+"""The value of an alias is the node's name, as that of a composite is."""
+_ACTION_NEEDS = required_in(ACTION_KEYS)
+_NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
+"""The keys that must be there."""
