@@ -28,7 +28,7 @@ from bt_actions.ros import spinning
 from bt_actions.ros.log import log
 from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
-from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, state, together
+from tests.support.trees import Gate, Raises, in_sequence, state, together
 from tests.support.waiting import holds_for, until
 
 
@@ -135,11 +135,6 @@ class TestRun:
             with pytest.raises(ValueError, match="number of seconds"):
                 runner.wait(float("nan"))
             assert runner.wait(1e300) is Status.SUCCESS
-
-    def test_a_heartbeat_may_be_endless(self, journal: Journal, name: str, node: Any) -> None:
-        leaf = MoveRobot("m", 0.1, action_name=name)
-        with TreeRunner(leaf, node=node, heartbeat=float("inf")) as runner:
-            assert runner.run() is Status.SUCCESS
 
     def test_after_shutdown_it_raises(self, node: Any) -> None:
         runner = TreeRunner(Gate(), node=node)
@@ -322,133 +317,6 @@ class ShutsDown(Gate):
         self.downs += 1
 
 
-class WithoutStatus(Behaviour):
-    def __init__(self, status: Any = None) -> None:
-        super().__init__("forgets")
-        self.returns = status
-
-    def update(self) -> Any:
-        return self.returns
-
-
-class ForgetfulDecorator(py_trees.decorators.Decorator):
-    def update(self) -> Any:
-        return None
-
-
-class ForgetfulComposite(py_trees.composites.Composite):
-    def tick(self) -> Iterator[Behaviour]:
-        yield from self.children[0].tick()
-        self.status = None  # type: ignore[assignment]
-        yield self
-
-
-class TestWithoutAStatus:
-    @pytest.mark.parametrize(
-        "bad",
-        [
-            WithoutStatus(),
-            WithoutStatus("SUCCESS"),
-            ForgetfulDecorator("forgets", py_trees.behaviours.Success("s")),
-            ForgetfulComposite("forgets", [py_trees.behaviours.Success("s")]),
-        ],
-        ids=["leaf", "leaf that returns something else", "decorator", "composite"],
-    )
-    def test_a_behaviour_ends_the_run_and_nothing_passes_over_it(
-        self, node: Any, bad: Behaviour
-    ) -> None:
-        then = py_trees.behaviours.Success("then")
-        root = in_turn(in_sequence(bad, name="branch"), then, name="root")
-        with (
-            TreeRunner(root, node=node) as runner,
-            pytest.raises(TreeError, match=r"^root/branch/forgets: no status after its tick"),
-        ):
-            runner.run(timeout=9.0)
-
-
-class Counted(Behaviour):
-    """Notes what is called; SUCCESS."""
-
-    def __init__(self, name: str, calls: list[str], *, fails: int = 0) -> None:
-        super().__init__(name)
-        self.calls, self.fails = calls, fails
-
-    def setup(self, **kwargs: Any) -> None:
-        self.calls.append(f"setup {self.name}")
-        self.fails -= 1
-        if self.fails >= 0:
-            raise OSError("no device")
-
-    def update(self) -> Status:
-        self.calls.append(self.name)
-        return Status.SUCCESS
-
-    def shutdown(self) -> None:
-        self.calls.append(f"shutdown {self.name}")
-
-
-class TestSetup:
-    def test_is_called_once_however_often_the_tree_runs(self, node: Any) -> None:
-        calls: list[str] = []
-        with TreeRunner(in_sequence(Counted("a", calls)), node=node) as runner:
-            for _ in range(3):
-                runner.run(timeout=9.0)
-        assert calls == ["setup a", "a", "a", "a", "shutdown a"]
-
-    def test_of_a_tree_with_a_setup_of_its_own_is_called_once(self, node: Any) -> None:
-        class Tree(py_trees.trees.BehaviourTree):
-            def setup(self, *args: Any, **kwargs: Any) -> None:
-                calls.append("setup of the tree")
-                super().setup(*args, **kwargs)
-
-        calls: list[str] = []
-        with TreeRunner(Tree(Counted("a", calls)), node=node) as runner:
-            for _ in range(2):
-                runner.run(timeout=9.0)
-        assert calls == ["setup of the tree", "setup a", "a", "a", "shutdown a"]
-
-    def test_that_raised_is_called_again_for_those_that_were_not_set_up(self, node: Any) -> None:
-        calls: list[str] = []
-        root = in_sequence(Counted("a", calls), Counted("b", calls, fails=1), name="root")
-        with TreeRunner(root, node=node) as runner:
-            with pytest.raises(TreeError, match="root/b: setup raised OSError: no device"):
-                runner.run(timeout=9.0)
-            runner.run(timeout=9.0)
-        assert calls[:5] == ["setup a", "setup b", "setup b", "a", "b"]
-
-    @pytest.mark.parametrize("who", ["handler", "observer"])
-    def test_of_what_is_inserted_in_a_run_comes_before_its_first_tick(
-        self, node: Any, who: str
-    ) -> None:
-        calls: list[str] = []
-        inner = in_sequence(Gate(), name="inner")
-        tree = py_trees.trees.BehaviourTree(in_sequence(inner, name="root"))
-
-        def replace(_: object) -> None:
-            if tree.root.status is Status.RUNNING and len(inner.children) == 1:
-                inner.remove_all_children()
-                inner.add_child(Counted("new", calls))
-                inner.add_child(Counted("last", calls))
-
-        with TreeRunner(tree, node=node) as runner:
-            if who == "handler":
-                tree.add_pre_tick_handler(replace)
-            else:
-                runner.observe(replace)
-            assert runner.run(timeout=9.0) is Status.SUCCESS
-        assert calls[:4] == ["setup new", "setup last", "new", "last"]
-
-    def test_of_what_is_inserted_in_a_run_is_named_where_it_raises(self, node: Any) -> None:
-        root, new = in_sequence(Gate(), name="root"), Raises("new", "setup")
-        tree = py_trees.trees.BehaviourTree(root)
-        tree.add_pre_tick_handler(lambda _: root.add_child(new))
-        with (
-            TreeRunner(tree, node=node) as runner,
-            pytest.raises(TreeError, match=r"^root/new: setup raised"),
-        ):
-            runner.run(timeout=9.0)
-
-
 class Stuck(Behaviour):
     """Does not return from its first tick after its cue until it is let go; then SUCCESS."""
 
@@ -548,15 +416,6 @@ class TestInterrupt:
             finally:
                 signal.signal(signal.SIGUSR2, before)
         assert journal.ends() == ["canceled"]
-
-    def test_before_a_run_makes_it_return_at_once(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
-            runner.interrupt()
-            assert runner.run(timeout=5.0) is Status.INVALID
-            assert journal.events() == []
-            assert runner.run(timeout=5.0) is Status.SUCCESS
 
     def test_to_abandon_ends_the_wait_for_a_goal_that_cannot_be_canceled(
         self, host: Host, name: str, node: Any
@@ -730,26 +589,6 @@ class TestPause:
             runner.resume()
             assert runner.wait(5.0) is Status.SUCCESS
         assert journal.count("succeeded") == 2
-
-    def test_a_tree_that_changes_at_each_tick_is_paused_at_once(self, node: Any) -> None:
-        ticks: list[int] = []
-
-        class Step(py_trees.behaviour.Behaviour):
-            def update(self) -> Status:
-                ticks.append(1)
-                if len(ticks) == 10:
-                    runner.pause()
-                return Status.SUCCESS if len(ticks) % 2 else Status.RUNNING
-
-        root = py_trees.decorators.Repeat("for ever", Step("step"), num_success=-1)
-        with TreeRunner(root, node=node) as runner:
-            runner.start()
-            until(lambda: len(ticks) >= 10)
-            assert holds_for(lambda: len(ticks) == 10, 0.3)
-            runner.resume()
-            until(lambda: len(ticks) > 10)
-            runner.interrupt()
-            assert runner.wait(5.0) is Status.INVALID
 
     def test_a_paused_tree_can_be_interrupted(self, journal: Journal, name: str, node: Any) -> None:
         leaf = MoveRobot("m", 9.0, action_name=name)
@@ -1098,75 +937,6 @@ class TestEvents:
         changes = {event.path: event.status for event in events if isinstance(event, NodeChanged)}
         assert changes == {("root",): Status.INVALID, ("root", "m"): Status.INVALID}
 
-    @pytest.mark.parametrize("when", ["at the end", "in a tick"])
-    def test_of_a_tree_whose_terminate_raises_end_with_each_status(
-        self, node: Any, when: str
-    ) -> None:
-        ends = Guard("ends")
-        bad = Raises("bad", "terminate")
-        branch = in_sequence(together(Gate("before"), bad, Gate("behind")), name="branch")
-        told: dict[str, Status] = {}
-
-        def observer(event: Event) -> None:
-            if isinstance(event, NodeChanged):
-                told[event.path[-1]] = event.status
-                if event.path == ("root",) and event.status is Status.RUNNING:
-                    ends.holds = when == "in a tick"
-                    if when == "at the end":
-                        runner.interrupt()
-
-        root = in_turn(ends, branch, name="root", memory=False)
-        with TreeRunner(root, node=node) as runner:
-            runner.observe(observer)
-            if when == "at the end":
-                assert runner.run(timeout=9.0) is Status.INVALID
-            else:
-                with pytest.raises(TreeError, match="bad: tick raised RuntimeError: on purpose"):
-                    runner.run(timeout=9.0)
-            bad.method = ""
-        stopped = ["root", "branch", "together", "before", "bad", "behind"]
-        assert {each: told[each] for each in stopped} == dict.fromkeys(stopped, Status.INVALID)
-        assert told["ends"] is (Status.FAILURE if when == "at the end" else Status.SUCCESS)
-        assert all(each.status is Status.INVALID for each in branch.iterate())
-
-    def test_an_observer_that_raises_is_dropped_and_the_run_goes_on(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        calls: list[Event] = []
-
-        def faulty(event: Event) -> None:
-            calls.append(event)
-            raise RuntimeError("on purpose")
-
-        events: list[Event] = []
-        with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
-            runner.observe(faulty)
-            runner.observe(events.append)
-            assert runner.run(timeout=9.0) is Status.SUCCESS
-        assert len(calls) == 1
-        assert isinstance(events[-1], TreeFinished)
-
-    def test_an_observer_that_ends_the_program_does_so_after_the_drain(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        calls: list[Event] = []
-
-        def leaves(event: Event) -> None:
-            if getattr(event, "state", "") == "EXECUTING" or calls:
-                calls.append(event)
-                raise SystemExit(7)
-
-        events: list[Event] = []
-        leaf = MoveRobot("m", 50.0, action_name=name)
-        with TreeRunner(leaf, node=node) as runner:
-            runner.observe(leaves)
-            runner.observe(events.append)
-            with pytest.raises(SystemExit, match="7"):
-                runner.run(timeout=9.0)
-            assert (leaf.end, journal.count("canceled")) == (End.CANCELED, 1)
-        assert len(calls) == 1
-        assert isinstance(events[-1], TreeFinished)
-
     def test_a_terminate_of_an_action_that_raises_keeps_no_goal_from_its_drain(
         self, journal: Journal, name: str, node: Any
     ) -> None:
@@ -1510,8 +1280,3 @@ class TestTicks:
             started = time.monotonic()
             assert runner.run(timeout=30.0) is Status.SUCCESS
             assert time.monotonic() - started < 6.0
-
-    def test_the_heartbeat_serves_behaviours_that_watch_the_clock(self, node: Any) -> None:
-        timer = py_trees.timers.Timer("timer", duration=0.2)
-        with TreeRunner(timer, node=node) as runner:
-            assert runner.run(timeout=5.0) is Status.SUCCESS

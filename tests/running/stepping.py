@@ -1,0 +1,57 @@
+"""A loop that is stepped in time of its own, over a traffic without goals. No ROS."""
+
+from __future__ import annotations
+
+from typing import Any
+from unittest.mock import Mock
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
+
+from bt_actions.events import Event
+from bt_actions.running.loop import TickLoop
+from bt_actions.utilities.stepping import Done
+
+
+class Stepped:
+    """Steps a loop, and lets as much time pass as it wants to be left alone for."""
+
+    def __init__(self, tree: Behaviour | BehaviourTree, **given: Any) -> None:
+        self.now = 0.0
+        self.slept: list[float] = []
+        self.told: list[Event] = []
+        self.traffic, self.log = Mock(), Mock()
+        self.drained = Mock()
+        self.drained.step.return_value = Done(None)
+        self.loop = TickLoop(
+            tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree),
+            self.traffic,
+            node="node",
+            steady=lambda: self.now,
+            drain=lambda handles: self.drained,
+            log=self.log,
+            **given,
+        )
+        self.loop.observe(self.told.append)
+
+    def begin(self, timeout: float | None = None) -> None:
+        self.loop.begin(self.now, timeout)
+
+    def step(self) -> Status | None:
+        """Step once; return the status at the end."""
+        step = self.loop.step(self.now)
+        if isinstance(step, Done):
+            return step.result
+        self.slept.append(step.seconds)
+        self.now += step.seconds
+        return None
+
+    def run(self, timeout: float | None = None) -> Status:
+        try:
+            self.begin(timeout)
+            while (status := self.step()) is None:
+                pass
+            return status
+        finally:
+            self.loop.rest()
