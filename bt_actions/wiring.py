@@ -36,12 +36,13 @@ def spinner(node: Any, executor: Any, **given: Any) -> Spinner:
 
 
 def ended_by_signals(
-    interrupt: Callable[[bool, bool], bool | None], last_words: Callable[[], object]
+    interrupt: Callable[[bool, bool], bool | None],
 ) -> AbstractContextManager[None]:
     """Call `interrupt` at signals that would end the process; see ros/signals.py."""
     from bt_actions.ros.signals import ended_by_signals
+    from bt_actions.traffic.traffic import close_process
 
-    return ended_by_signals(interrupt, last_words)
+    return ended_by_signals(interrupt, close_process)
 
 
 def log() -> Log:

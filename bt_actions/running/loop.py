@@ -24,10 +24,10 @@ from bt_actions.running.watchdog import Watchdog
 from bt_actions.utilities.places import culprit_of, path_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
+from bt_actions.wiring import backend_of
 
 if TYPE_CHECKING:
     from bt_actions.traffic.shared import GoalHandle
-    from bt_actions.traffic.traffic import Traffic
 
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
@@ -73,9 +73,8 @@ class TickLoop:
     def __init__(
         self,
         tree: BehaviourTree,
-        traffic: Traffic,
-        *,
         node: Any,
+        *,
         steady: Callable[[], float],
         drain: Callable[[list[GoalHandle]], Draining],
         log: Log,
@@ -85,12 +84,11 @@ class TickLoop:
         check: Callable[[], None] = lambda: None,
         misbehaved: Callable[[], str] = lambda: "",
     ) -> None:
-        """Let it run on what `node` stands for, which each behaviour is set up with.
+        """Make it; `begin` begins a run.
 
         Args:
             tree: what is ticked.
-            traffic: of the node: where the tree's goals go.
-            node: what each behaviour is set up with.
+            node: what each behaviour is set up with; a Backend may stand for it.
             steady: the steady clock that the times given to it are of.
             drain: begins to see goals to their ends.
             log: where lines go.
@@ -101,12 +99,12 @@ class TickLoop:
             misbehaved: is asked after each behaviour's tick what that did wrong.
         """
         self.tree, self.heartbeat = tree, heartbeat
-        self._traffic, self._node, self._log = traffic, node, log
+        self._traffic, self._node, self._log = backend_of(node).traffic, node, log
         self._drain_of, self._wake = drain, wake
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
         self._observers: list[Observer] = []
         self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.mind())
-        self.watchdog = Watchdog(traffic, self.goals, steady, log.warning)
+        self.watchdog = Watchdog(self._traffic, self.goals, steady, log.warning)
         self._visitor = ChangeVisitor(self._set_up_rest, self._after_each)
         self._set_up = SetUp()
         self._doing = "setup"
@@ -121,7 +119,7 @@ class TickLoop:
         self._status = Status.INVALID
         self._error: BaseException | None = None
         self._drain: Draining | None = None
-        traffic.observe(self.goals.note)
+        self._traffic.observe(self.goals.note)
 
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event, in the step; one that raises is removed."""

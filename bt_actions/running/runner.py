@@ -1,7 +1,7 @@
 """Runs a tree to its end on a thread: the caller's in `run`, one of its own after `start`.
 
-Here are the thread, the future, signals, shutdown and the end of the process; what a run does at
-each moment is for running/loop.py. ROS comes in through ros/ and only when a runner is made.
+Here are threads, signals, shutdown and the end of the process; what a run does at each moment is
+for running/loop.py. ROS comes in through wiring.py, when a runner is made.
 """
 
 from __future__ import annotations
@@ -9,21 +9,22 @@ from __future__ import annotations
 import atexit
 import contextlib
 import os
-import queue
 import threading
 import time
 from collections.abc import Callable
 from concurrent import futures
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
+from bt_actions import wiring
 from bt_actions.events import Observer
 from bt_actions.running.goals import GoalReport
 from bt_actions.running.loop import TickLoop, TreeError
+from bt_actions.running.started import StartedRun
+from bt_actions.running.wakeup import WakeUp
 from bt_actions.utilities.places import path_of, root_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
@@ -68,40 +69,32 @@ class TreeRunner:
         name: str = "",
         context: Any = None,
     ) -> None:
-        from bt_actions.ros.log import log
-        from bt_actions.ros.spinning import Spinner
-        from bt_actions.traffic.traffic import Traffic
-
         if not heartbeat > 0.0:
             raise ValueError(f"heartbeat must be more than zero seconds, not {heartbeat!r}")
         tree = root_or_behaviour_tree
         self.tree = tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree)
-        self._log = log
-        self._wakes: queue.SimpleQueue[None] = queue.SimpleQueue()  # put() is safe in a handler
-        self._awake = False
+        self._log = wiring.log()
+        self._wake_up = WakeUp()
         self._on_close: list[Callable[[], None]] = []
         self._spin_error: BaseException | None = None
-        self._thread: threading.Thread | None = None
-        self._future: futures.Future[Status] | None = None
-        self._is_heard = True  # somebody has asked what became of it
+        self._started: StartedRun | None = None
         self._running = threading.Lock()
         self._runs_on: int | None = None
         self._closed = False  # no run begins any more
         self._shutting_down = threading.Lock()
         self._is_down = False
         self._pid = os.getpid()
-        self._spinner = Spinner(
+        self._spinner = wiring.spinner(
             node, executor, name=name, namespace=namespace, context=context, died=self._spin_died
         )
         self._loop = TickLoop(
             self.tree,
-            Traffic.of(self._spinner.node),
-            node=self._spinner.node,
+            self._spinner.node,
             steady=time.monotonic,
             drain=self._drain,
-            log=log,
+            log=self._log,
             heartbeat=heartbeat,
-            wake=self._wake,
+            wake=self._wake_up.set,
             ready=self._spin,
             check=self._check,
             misbehaved=self._spinner.taken_away,
@@ -138,10 +131,10 @@ class TreeRunner:
         `start` are allowed, and for `asyncio.wrap_future`. To cancel it does nothing: `interrupt`
         does. Raises RuntimeError before the first `start`.
         """
-        if self._future is None:
+        if self._started is None:
             raise RuntimeError("there is no future: the tree has not been started")
-        self._is_heard = True
-        return self._future
+        self._started.is_heard = True
+        return self._started.future
 
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event of a run, on the ticking thread.
@@ -179,9 +172,8 @@ class TreeRunner:
         the goals were drained.
         """
         if self._spinner.is_here():
-            raise RuntimeError(
-                "run() would wait for the thread that it is called on, which spins the node: "
-                "start() the tree, and take its status in a done callback of `future`"
+            raise _waits_for_itself(
+                "run()", "start() the tree, and take its status in a done callback of `future`"
             )
         self._begin()
         try:
@@ -215,10 +207,7 @@ class TreeRunner:
         return self._ended_by_signals()
 
     def _ended_by_signals(self) -> contextlib.AbstractContextManager[None]:
-        from bt_actions.ros.signals import ended_by_signals
-        from bt_actions.traffic.traffic import close_process
-
-        return ended_by_signals(self._signalled, close_process)
+        return wiring.ended_by_signals(self._signalled)
 
     def _signalled(self, again: bool, ends_process: bool) -> bool:
         """Interrupt the run, and all of them before the process ends; tell whether ours cannot end.
@@ -239,38 +228,15 @@ class TreeRunner:
         turns into an exception, and what ends the main thread in good order, drains them.
         """
         self._begin()
-        self._tell_unheard()
-        before = self._thread, self._future
-        future = self._future = futures.Future[Status]()
-        future.set_running_or_notify_cancel()
-        self._thread = threading.Thread(
-            target=self._run_started, args=(future,), name="bt_actions-tree"
-        )
-        self._thread.daemon = True  # the exit hook of traffic/traffic.py drains what it leaves
-        self._is_heard = False
+        before, self._started = self._started, StartedRun(lambda: self._run(None), self._release)
+        if before is not None:
+            before.tell_unheard(self._log.error)
         try:
-            self._thread.start()
-        except RuntimeError:  # there can be no more threads
-            self._is_heard, (self._thread, self._future) = True, before
+            self._started.begin()
+        except RuntimeError:
+            self._started = before
             self._release()
             raise
-
-    def _run_started(self, future: futures.Future[Status]) -> None:
-        try:
-            status = self._run(None)
-        except BaseException as error:  # noqa: BLE001 - raised again by wait()
-            self._release()
-            future.set_exception(error)
-        else:
-            self._release()
-            future.set_result(status)
-
-    def _tell_unheard(self) -> None:
-        """Tell in the log what a run raised that nobody has asked about."""
-        if not self._is_heard and self._future is not None:
-            if error := self._future.exception():
-                self._log.error(f"the tree that was started raised {raised(error)}")
-            self._is_heard = True
 
     def _release(self) -> None:
         from bt_actions.traffic.shared import lock
@@ -291,17 +257,15 @@ class TreeRunner:
         seconds; it goes on. Raises RuntimeError before the first `start`, within the run, and,
         without a `timeout`, where `run` does because of the thread.
         """
-        future = self._future
-        if future is None:
+        started = self._started
+        if started is None:
             raise RuntimeError("nothing to wait for: the tree has not been started")
+        future = started.future
         _check_seconds(timeout)
         if self._runs_on == threading.get_ident():
             raise RuntimeError("wait() within the run would wait for itself")
         if timeout is None and not future.done() and self._spinner.is_here():
-            raise RuntimeError(
-                "wait() would wait for the thread that it is called on, which spins the node: "
-                "take the status in a done callback of `future`"
-            )
+            raise _waits_for_itself("wait()", "take the status in a done callback of `future`")
         with self._mind_signals():
             futures.wait([future], None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         if not future.done():
@@ -311,7 +275,7 @@ class TreeRunner:
             ]
             what = f"; {', '.join(goals)}" if goals else ""
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s{what}")
-        self._is_heard = True
+        started.is_heard = True
         return future.result()
 
     def pause(self) -> None:
@@ -348,9 +312,8 @@ class TreeRunner:
         if self._is_down:
             return
         if self._spins_here():
-            raise RuntimeError(
-                "shutdown() would wait for the thread that it is called on, which spins the node: "
-                "call it on another one, or in a done callback of `future`"
+            raise _waits_for_itself(
+                "shutdown()", "call it on another one, or in a done callback of `future`"
             )
         if self._runs_on == threading.get_ident():
             raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
@@ -387,10 +350,9 @@ class TreeRunner:
             self._shutting_down.release()
 
     def _take_down(self) -> None:
-        thread, self._thread = self._thread, None
-        if thread is not None and thread is not threading.current_thread():  # a done callback
-            thread.join()
-        self._tell_unheard()
+        if self._started is not None:
+            self._started.join()
+            self._started.tell_unheard(self._log.error)
         try:
             self._loop.shutdown()
         finally:
@@ -402,12 +364,7 @@ class TreeRunner:
     def __enter__(self) -> TreeRunner:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: object, _traceback: object) -> None:
         if error is None or not self._spins_here():  # else what run() has said would be lost
             self.shutdown()
 
@@ -424,9 +381,7 @@ class TreeRunner:
                 step = self._loop.step(time.monotonic())
                 if isinstance(step, Done):
                     return step.result
-                with contextlib.suppress(queue.Empty):
-                    self._wakes.get(step.seconds > 0.0, step.seconds)
-                self._awake = False
+                self._wake_up.sleep(step.seconds)
             except BaseException as error:  # noqa: BLE001 - raised again after the drain
                 self._loop.fail(error)
 
@@ -440,12 +395,7 @@ class TreeRunner:
 
     def _spin_died(self, error: BaseException) -> None:
         self._spin_error = error
-        self._wake()
-
-    def _wake(self) -> None:
-        if not self._awake:
-            self._awake = True
-            self._wakes.put(None)
+        self._wake_up.set()
 
     def _drain(self, handles: list[GoalHandle]) -> _Drain:
         return _Drain(handles, self._loop)
@@ -466,6 +416,12 @@ class _Drain:
     def _hurry(self) -> bool:
         self._loop.goals.tell(time.monotonic())
         return self._loop.abandoned
+
+
+def _waits_for_itself(call: str, instead: str) -> RuntimeError:
+    return RuntimeError(
+        f"{call} would wait for the thread that it is called on, which spins the node: {instead}"
+    )
 
 
 def _check_seconds(timeout: float | None) -> None:

@@ -13,6 +13,8 @@ from bt_actions.events import Event
 from bt_actions.running.loop import TickLoop
 from bt_actions.utilities.stepping import Done
 
+BACKEND = ["clock", "log", "publisher", "randomness", "service", "subscription", "traffic", "wake"]
+
 
 class Stepped:
     """Steps a loop, and lets as much time pass as it wants to be left alone for."""
@@ -21,13 +23,13 @@ class Stepped:
         self.now = 0.0
         self.slept: list[float] = []
         self.told: list[Event] = []
-        self.traffic, self.log = Mock(), Mock()
+        self.backend, self.log = Mock(spec=BACKEND), Mock()
+        self.traffic = self.backend.traffic
         self.drained = Mock()
         self.drained.step.return_value = Done(None)
         self.loop = TickLoop(
             tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree),
-            self.traffic,
-            node="node",
+            self.backend,
             steady=lambda: self.now,
             drain=lambda handles: self.drained,
             log=self.log,
