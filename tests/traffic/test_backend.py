@@ -1,0 +1,207 @@
+"""What every Backend keeps, and its services, subscriptions and publishers. ROS is one of them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+import pytest
+from std_msgs.msg import Int32
+from std_srvs.srv import SetBool
+
+from bt_actions.traffic.backend import Backend
+from bt_actions.wiring import backend_of
+from tests.support.waiting import until
+
+NUMBERS = itertools.count(1)
+
+
+class World(Protocol):
+    """A backend, and what stands around it."""
+
+    backend: Backend
+    namespace: str
+    """Of the backend's node, without a slash at its end."""
+
+    def serve(self, service_type: type, name: str, answer: Callable[[Any], Any]) -> None:
+        """Offer a service; `answer` gives the response to a request."""
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        """Let messages travel until something is so."""
+
+
+class Ros:
+    """A node that is spun while somebody waits for something."""
+
+    def __init__(self, node: Any) -> None:
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.backend: Backend = backend_of(node)
+        self.namespace = node.get_namespace().rstrip("/")
+        self._node = node
+        self._services: list[Any] = []
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
+
+    def serve(self, service_type: type, name: str, answer: Callable[[Any], Any]) -> None:
+        """Offer a service on the same node."""
+        self._services.append(
+            self._node.create_service(service_type, name, lambda request, _: answer(request))
+        )
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        """Spin until something is so."""
+        until(condition, meanwhile=lambda: self._executor.spin_once(timeout_sec=0.01))
+
+    def close(self) -> None:
+        """Leave the node as it was."""
+        for service in self._services:
+            self._node.destroy_service(service)
+        self._executor.shutdown()
+        self._node.executor = None
+
+
+@pytest.fixture
+def ros(node: Any) -> Iterator[World]:
+    """The node of all tests."""
+    world = Ros(node)
+    yield world
+    world.close()
+
+
+@pytest.fixture(params=["ros"])
+def world(request: pytest.FixtureRequest) -> World:
+    """Each Backend there is."""
+    world: World = request.getfixturevalue(request.param)
+    return world
+
+
+@pytest.fixture
+def name() -> str:
+    """A relative name that no other test uses."""
+    return f"backend_{next(NUMBERS)}"
+
+
+@pytest.fixture
+def told(world: World) -> Iterator[list[Any]]:
+    """What who runs a tree here is told; None is a wake-up."""
+    told: list[Any] = []
+    world.backend.traffic.observe(told.append)
+    yield told
+    world.backend.traffic.unobserve(told.append)
+
+
+def switched(request: Any) -> Any:
+    return SetBool.Response(success=request.data, message="switched")
+
+
+def test_what_is_a_backend_stands_for_itself(world: World) -> None:
+    assert isinstance(world.backend, Backend)
+    assert backend_of(world.backend) is world.backend
+
+
+def test_time_goes_on_and_a_stamp_is_of_the_node_s_own_clock(world: World) -> None:
+    clock = world.backend.clock
+    first, first_stamp = clock.now(), clock.stamp()
+    world.until(lambda: clock.now().steady > first.steady and clock.now().ros > first.ros)
+    assert isinstance(first_stamp, int)
+    assert clock.stamp() > first_stamp
+
+
+def test_who_runs_a_tree_is_woken(world: World, told: list[Any]) -> None:
+    world.backend.wake()
+    assert told == [None]
+
+
+def test_there_is_nothing_to_wait_for_without_goals(world: World) -> None:
+    assert world.backend.drain([]) == []
+
+
+def test_a_line_of_each_level_can_be_logged(world: World) -> None:
+    for level in ("debug", "info", "warn", "error", "fatal"):
+        world.backend.log(level, "a line")
+
+
+def test_who_listens_is_given_each_message_in_order(world: World, name: str) -> None:
+    came: list[int] = []
+    heard = world.backend.subscription(Int32, name, "default", lambda each: came.append(each.data))
+    spoken = world.backend.publisher(Int32, name, "default")
+    assert heard.topic == spoken.topic == f"{world.namespace}/{name}"
+    world.until(lambda: spoken.listeners == 1)
+    for number in range(5):
+        spoken.publish(Int32(data=number))
+    world.until(lambda: len(came) == 5)
+    assert came == [0, 1, 2, 3, 4]
+    heard.close()
+    world.until(lambda: spoken.listeners == 0)
+    spoken.publish(Int32(data=5))
+    spoken.close()
+    assert came == [0, 1, 2, 3, 4], "nobody listens any more"
+
+
+def test_a_latched_message_is_given_to_who_comes_later(world: World, name: str) -> None:
+    came: list[int] = []
+    spoken = world.backend.publisher(Int32, name, "latched")
+    spoken.publish(Int32(data=1))
+    spoken.publish(Int32(data=2))
+    heard = world.backend.subscription(Int32, name, "latched", lambda each: came.append(each.data))
+    world.until(lambda: came)
+    assert came == [2]
+    heard.close()
+    spoken.close()
+
+
+def test_some_time_after_it_began_nobody_may_be_on_the_way_any_more(
+    world: World, name: str
+) -> None:
+    heard = world.backend.subscription(Int32, name, "default", lambda _: None)
+    spoken = world.backend.publisher(Int32, name, "default")
+    world.until(lambda: heard.first_may_come() == 0.0)
+    world.until(lambda: spoken.listener_may_come() == 0.0)
+    heard.close()
+    spoken.close()
+
+
+def test_a_service_answers_and_wakes_who_runs_the_tree(
+    world: World, name: str, told: list[Any]
+) -> None:
+    service = world.backend.service(SetBool, name)
+    assert service.name == f"{world.namespace}/{name}"
+    assert (service.ready, service.calling, service.answered) == (False, False, False)
+    why = service.why_absent()
+    assert not why or why.startswith(": ")
+    world.serve(SetBool, name, switched)
+    world.until(lambda: service.ready)
+    for data in (True, False):
+        del told[:]
+        service.call(SetBool.Request(data=data))
+        assert (service.calling, service.answered) == (True, False)
+        world.until(lambda: service.answered and told)
+        assert told == [None]
+        assert service.answer() == SetBool.Response(success=data, message="switched")
+        assert (service.calling, service.answered) == (False, False)
+    service.close()
+
+
+def test_an_answer_to_a_call_that_was_dropped_is_no_answer_to_the_next(
+    world: World, name: str
+) -> None:
+    served: list[bool] = []
+
+    def answer(request: Any) -> Any:
+        served.append(request.data)
+        return switched(request)
+
+    service = world.backend.service(SetBool, name)
+    world.serve(SetBool, name, answer)
+    world.until(lambda: service.ready)
+    service.call(SetBool.Request(data=True))
+    service.drop()
+    assert not service.calling
+    service.call(SetBool.Request(data=True))
+    service.call(SetBool.Request(data=False))
+    world.until(lambda: service.answered and len(served) == 3)
+    assert service.answer().success is False
+    service.call(SetBool.Request(data=True))
+    service.close()
