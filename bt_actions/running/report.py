@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 from uuid import UUID
 
 from py_trees.behaviour import Behaviour
@@ -19,14 +18,9 @@ from py_trees.composites import Selector
 
 from bt_actions import document
 from bt_actions.behaviours.gate import Gate
+from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.utilities.places import path_of
-from bt_actions.utilities.plain_text import clean
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from bt_actions.events import Event, GoalChanged
 
 DONE = "DONE"
 UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
@@ -188,17 +182,16 @@ class Report:
     finished: bool = False
     now: float = 0.0
     """The time of the latest event."""
+    unaccounted: list[str] = field(default_factory=list)
+    """One line for each goal whose end is not known, now that the run is over."""
     _clock: Callable[[], float] = time.monotonic
     _begun: float | None = None
     _rows: dict[UUID, Row] = field(default_factory=dict)
     _statuses: dict[UUID, tuple[Status, str]] = field(default_factory=dict)
-    _unaccounted: list[str] = field(default_factory=list)
     _warnings: dict[UUID, Culprit] = field(default_factory=dict)
 
     def observe(self, event: Event) -> None:
         """Take in one event, in the order of their coming."""
-        from bt_actions.events import GoalChanged, NodeChanged, TreeFinished, TreeStarted
-
         self.now = event.time
         self.started = self.started or event.time  # a tree that cannot be set up never starts
         if isinstance(event, TreeStarted):
@@ -257,15 +250,6 @@ class Report:
     def decided(self) -> bool:
         """Whether the tree has come to its end, be it that goals of it have not."""
         return self.status_of(self.root) in (Status.SUCCESS, Status.FAILURE)
-
-    @property
-    def unaccounted(self) -> list[str]:
-        """One line for each goal whose end is not known."""
-        return list(self._unaccounted)
-
-    def not_accounted_for(self, lines: list[str]) -> None:
-        """Say which goals have no known end, now that the run is over."""
-        self._unaccounted = lines
 
     def seconds(self, row: Row) -> float:
         """Return how long `row` took so far, a visit that is not over included."""
@@ -335,54 +319,3 @@ def place_of(node: Behaviour) -> str:
     """Return file:line:column where a tree file says `node`, or "" for a node made in Python."""
     place = document.place_of(node)
     return "" if place is None else f"{place.file}:{place.line}:{place.column}"
-
-
-def table(report: Report, width: int | None = None) -> list[str]:
-    """Return the table of actions as lines; names are cut so that lines fit into `width`."""
-    body = [
-        (row.name, row.server, row.tries, row.verdict, f"{report.seconds(row):.2f} s")
-        for row in report.rows
-    ]
-    return columns(body, width) if body else []
-
-
-def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
-    """Return name, server, tries, verdict and duration of actions as lines, under a head."""
-    head = ("action", "server", "attempts", "outcome", "duration")
-    widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
-    if width is not None:
-        for column in (1, 0):  # the server first: it is often a long name
-            excess = sum(widths) + 2 * (len(widths) - 1) - width
-            widths[column] -= max(0, min(excess, widths[column] - 8))
-    right = {2, 4}
-    return [
-        "  ".join(
-            _cut(cell, size).rjust(size) if column in right else _cut(cell, size).ljust(size)
-            for column, (cell, size) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in (head, *body)
-    ]
-
-
-def _cut(cell: str, size: int) -> str:
-    return cell if len(cell) <= size else cell[: size - 2] + ".."
-
-
-def summary(report: Report) -> list[str]:
-    """Return why the tree failed: for each leaf its path, attempts, outcome, reason and place."""
-    lines: list[str] = []
-    for culprit in report.culprits():
-        lines.append(" / ".join(culprit.path))
-        row = culprit.row
-        if row is None or row.outcome is None:
-            lines.append(f"  failed{_because(culprit.message)}")
-        else:
-            tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
-            lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
-        if culprit.place:
-            lines.append(f"  {culprit.place}")
-    return lines
-
-
-def _because(reason: str) -> str:
-    return f": {clean(reason)}" if reason else ""

@@ -16,12 +16,13 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Inverter
 
 from bt_actions.cli.exits import Exit
+from bt_actions.cli.views.table import summary, table
 from bt_actions.cli.views.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import PLACE
 from bt_actions.events import Event, NodeChanged, TreeFinished
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.report import Report, Row, summary, table
+from bt_actions.running.report import Report, Row
 from bt_actions.running.ticking import ChangeVisitor
 from bt_actions.utilities.places import path_of
 from tests.cli.fakes import FakeAction, Story

@@ -158,8 +158,8 @@ class CallView(GoalView):
 
     def result_lines(self) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""
+        from bt_actions.cli.views.table import columns
         from bt_actions.cli.views.words import brief
-        from bt_actions.running.report import columns
 
         result = self._leaf.result
         if result is None:

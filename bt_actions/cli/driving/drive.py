@@ -298,7 +298,7 @@ class Drive:
             ]
             for row in self._report.live:
                 row.leave(self._report.now)
-        self._report.not_accounted_for(lines)
+        self._report.unaccounted = lines
 
     def _code(self) -> Exit:
         if self._report.unaccounted or (self._abandoned and not self._report.finished):

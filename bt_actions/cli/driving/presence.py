@@ -12,10 +12,11 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.cli.streams.writing import note
+from bt_actions.cli.views.table import summary
 from bt_actions.cli.views.words import brief
 from bt_actions.document import given_inputs, place_of, tree_name
 from bt_actions.events import Event, TreeStarted
-from bt_actions.running.report import Report, summary
+from bt_actions.running.report import Report
 from bt_actions.utilities.plain_text import clean, in_words
 
 if TYPE_CHECKING:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from py_trees.common import Status
 
 from bt_actions.cli.exits import Exit
+from bt_actions.cli.views.table import summary, table
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.report import Report, Row, summary, table
+from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import shorten
 

@@ -1,0 +1,57 @@
+"""A run's actions as a table, and why its tree failed, as lines. Looks at the report alone."""
+
+from __future__ import annotations
+
+from bt_actions.running.report import Report
+from bt_actions.utilities.plain_text import clean
+
+
+def table(report: Report, width: int | None = None) -> list[str]:
+    """Return the table of actions as lines; names are cut so that lines fit into `width`."""
+    body = [
+        (row.name, row.server, row.tries, row.verdict, f"{report.seconds(row):.2f} s")
+        for row in report.rows
+    ]
+    return columns(body, width) if body else []
+
+
+def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
+    """Return name, server, tries, verdict and duration of actions as lines, under a head."""
+    head = ("action", "server", "attempts", "outcome", "duration")
+    widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
+    if width is not None:
+        for column in (1, 0):  # the server first: it is often a long name
+            excess = sum(widths) + 2 * (len(widths) - 1) - width
+            widths[column] -= max(0, min(excess, widths[column] - 8))
+    right = {2, 4}
+    return [
+        "  ".join(
+            _cut(cell, size).rjust(size) if column in right else _cut(cell, size).ljust(size)
+            for column, (cell, size) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in (head, *body)
+    ]
+
+
+def _cut(cell: str, size: int) -> str:
+    return cell if len(cell) <= size else cell[: size - 2] + ".."
+
+
+def summary(report: Report) -> list[str]:
+    """Return why the tree failed: for each leaf its path, attempts, outcome, reason and place."""
+    lines: list[str] = []
+    for culprit in report.culprits():
+        lines.append(" / ".join(culprit.path))
+        row = culprit.row
+        if row is None or row.outcome is None:
+            lines.append(f"  failed{_because(culprit.message)}")
+        else:
+            tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
+            lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
+        if culprit.place:
+            lines.append(f"  {culprit.place}")
+    return lines
+
+
+def _because(reason: str) -> str:
+    return f": {clean(reason)}" if reason else ""
