@@ -47,14 +47,6 @@ WRONG_ARROWS = {
 MAY_IMPORT_RCLPY = ("ros/", "simulation/ros/")
 STRAYS = {
     "recovery/sweep.py",
-    "serving/asking.py",
-    "serving/diagnostics.py",
-    "serving/goal.py",
-    "serving/lifecycle.py",
-    "serving/rejections.py",
-    "serving/run.py",
-    "serving/server.py",
-    "serving/wire.py",
     "traffic/traffic.py",
 }
 """Files outside these rooms that import rclpy."""
@@ -66,7 +58,6 @@ LONG = {
     "traffic/endpoint.py",
     "traffic/traffic.py",
     "running/runner.py",
-    "serving/server.py",
 }
 """Files of more lines than LONGEST."""
 CROWDED: set[str] = set()

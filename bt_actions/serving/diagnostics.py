@@ -7,10 +7,8 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.callback_groups import CallbackGroup
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
+from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.serving.catalog import State
 from bt_actions.serving.outcome import RunOutcome
 
@@ -58,24 +56,13 @@ class Diagnostics:
 
     def __init__(
         self,
-        node: Node,
+        endpoints: Endpoints,
         look: Callable[[], tuple[Iterable[Standing], str]],
         submit: Callable[[Callable[[], None]], object],
-        group: CallbackGroup,
     ) -> None:
-        self._node, self._look, self._submit = node, look, submit
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._timer = node.create_timer(
-            PERIOD,
-            self._on_timer,
-            callback_group=group,
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
-
-    def close(self) -> None:
-        """Publish nothing more."""
-        self._node.destroy_timer(self._timer)
-        self._node.destroy_publisher(self._publisher)
+        self._node, self._look, self._submit = endpoints.node, look, submit
+        self._publisher = endpoints.publisher(DiagnosticArray, "/diagnostics", 10)
+        endpoints.timer(PERIOD, self._on_timer)
 
     def _on_timer(self) -> None:
         with contextlib.suppress(RuntimeError):  # the server is closed at this moment

@@ -1,11 +1,10 @@
-"""One accepted goal: its handle, its run, and what its client has heard of it. Ends nothing."""
+"""One accepted goal: its client, its run, and what its client has heard of it. Ends nothing."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rclpy.action.server import ServerGoalHandle
-
+from bt_actions.ros.serving.action_server import AcceptedGoal
 from bt_actions.serving.messages import feedback
 from bt_actions.serving.run import Run
 
@@ -19,7 +18,7 @@ FASTEST, SLOWEST = 0.1, 1.0
 class Goal:
     """A goal that runs, or waits for its turn."""
 
-    handle: ServerGoalHandle
+    client: AcceptedGoal
     run: Run
     tree: str
     begun: bool = False
@@ -29,11 +28,11 @@ class Goal:
     @property
     def id(self) -> bytes:
         """Its goal id."""
-        return bytes(self.handle.goal_id.uuid)
+        return self.client.id
 
     def tell(self, now: float) -> None:
         """Tell its client how far it is; to be called every FASTEST seconds."""
         changes = self.run.changes
         if changes != self._told or now - self._told_at >= SLOWEST - FASTEST / 2:
             self._told, self._told_at = changes, now
-            self.handle.publish_feedback(feedback(self.run.running(), self.run.leaves_ended))
+            self.client.tell(feedback(self.run.running(), self.run.leaves_ended))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import Rejection
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from bt_actions.ros.log import log
+from bt_actions.ros.serving.endpoints import Endpoints, kept
 from bt_actions.serving.requests import Refused
 from bt_actions.utilities.plain_text import clean
 
@@ -21,17 +20,9 @@ ECHO = 200
 class Rejections:
     """The log, and the topic ``~/rejections``, which keeps the last ten."""
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._publisher = node.create_publisher(
-            Rejection,
-            "~/rejections",
-            QoSProfile(
-                depth=REJECTIONS,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            ),
-        )
+    def __init__(self, endpoints: Endpoints) -> None:
+        self._node = endpoints.node
+        self._publisher = endpoints.publisher(Rejection, "~/rejections", kept(REJECTIONS))
 
     def tell(self, goal: RunTree.Goal, refused: Refused) -> None:
         """Say why a goal is rejected."""
@@ -48,7 +39,3 @@ class Rejections:
                 message=f"{said.message}{place}",
             )
         )
-
-    def close(self) -> None:
-        """Be gone."""
-        self._node.destroy_publisher(self._publisher)

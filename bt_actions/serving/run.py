@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure
 from py_trees.common import Status
-from rclpy.expand_topic_name import expand_topic_name
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
@@ -46,7 +45,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: where goals are sent from; somebody spins it.
-        begins: called with the full names of the actions that it uses, before it sends a goal.
+        begins: called with the names of the actions that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
     """
 
@@ -130,7 +129,9 @@ class Run:
 
     def _to_end(self) -> RunOutcome:
         root = self.tree.build(self._inputs)
-        self._begins(self._actions(root))
+        self._begins(
+            {each.action_name for each in root.iterate() if isinstance(each, ActionBehaviour)}
+        )
         report = Report(root)
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node)
@@ -166,11 +167,6 @@ class Run:
             outputs=outputs,
             unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
         )
-
-    def _actions(self, root: Behaviour) -> set[str]:
-        name, space = self._node.get_name(), self._node.get_namespace()
-        leaves = [each for each in root.iterate() if isinstance(each, ActionBehaviour)]
-        return {str(expand_topic_name(each.action_name, name, space)) for each in leaves}
 
     def _note(self, event: Event) -> None:
         if not isinstance(event, NodeChanged) or event.node.children:

@@ -6,28 +6,27 @@ turns.py's, and a run its own (run.py); here is what they have to do with ROS.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
+from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
-from rclpy.action.server import CancelResponse, GoalResponse, RCLError, ServerGoalHandle
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
+from bt_actions.document import Tree
 from bt_actions.document.reading.find import tree_folder
 from bt_actions.ros.log import log
 from bt_actions.ros.rosout import Rosout
+from bt_actions.ros.serving.action_server import AcceptedGoal, DeferredActionServer
+from bt_actions.ros.serving.endpoints import Endpoints
+from bt_actions.ros.serving.lifecycle import Lifecycle
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.diagnostics import Diagnostics, Standing
 from bt_actions.serving.goal import FASTEST, Goal
-from bt_actions.serving.lifecycle import Lifecycle
 from bt_actions.serving.messages import finding, info, result
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
 from bt_actions.serving.rejections import ECHO, Rejections
@@ -35,7 +34,6 @@ from bt_actions.serving.requests import Refused
 from bt_actions.serving.run import Run
 from bt_actions.serving.turns import Policy, Turns
 from bt_actions.serving.underway import Underway
-from bt_actions.serving.wire import OffTheExecutor, RunTreeServer
 from bt_actions.utilities.plain_text import clean, in_words
 
 __all__ = ["TreeServer"]
@@ -44,6 +42,14 @@ RESULT_TIMEOUT = 60
 """Seconds for which an ended goal's result can be asked for; each one kept makes a goal slower."""
 _LAST_WORDS = 2.0
 """Seconds for the last results to be sent when the server is closed."""
+
+
+class _Admitted(NamedTuple):
+    """What a goal runs that its client has not been told of yet."""
+
+    name: str
+    tree: Tree
+    inputs: Mapping[str, object]
 
 
 class TreeServer:
@@ -73,7 +79,7 @@ class TreeServer:
 
     def __init__(
         self,
-        node: Node,
+        node: Any,
         *,
         trees: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
         policy: Policy | str = Policy.REJECT,
@@ -94,44 +100,30 @@ class TreeServer:
         """A line for each run that was left, as it did not end after `abandon`."""
         self._abandoned = threading.Event()
         self._is_drained = False
-        self._off_the_executor = OffTheExecutor(node)
         self._turns: Turns[Goal] = Turns(Policy(policy), most)
         self._goals: dict[bytes, Goal] = {}
-        self._admitted: dict[int, tuple[Any, Callable[[ServerGoalHandle], Goal]]] = {}
-        self._canceled: set[int] = set()
-        """Those of them that their clients have canceled since they were told of the acceptance."""
         self._refuses = "it is unconfigured"
         self._last: dict[str, RunOutcome] = {}
         self._underway = Underway(node.context.get_domain_id())
         self._worker = ThreadPoolExecutor(1, "bt_actions-check")
-        group = ReentrantCallbackGroup()
-        self._rejections = Rejections(node)
-        self._action = RunTreeServer(
-            node,
+        self._endpoints = endpoints = Endpoints(node)
+        self._rejections = Rejections(endpoints)
+        self._action = DeferredActionServer(
+            endpoints,
             RunTree,
             "run_tree",
-            execute_callback=_never,
-            callback_group=group,
-            goal_callback=self._on_goal,
-            handle_accepted_callback=self._on_accepted,
-            cancel_callback=self._on_cancel,
-            result_timeout=RESULT_TIMEOUT,
+            admit=self._on_goal,
+            accepted=self._on_accepted,
+            dropped=self._on_dropped,
+            cancel=self._on_cancel,
+            keeps=RESULT_TIMEOUT,
         )
-        self._action.request_is_over = self._on_request_over
-        self._services = [
-            node.create_service(kind, f"~/{name}", callback, callback_group=group)
-            for kind, name, callback in (
-                (ListTrees, "list_trees", self._on_list),
-                (CheckTree, "check_tree", self._on_check),
-                (ControlTree, "control_tree", self._on_control),
-            )
-        ]
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        endpoints.service(ListTrees, "~/list_trees", self._on_list)
+        endpoints.service(CheckTree, "~/check_tree", self._on_check)
+        endpoints.service(ControlTree, "~/control_tree", self._on_control)
         self._rosout = Rosout(node)
-        self._timer = node.create_timer(
-            FASTEST, self._tell, callback_group=group, clock=steady, autostart=False
-        )
-        self._diagnostics = Diagnostics(node, self._standings, self._worker.submit, group)
+        self._timer = endpoints.timer(FASTEST, self._tell, autostart=False)
+        Diagnostics(endpoints, self._standings, self._worker.submit)
         self.lifecycle: Lifecycle | None = None
         if managed:
             steps = {
@@ -141,7 +133,7 @@ class TreeServer:
                 "cleaningup": self._forget,
                 "shuttingdown": self._finalize,
             }
-            self.lifecycle = Lifecycle(node, steps, group, self._off_the_executor)
+            self.lifecycle = Lifecycle(endpoints, steps)
         else:
             self._configure()
             self._activate()
@@ -155,7 +147,7 @@ class TreeServer:
         if self.lifecycle is not None:
             self.lifecycle.stop()
         self.halt(Ending.DEACTIVATED)
-        self._off_the_executor.wait(_LAST_WORDS)
+        self._endpoints.off.wait(_LAST_WORDS)
         self._action.flush(_LAST_WORDS)
         self._is_drained = True
 
@@ -167,15 +159,11 @@ class TreeServer:
         """
         if not self._is_drained:
             self.drain()
-        self._diagnostics.close()
+        self._rosout.close()
+        self._endpoints.close()
+        self._action.destroy()
         if self.lifecycle is not None:
             self.lifecycle.close()
-        self.node.destroy_timer(self._timer)
-        for service in self._services:
-            self.node.destroy_service(service)
-        self._action.destroy()
-        self._rosout.close()
-        self._rejections.close()
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     def halt(self, ending: Ending = Ending.HALTED, why: str = "it ends") -> None:
@@ -183,7 +171,7 @@ class TreeServer:
         with self._answered:
             self._refuses = why
             # What was admitted before comes now, if anybody spins the node, and ends as it comes.
-            self._answered.wait_for(lambda: not self._admitted, _LAST_WORDS)
+            self._answered.wait_for(lambda: not self._turns.expected, _LAST_WORDS)
             goals = list(self._goals.values())
         for goal in goals:  # first of all, so that none begins as another ends
             goal.run.end(ending)
@@ -235,30 +223,17 @@ class TreeServer:
 
     # Requests; on the executor's threads
 
-    async def _on_goal(self, goal: RunTree.Goal) -> GoalResponse:
+    async def _on_goal(self, goal: RunTree.Goal) -> _Admitted | None:
         try:
             self._refuse_more()
             entry, tree, values = await self._off(self.catalog.check, goal.tree, goal.inputs)
             with self._lock:  # the other goals that came meanwhile are admitted by now
                 self._refuse_more()
                 self._turns.expected += 1
-
-                def make(handle: ServerGoalHandle) -> Goal:
-                    run = Run(
-                        tree,
-                        values,
-                        self.node,
-                        ended=lambda outcome: self._ended(made, outcome),
-                        begins=lambda actions: self._underway.begins(made.id, actions),
-                    )
-                    made = Goal(handle, run, entry.name)
-                    return made
-
-                self._admitted[id(goal)] = goal, make
         except Refused as refused:
             self._rejections.tell(goal, refused)
-            return GoalResponse.REJECT
-        return GoalResponse.ACCEPT
+            return None
+        return _Admitted(entry.name, tree, values)
 
     def _refuse_more(self) -> None:
         with self._lock:
@@ -270,47 +245,48 @@ class TreeServer:
         if self._refuses:
             raise Refused("INACTIVE", f"this server accepts no goals: {self._refuses}")
 
-    def _on_accepted(self, handle: ServerGoalHandle) -> None:
-        with self._lock:
-            _, make = self._admitted.pop(id(handle.request))
-            canceled = id(handle.request) in self._canceled
-            goal = make(handle)
+    def _on_accepted(self, client: AcceptedGoal, admitted: _Admitted) -> None:
+        run = Run(
+            admitted.tree,
+            admitted.inputs,
+            self.node,
+            ended=lambda outcome: self._ended(goal, outcome),
+            begins=lambda actions: self._underway.begins(
+                goal.id, {self._endpoints.full_name(each) for each in actions}
+            ),
+        )
+        goal = Goal(client, run, admitted.name)
+        with self._answered:
             self._goals[goal.id] = goal
             begun, halted = self._turns.come(goal)
+            self._answered.notify_all()
             refuses = self._refuses
         for each in halted:
             self._end(each, Ending.REPLACED)
-        if canceled:
+        if client.canceled():
             self._end(goal, Ending.CANCELED)
         if refuses:  # it was admitted before
             self._end(goal, Ending.DEACTIVATED)
         self._begin(begun)
 
-    def _on_request_over(self, goal: RunTree.Goal) -> None:
-        with self._lock:
-            self._canceled.discard(id(goal))
-            if self._admitted.pop(id(goal), None) is not None:  # its client could not be told
-                self._turns.expected -= 1
+    def _on_dropped(self, _: _Admitted) -> None:
+        with self._answered:
+            self._turns.expected -= 1
             self._answered.notify_all()
 
-    def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
+    def _on_cancel(self, goal_id: bytes) -> bool:
         with self._lock:
-            goal = self._goals.get(bytes(handle.goal_id.uuid))
-            early = id(handle.request) in self._admitted
-            if early:
-                self._canceled.add(id(handle.request))
+            goal = self._goals.get(goal_id)
         if goal is not None:
             self._end(goal, Ending.CANCELED)
-        elif not early:
-            return CancelResponse.REJECT
-        return CancelResponse.ACCEPT
+        return goal is not None
 
     async def _on_list(self, _: Any, response: ListTrees.Response) -> ListTrees.Response:
         entries = await self._off(self.catalog.entries)
         with self._lock:
             goals = list(self._goals.values())
         response.trees = [
-            info(entry, [goal.handle.goal_id for goal in goals if goal.tree == entry.name])
+            info(entry, [goal.client.handle.goal_id for goal in goals if goal.tree == entry.name])
             for entry in entries
         ]
         return response
@@ -350,7 +326,7 @@ class TreeServer:
 
     async def _off(self, work: Callable[..., Any], *arguments: Any) -> Any:
         """Do something that takes its time on a thread that is not the executor's."""
-        return await self._off_the_executor(self._worker.submit, lambda: work(*arguments))
+        return await self._endpoints.off(self._worker.submit, lambda: work(*arguments))
 
     # Runs
 
@@ -359,9 +335,7 @@ class TreeServer:
             with self._lock:  # the timer's callback stops it where nothing has begun
                 goal.begun = True
                 self._timer.reset()
-            with contextlib.suppress(RCLError):  # a cancel comes at this moment
-                if not goal.handle.is_cancel_requested:
-                    goal.handle.execute()
+            goal.client.begin()
             self._tell_all("info", f"{goal.tree}: begins")
             goal.run.start()
 
@@ -401,19 +375,12 @@ class TreeServer:
         getattr(self._rosout, level)(text)
 
     def _answer(self, goal: Goal, outcome: RunOutcome) -> None:
-        handle, canceled = goal.handle, outcome.code == Code.CANCELED
-        until = time.monotonic() + _LAST_WORDS
-        while canceled and not handle.is_cancel_requested and time.monotonic() < until:
-            time.sleep(0.001)  # the executor is about to say that the cancel is granted
-        if not goal.begun and not handle.is_cancel_requested:
-            handle.execute()
+        status, canceled = GoalStatus.STATUS_ABORTED, outcome.code == Code.CANCELED
         if outcome.code == Code.NONE:
-            handle.succeed()
-        elif canceled and outcome.settled and handle.is_cancel_requested:
-            handle.canceled()
-        else:
-            handle.abort()
-        self._action.finish(handle, result(outcome))
+            status = GoalStatus.STATUS_SUCCEEDED
+        elif canceled and outcome.settled:
+            status = GoalStatus.STATUS_CANCELED
+        self._action.answer(goal.client, result(outcome), status, after_cancel=canceled)
 
     def _tell(self) -> None:
         """Tell the clients how far their runs are; the timer's callback."""
@@ -424,7 +391,3 @@ class TreeServer:
         now = time.monotonic()
         for goal in goals:
             goal.tell(now)
-
-
-def _never(_: ServerGoalHandle) -> None:
-    raise AssertionError("a goal is answered by RunTreeServer.finish")

@@ -150,9 +150,9 @@ import sys, time, rclpy
 from rclpy.executors import MultiThreadedExecutor
 from bt_actions.serving import TreeServer
 begin = TreeServer._on_accepted
-def slow(server, handle):
+def slow(server, *goal):
     time.sleep(1.0)
-    begin(server, handle)
+    begin(server, *goal)
 TreeServer._on_accepted = slow
 rclpy.init()
 node = rclpy.create_node("bt_actions_serve", namespace=sys.argv[2])

@@ -13,12 +13,10 @@ from typing import Any
 from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.action.server import RCLError
-from rclpy.callback_groups import CallbackGroup
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.node import Node
 
 from bt_actions.ros.log import log
-from bt_actions.serving.wire import OffTheExecutor
+from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.utilities.plain_text import in_words
 
 __all__ = ["Lifecycle"]
@@ -31,28 +29,21 @@ class Lifecycle:
     the state is as before. One change at a time.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        steps: Mapping[str, Callable[[], None]],
-        group: CallbackGroup,
-        off: OffTheExecutor,
-    ) -> None:
-        self._node, self._steps, self._off = node, steps, off
+    def __init__(self, endpoints: Endpoints, steps: Mapping[str, Callable[[], None]]) -> None:
+        node = self._node = endpoints.node
+        self._steps, self._off = steps, endpoints.off
         self._changes = threading.Lock()
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
-        self._events = node.create_publisher(TransitionEvent, "~/transition_event", 10)
-        self._services = [
-            node.create_service(kind, f"~/{name}", callback, callback_group=group)
-            for kind, name, callback in (
-                (ChangeState, "change_state", self._on_change),
-                (GetState, "get_state", self._on_state),
-                (GetAvailableStates, "get_available_states", self._on_states),
-                (GetAvailableTransitions, "get_available_transitions", self._on_transitions),
-                (GetAvailableTransitions, "get_transition_graph", self._on_graph),
-            )
-        ]
+        self._events = endpoints.publisher(TransitionEvent, "~/transition_event", 10)
+        for kind, name, callback in (
+            (ChangeState, "change_state", self._on_change),
+            (GetState, "get_state", self._on_state),
+            (GetAvailableStates, "get_available_states", self._on_states),
+            (GetAvailableTransitions, "get_available_transitions", self._on_transitions),
+            (GetAvailableTransitions, "get_transition_graph", self._on_graph),
+        ):
+            endpoints.service(kind, f"~/{name}", callback)
 
     @property
     def state(self) -> str:
@@ -87,10 +78,7 @@ class Lifecycle:
         self._changes.acquire()
 
     def close(self) -> None:
-        """Be gone, after `stop`."""
-        for service in self._services:
-            self._node.destroy_service(service)
-        self._node.destroy_publisher(self._events)
+        """Be gone, after `stop`, and after its endpoints."""
         self._machine.destroy_when_not_in_use()
 
     def _trigger(self, trigger: Callable[[Any, bool], None], transition: Any) -> None:

@@ -1,0 +1,85 @@
+"""What servers in sight say, asked by a participant that is gone afterwards. All of it blocks."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Generator, Iterator
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from bt_actions.messages.interfaces import interface_name
+from bt_actions.ros.serving.endpoints import kept
+from bt_actions.ros.topics import DISCOVERS
+from bt_actions.ros.workarounds import participant
+
+__all__ = ["answers", "heard"]
+
+PATIENCE = 5.0
+"""Seconds for a server to come in sight, and for one to answer."""
+Spin = Callable[[], None]
+
+
+@contextlib.contextmanager
+def _asking() -> Iterator[tuple[Node, Spin]]:
+    context = Context()
+    context.init()
+    node = Node("bt_actions_asks", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    try:
+        yield node, lambda: executor.spin_once(timeout_sec=0.05)
+    finally:
+        executor.shutdown()
+        participant.close(node, context)
+
+
+def heard(message_type: type, depth: int) -> Generator[Any]:
+    """Yield what is kept on every topic of a type, for some seconds; see `kept`."""
+    came: list[Any] = []
+    known: set[str] = set()
+    until = time.monotonic() + PATIENCE
+    with _asking() as (node, spin):
+        while time.monotonic() < until:
+            for topic, types in node.get_topic_names_and_types():
+                if interface_name(message_type) in types and topic not in known:
+                    known.add(topic)
+                    node.create_subscription(message_type, topic, came.append, kept(depth))
+            spin()
+            while came:
+                yield came.pop(0)
+
+
+def answers(service_type: Any, namespace: str) -> dict[str, Any]:
+    """Ask every service of a type below a namespace; by its name, None where it does not answer."""
+    below = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
+    futures: dict[str, Any] = {}
+    begun = time.monotonic()
+    with _asking() as (node, spin):
+
+        def look() -> None:
+            for service, types in node.get_service_names_and_types():
+                fits = interface_name(service_type) in types and service.startswith(below)
+                if fits and service not in futures:
+                    futures[service] = node.create_client(service_type, service), None
+
+        def ask() -> bool:
+            """Whether all have answered."""
+            for service, (client, future) in futures.items():
+                if future is None and client.service_is_ready():
+                    futures[service] = client, client.call_async(service_type.Request())
+            return all(future is not None and future.done() for _, future in futures.values())
+
+        while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if futures else 0.0):
+            if now < DISCOVERS or not futures:
+                look()
+            if ask() and futures and now >= DISCOVERS:
+                break
+            spin()
+    return {
+        service: future.result() if future is not None and future.done() else None
+        for service, (_, future) in sorted(futures.items())
+    }
