@@ -1220,33 +1220,6 @@ with TreeRunner(root) as runner:
         closing.join()
 
 
-class TestLastMoments:
-    def test_what_becomes_known_at_the_end_of_a_run_is_reported(
-        self, host: Host, name: str, node: Any
-    ) -> None:
-        """Its server comes back while the observers are told that the tree has finished."""
-        from bt_actions.traffic.shared import Change
-
-        host.open(name, "1:reject_cancel")
-        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.2, cancel=0.3))
-        with TreeRunner(leaf, node=node) as runner:
-
-            def late(event: Any) -> None:
-                if isinstance(event, TreeFinished):
-                    (handle,) = runner._handles
-                    runner._handles.clear()  # as of a goal that was lost, and so accounted for
-                    goal = handle.goal
-                    now = time.monotonic()
-                    change = Change(now, handle, goal.state, goal.outcome, goal.end, goal.reason)
-                    runner._note(change)
-
-            runner.observe(late)
-            runner.run(timeout=9.0)
-            assert [report.name for report in runner.unaccounted] == ["m"]
-        host.cancel_all(name)
-        host.close_server(name)
-
-
 class TestTicks:
     def test_come_when_something_happens_and_not_before(
         self, journal: Journal, name: str, node: Any

@@ -101,14 +101,12 @@ class RunGoals:
         self._wake()
 
     def _is_ours(self, handle: GoalHandle) -> bool:
-        if handle in self._handles or (handle.begun_in is self._token and not handle.is_over):
-            return True  # a second server's share of one that is over is news
+        """Whether it is the tree's; between two runs, also whether a run has left it."""
+        began, owner = handle.begun_in is self._token, handle.owner
         if not self.run_goes_on:
-            return False
-        owner = handle.owner
-        return handle.begun_in is self._token or (
-            owner is not None and root_of(owner) is self._tree.root
-        )
+            return handle in self._handles or (began and not handle.is_over)
+        in_tree = owner is not None and root_of(owner) is self._tree.root
+        return began or in_tree or handle in self._handles
 
     def tell(self, now: float) -> None:
         """Tell what was noted, and forget what is over."""

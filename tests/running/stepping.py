@@ -11,9 +11,8 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.events import Event
 from bt_actions.running.loop import TickLoop
+from bt_actions.traffic.backend import Backend
 from bt_actions.utilities.stepping import Done
-
-BACKEND = ["clock", "log", "publisher", "randomness", "service", "subscription", "traffic", "wake"]
 
 
 class Stepped:
@@ -23,7 +22,7 @@ class Stepped:
         self.now = 0.0
         self.slept: list[float] = []
         self.told: list[Event] = []
-        self.backend, self.log = Mock(spec=BACKEND), Mock()
+        self.backend, self.log = Mock(spec=Backend), Mock()
         self.traffic = self.backend.traffic
         self.drained = Mock()
         self.drained.step.return_value = Done(None)
