@@ -1167,7 +1167,7 @@ with TreeRunner(root) as runner:
         class Stalled:
             """Standard error, with a full pipe behind it."""
 
-            def error(self, text: str) -> None:
+            def error(self, *_: str) -> None:
                 said.set()
                 written.wait(60.0)
 
@@ -1180,7 +1180,7 @@ with TreeRunner(root) as runner:
             assert runner.run(timeout=9.0) is Status.FAILURE
             assert said.wait(5.0), "the goal is not accounted for, and the log is told"
         written.set()
-        log.flush(5.0)
+        log.flush()
         host.cancel_all(name)
         host.close_server(name)
 
@@ -1196,7 +1196,7 @@ with TreeRunner(root) as runner:
         entered, goes_on, told = threading.Event(), threading.Event(), threading.Event()
 
         class Written:
-            def warning(self, text: str) -> None:
+            def warning(self, _: str, text: str) -> None:
                 if "has not returned" in text:
                     told.set()
 

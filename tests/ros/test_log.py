@@ -1,6 +1,9 @@
 """The log of goals never raises: what it would take along is the life of a goal."""
 
+from __future__ import annotations
+
 import itertools
+import logging
 import os
 import pty
 import re
@@ -8,164 +11,110 @@ import signal
 import subprocess
 import sys
 import threading
-import time
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 import rclpy.logging
 
-from bt_actions.ros.log import LONGEST, MOST, WRITE, Log
+from bt_actions.ros import log as module
+from bt_actions.ros.log import BY_RCLPY, LEVELS, LONGEST, MOST, Log
 from tests.support.waiting import until
 
+_numbers = itertools.count()
 
-class Written:
-    """In place of rclpy's logger."""
+
+class Written(logging.Handler):
+    """A handler of the user's, which also stands in for a logger of rclpy's."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.lines: list[str] = []
+        self.reads = threading.Event()
+        """From then on standard error is read."""
+        self.reads.set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.lines.append(f"{record.levelname.lower()}: {record.getMessage()}")
 
     def __getattr__(self, level: str) -> Any:
         return lambda text: self.lines.append(f"{level}: {text}")
 
 
-def stuck_log(monkeypatch: pytest.MonkeyPatch) -> tuple[Log, Written, threading.Event]:
-    """A log, what it has written, and the event from which on its reader reads."""
-    log, written, reads = Log("test"), Written(), threading.Event()
-    monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda patience: reads.wait(60.0 if patience is None else 0))
-    return log, written, reads
+@pytest.fixture
+def written(monkeypatch: pytest.MonkeyPatch) -> Iterator[Written]:
+    each = Written()
+    monkeypatch.setattr(
+        module, "_has_room", lambda patience: each.reads.wait(60.0 if patience is None else 0)
+    )
+    yield each
+    each.reads.set()
 
 
-def test_a_line_fits_into_a_pipe_that_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def log(written: Written) -> Log:
+    """One that writes to `written` only."""
+    name = f"test{next(_numbers)}"
+    made = Log(name)
+    made._logger.handlers[:] = [written]
+    return made
+
+
+def test_a_line_fits_into_a_pipe_that_has_room(log: Log, written: Written) -> None:
     """Standard error is asked for room before each, and never takes half a line."""
-    log, written = Log("test"), Written()
-    monkeypatch.setattr(log, "_logger", written)
     log.error("\N{CYRILLIC SMALL LETTER ZHE}" * LONGEST)
-    log.flush(10.0)
+    log.flush()
     (line,) = written.lines
     assert LONGEST - 1 <= len(line.removeprefix("error: ").encode()) <= LONGEST
-    assert line.endswith("...")
 
 
-def test_a_tree_that_logs_in_a_loop_loses_nothing_while_somebody_reads(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    log, written = Log("test"), Written()
-    monkeypatch.setattr(log, "_logger", written)
-    for number in range(3 * MOST):
-        log.by(written, "info", str(number))
-    log.error("of a goal")
-    log.flush(10.0)
-    assert written.lines == [*(f"info: {number}" for number in range(3 * MOST)), "error: of a goal"]
-
-
-def test_where_nobody_reads_a_tree_leaves_room_for_goals_and_what_was_dropped_is_told(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    log, written, reads = stuck_log(monkeypatch)
-    for number in range(2 * MOST):
-        log.by(written, "info", str(number))
-    log.error("of a goal")
-    log.flush(0.1)
-    log.flush(60.0)  # it was waited for in vain already
-    reads.set()
-    until(lambda: written.lines and written.lines[-1] == "error: of a goal")
-    told = next(line for line in written.lines if "were not logged" in line)
-    number = int(told.removeprefix("warning: ").split()[0])
-    assert len(written.lines) - 2 + number == 2 * MOST
-
-
-def test_a_reader_that_falters_is_waited_for_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A tree that logs has given up by then; what is said of goals at the end has not."""
-    log, written, reads = stuck_log(monkeypatch)
+def test_a_tree_that_logs_in_a_loop_loses_nothing_that_fits(log: Log, written: Written) -> None:
     for number in range(MOST):
         log.by(written, "info", str(number))
-    assert log._slow_at == 0
-    log.error("of a goal")
-    flush = threading.Thread(target=log.flush, args=(60.0,))
-    flush.start()
-    reads.set()
-    flush.join()
-    assert "error: of a goal" in written.lines
+    until(lambda: len(written.lines) == MOST)
+    assert written.lines == [f"info: {number}" for number in range(MOST)]
 
 
-def test_where_its_thread_does_not_come_to_it_flush_writes_what_there_is_room_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    log, written, goes_on = Log("test"), Written(), threading.Event()
-    monkeypatch.setattr(log, "_logger", written)
-    monkeypatch.setattr(log, "_room", lambda patience: patience == 0 or goes_on.wait(60.0))
-    log.info("in its hands")
-    until(lambda: log._lines.empty())
-    log.error("a goal is not accounted for")
-    log.flush(0.01)
-    assert written.lines == ["error: a goal is not accounted for"]
-    goes_on.set()
-    until(lambda: written.lines[1:] == ["info: in its hands"])
-    log.flush(10.0)
-    assert log._written == log._taken == 2
-
-
-def test_the_time_that_a_process_was_stopped_for_is_not_the_logs(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A machine that stood still for longer than `flush` waits: nothing has been in vain."""
-    log, written, passes = stuck_log(monkeypatch)
-    log.error("a goal is not accounted for")
-    monkeypatch.setattr(time, "monotonic", itertools.count(0.0, 100.0).__next__)
-    nap = time.sleep
-
-    def goes_on(seconds: float) -> None:
-        passes.set()
-        nap(seconds)
-
-    monkeypatch.setattr(time, "sleep", goes_on)
-    log.flush(10.0)
-    assert written.lines == ["error: a goal is not accounted for"]
-
-
-def test_what_was_dropped_last_is_told_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    log, written, reads = stuck_log(monkeypatch)
+def test_where_nobody_reads_newer_lines_are_counted(log: Log, written: Written) -> None:
+    written.reads.clear()
     for number in range(2 * MOST):
         log.info(str(number))
-    reads.set()
+    log.flush()
+    log.flush()  # it was waited for in vain already
+    written.reads.set()
     until(lambda: written.lines and "were not logged" in written.lines[-1])
+    *whole, told = written.lines
+    assert whole == [f"info: {number}" for number in range(len(whole))]
+    assert told == f"warning: {2 * MOST - len(whole)} lines were not logged"
+    log.info("and on")
+    log.flush()
+    assert written.lines[-1] == "info: and on"
 
 
-def test_a_logger_of_a_node_that_is_gone_loses_nothing(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_logger_of_a_node_that_is_gone_loses_nothing(log: Log, written: Written) -> None:
     class Gone:
         def __getattr__(self, level: str) -> Any:
             raise RuntimeError("its node was destroyed")
 
-    log, written = Log("test"), Written()
-    monkeypatch.setattr(log, "_logger", written)
     log.by(Gone(), "warn", "of a node")
     log.info("and on")
-    log.flush(10.0)
-    assert written.lines == ["info: and on"]
-    assert re.fullmatch(r"\[WARN\] \[\d+\.\d{9}\] \[test\]: of a node\n", capfd.readouterr().err)
+    log.flush()
+    assert written.lines == ["warning: of a node", "info: and on"]
 
 
 @pytest.mark.parametrize("why", ["there are too many", "the interpreter is being taken down"])
 def test_where_no_thread_can_be_started_the_line_is_written_at_once(
-    monkeypatch: pytest.MonkeyPatch, why: str
+    log: Log, written: Written, monkeypatch: pytest.MonkeyPatch, why: str
 ) -> None:
     def refuse(self: threading.Thread) -> None:
         assert why == "there are too many", "it would wait for ever"
         raise RuntimeError("can't start new thread")
 
-    log, written = Log("test"), Written()
-    monkeypatch.setattr(log, "_logger", written)
     monkeypatch.setattr(threading.Thread, "start", refuse)
     monkeypatch.setattr(sys, "is_finalizing", lambda: why != "there are too many")
     log.error("a goal is not accounted for")
     log.info("and on")
-    monkeypatch.undo()
     assert written.lines == ["error: a goal is not accounted for", "info: and on"]
-    log.flush(0.0)
-    assert log._written == log._taken
 
 
 ONE_THAT_GOES_ON = """
@@ -178,7 +127,8 @@ for _ in range(200):
     time.sleep(0.005)
 print("went on", flush=True)
 input()
-log.flush(60.0)
+while log._lines.unfinished_tasks:
+    time.sleep(0.01)
 os._exit(0)
 """
 
@@ -209,26 +159,20 @@ def test_a_terminal_that_nobody_reads_holds_up_nothing() -> None:
     assert said.startswith(b"\x1b[31m[ERROR] [")
 
 
-@pytest.mark.parametrize("level", WRITE)
-def test_a_line_by_hand_looks_as_one_of_rclpys(
-    level: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    WRITE[level](rclpy.logging.get_logger("test"), "of a goal")
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_line_looks_as_one_of_rclpys(level: str, capfd: pytest.CaptureFixture[str]) -> None:
+    BY_RCLPY[level](rclpy.logging.get_logger("test"), "of a goal")
     by_rclpy = capfd.readouterr().err
-    monkeypatch.setenv("RCUTILS_LOGGING_USE_STDOUT", "1")  # which rclpy has looked for by now
-    log = Log("test")
-    log._put(level, "of a goal")
-    log.flush(10.0)
+    Log("test")._logger.log(LEVELS[level], "of a goal")
     by_hand = capfd.readouterr().err
+    logging.getLogger("test").handlers.clear()
     numbers = re.compile(r"\d+\.\d{9}")
     assert numbers.sub("", by_hand) == numbers.sub("", by_rclpy)
     assert bool(by_hand) is (level != "debug")
 
 
-def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    log, written, reads = stuck_log(monkeypatch)
+def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(log: Log, written: Written) -> None:
+    written.reads.clear()
     log.info("in its hands")
     log.error("of the parent's goal")
     held, forked = threading.Event(), threading.Event()
@@ -245,22 +189,20 @@ def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(
     if not child:
         try:
             signal.alarm(20)
-            reads.set()
+            written.reads.set()
             log.info("of the child")
-            log.flush(10.0)
+            log.flush()
             os._exit(0 if written.lines == ["info: of the child"] else 1)
         finally:
             os._exit(2)
     assert os.waitpid(child, 0)[1] == 0
     forked.set()
     holder.join()
-    reads.set()
+    written.reads.set()
     until(lambda: written.lines == ["info: in its hands", "error: of the parent's goal"])
 
 
-def test_no_line_holds_what_a_terminal_obeys(monkeypatch: pytest.MonkeyPatch) -> None:
-    log, written = Log("test"), Written()
-    monkeypatch.setattr(log, "_logger", written)
+def test_no_line_holds_what_a_terminal_obeys(log: Log, written: Written) -> None:
     log.info("a\x1b]0;title\x07b\r\x9bc\u202ed\ud800\n\te")
-    log.flush(10.0)
+    log.flush()
     assert written.lines == ["info: a ]0;title b  c d \n  \te"]

@@ -157,7 +157,7 @@ def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
         runner.run(5.0)
     assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
     until(nobody_looks)
-    log.flush(10.0)
+    log.flush()
     assert capfd.readouterr().err.count("no second look for lost servers") == 1
 
 
