@@ -612,10 +612,10 @@ def test_who_gives_up_waiting_has_asked_for_each_goal(
     host = new_host()
     journal = host.open(name)
     program = start_program("-c", GIVES_UP, name)
-    program.endpoint("all run")
+    program.line("all run")
     host.freeze()
     program.tell("")
-    assert program.endpoint("left: ") == "left: 10"
+    assert program.line("left: ") == "left: 10"
     program.wait()
     host.thaw()
     journal.wait_for("canceled", 10)
@@ -650,7 +650,7 @@ def test_who_will_not_wait_has_asked_for_more_goals_than_a_queue_holds(
     """Sixty goals; SIGINT, and 20 ms later another, which ends the wait for the answers"""
     journal = new_host().open(name)
     program = start_program("-c", INSISTS, name)
-    program.endpoint("all run", 60.0)
+    program.line("all run", 60.0)
     program.send(signal.SIGINT)
     time.sleep(0.02)  # less than the sixty answers take
     program.send(signal.SIGINT)

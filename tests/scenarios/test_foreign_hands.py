@@ -122,9 +122,9 @@ def test_a_program_that_ends_leaves_no_goal(
 ) -> None:
     taken = program(name)
     process, journal = taken.process, taken.journal
-    process.endpoint("executing", within=60.0)
+    process.line("executing", within=60.0)
     if name in TELL:
-        assert process.endpoint("end") == "end CANCELED CANCELED", process
+        assert process.line("end") == "end CANCELED CANCELED", process
     code = process.wait()
     assert journal.ends() == ["canceled"], process
     assert journal.events().count("cancel_requested") >= 1
@@ -140,7 +140,7 @@ def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
 ) -> None:
     taken = program(name, number)
     process, journal = taken.process, taken.journal
-    process.endpoint("executing", within=60.0)
+    process.line("executing", within=60.0)
     sent = process.send(signal.Signals[f"SIG{number}"])
     journal.wait_for("canceled", within=10.0)
     record.took(time.monotonic() - sent)
@@ -157,7 +157,7 @@ def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
 ) -> None:
     taken = program(name, number)
     process, journal = taken.process, taken.journal
-    process.endpoint("executing", within=60.0)
+    process.line("executing", within=60.0)
     sent = process.send(signal.Signals[f"SIG{number}"])
     code = process.wait()
     record.took(time.monotonic() - sent)
@@ -168,7 +168,7 @@ def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
 
 def test_a_program_may_just_succeed(program: Callable[..., Program], record: Record) -> None:
     taken = program(TO_SUCCEED[0])
-    assert taken.process.endpoint("end") == "end SUCCEEDED SUCCEEDED"
+    assert taken.process.line("end") == "end SUCCEEDED SUCCEEDED"
     assert taken.process.wait() == 0, taken.process
     assert taken.journal.events() == ["received", "accepted", "succeeded"]
     assert taken.process.errors == []
@@ -179,7 +179,7 @@ def test_a_goal_that_cannot_be_canceled_at_exit_is_reported(
     program: Callable[..., Program], record: Record
 ) -> None:
     taken = program("just_end_soon")
-    taken.process.endpoint("executing", within=60.0)
+    taken.process.line("executing", within=60.0)
     assert taken.process.wait() == 0
     assert "not accounted for" in str(taken.process)
     assert "cannot account for it" in str(taken.process)

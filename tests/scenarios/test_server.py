@@ -157,7 +157,7 @@ class TestKilled:
         robot, path = name.rpartition("/")[0], tmp_path / "journal"
         arguments = ("sim", "--namespace", robot, "--journal", str(path))
         victim = start_program("-m", "bt_actions.cli", *arguments, environment=NOTHING_SET)
-        victim.endpoint("ready: ")
+        victim.line("ready: ")
         journal = Journal(path, f"{robot}/move_robot")
         record.journals.append(journal)
         leaf = MoveRobot("m", 9.0, action_name=journal.server)
