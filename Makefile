@@ -13,7 +13,7 @@ PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees laun
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
 unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup dev demo test docs chaos soak benchmark lint types format colcon clean python colcon-python
+.PHONY: help setup dev demo quick test docs chaos soak benchmark lint types format colcon clean python colcon-python
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -27,6 +27,9 @@ demo: setup ## pick and place against simulated servers, ten times as fast as re
 
 test: lint types ## check the code and run every test
 	$(BIN)/python -m pytest
+
+quick: lint types ## check the code, and run the tests that need no ROS; a minute
+	CI= $(BIN)/python -m pytest --without-ros -m "not chaos and not slow"
 
 docs: dev ## remake the pages and pictures that come from the code; `make test` fails when one is stale
 	$(BIN)/python scripts/goal_doc.py

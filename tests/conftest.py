@@ -37,7 +37,50 @@ with several participants in one process Fast DDS was seen not to return from de
 _STDERR = pytest.StashKey[int]()
 
 
+LEFT_OUT = "rclpy is left out by --without-ros"
+
+
+class WithoutRclpy:
+    """A finder of modules that knows no rclpy."""
+
+    @staticmethod
+    def find_spec(name: str, path: object = None, target: object = None) -> None:
+        if name == "rclpy":
+            raise ModuleNotFoundError(LEFT_OUT)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--without-ros",
+        action="store_true",
+        help="run what needs no ROS, with rclpy blocked: who imports it all the same fails",
+    )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """With --without-ros, pass over a file of tests that imports rclpy."""
+    report = yield
+    if report.failed and LEFT_OUT in str(report.longrepr):
+        report.outcome, report.longrepr, report.result = "passed", None, []
+    return report
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """With --without-ros, leave out the tests that are given a ROS domain, or are marked."""
+    if config.option.without_ros:
+        needs = [item for item in items if "domain" in item.fixturenames or _is_marked(item)]
+        config.hook.pytest_deselected(items=needs)
+        items[:] = [item for item in items if item not in set(needs)]
+
+
+def _is_marked(item: pytest.Item) -> bool:
+    return item.get_closest_marker("ros") is not None
+
+
 def pytest_configure(config: pytest.Config) -> None:
+    if config.option.without_ros:
+        sys.meta_path.insert(0, WithoutRclpy())  # type: ignore[arg-type]
     assert sys.__stderr__ is not None
     config.stash[_STDERR] = os.dup(sys.__stderr__.fileno())  # the real one, while none is captured
 

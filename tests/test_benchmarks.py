@@ -75,6 +75,7 @@ def test_the_tree_that_is_measured_has_so_many_nodes() -> None:
 @pytest.mark.parametrize(
     ("tree", "slack", "code"), [(1.9, "1", 0), (2.1, "1", 1), (2.1, "1.25", 0), (2.6, "1.25", 1)]
 )
+@pytest.mark.ros
 def test_run_tree_costs_twice_as_much_as_an_action_by_hand_at_most(
     tree: float,
     slack: str,

@@ -101,6 +101,7 @@ def test_a_parameter_that_does_not_fit_is_told_by_its_name(
     assert message in str(raised.value)
 
 
+@pytest.mark.ros
 def test_an_option_of_ours_that_stands_behind_is_told_where_it_belongs() -> None:
     with pytest.raises(BadInput) as raised:
         parameters(["-p", "a:=1", "--check-part", "5.0"])

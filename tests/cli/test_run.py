@@ -332,6 +332,7 @@ class TestPyTreesRender:
     ("cause", "code", "told"),
     [(KeyboardInterrupt(), 130, ""), (None, 2, "ROS 2 cannot be imported (initialization failed)")],
 )
+@pytest.mark.ros
 def test_ctrl_c_while_ros_is_imported_is_no_missing_ros(
     cause: BaseException | None,
     code: int,

@@ -59,6 +59,7 @@ root:
 """
 
 
+@pytest.mark.ros
 def test_a_large_result_is_expected_and_saved_as_it_is(load: Load) -> None:
     leaf: Any = load(GET)
     result = Fibonacci.Result(sequence=MANY)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from tests.support.processes import Process
-from tests.support.tree_client import TreeClient
+
+if TYPE_CHECKING:
+    from tests.support.tree_client import TreeClient
 
 MAIN = "import sys; from bt_actions.cli import main; sys.exit(main())"
 MOVE = """\
@@ -93,6 +95,8 @@ def fresh_context(domain: int) -> Iterator[Any]:
 @pytest.fixture
 def client(fresh_context: Any, space: str) -> Iterator[TreeClient]:
     """A client of the server in the test's namespace."""
+    from tests.support.tree_client import TreeClient
+
     client = TreeClient(fresh_context, space)
     yield client
     client.close()
