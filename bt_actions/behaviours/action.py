@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Access, Status
 
-from bt_actions.behaviours.node import backend_in
+from bt_actions.behaviours.connected import backend_in
 from bt_actions.behaviours.progress import DEADLINES, Progress
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import key, resolve, variables_in

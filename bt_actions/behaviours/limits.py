@@ -9,7 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.clock import Countdown, NodeTime
+from bt_actions.behaviours.connected import Countdown
 from bt_actions.behaviours.gate import Gate
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.utilities.units import parse_duration
@@ -33,13 +33,12 @@ class Deadline(Gate):
     def __init__(self, name: str, child: Behaviour, after: Callable[[], object]) -> None:
         super().__init__(name, child)
         self._after = after
-        self._clock = NodeTime()
-        self._countdown = Countdown(self._clock)
+        self._countdown = Countdown()
         self._expired = False
         self._limit: float | None = None
 
     def setup(self, **kwargs: Any) -> None:
-        self._clock.setup(kwargs.get("node"))
+        self._countdown.setup(kwargs.get("node"))
 
     def initialise(self) -> None:
         self._expired = False

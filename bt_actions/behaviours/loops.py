@@ -8,8 +8,9 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.clock import Countdown, NodeTime
+from bt_actions.behaviours.connected import Countdown
 from bt_actions.behaviours.gate import Gate
+from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
 
@@ -42,14 +43,13 @@ class RetryChild(Gate):
     ) -> None:
         super().__init__(name, child)
         self._attempts = attempts
-        self._backoff = (backoff, factor, max_backoff)
-        self._clock = NodeTime()
-        self._pause = Countdown(self._clock)
+        self._retry = Retry(backoff=backoff, factor=factor, max_backoff=max_backoff)
+        self._pause = Countdown()
         self.failures = 0
         self.limit: int | None = None
 
     def setup(self, **kwargs: Any) -> None:
-        self._clock.setup(kwargs.get("node"))
+        self._pause.setup(kwargs.get("node"))
 
     def initialise(self) -> None:
         self.failures = 0
@@ -74,12 +74,7 @@ class RetryChild(Gate):
         self.feedback_message = f"attempt {self.failures}{of} failed"
         if self.limit is not None and self.failures >= self.limit:
             return Status.FAILURE
-        first, factor, longest = self._backoff
-        try:
-            pause = first and min(first * factor ** (self.failures - 1), longest)
-        except OverflowError:
-            pause = longest
-        self._pause.start(pause)
+        self._pause.start(self._retry.pause(self.failures))
         return Status.RUNNING
 
     def due_in(self) -> float | None:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.clock import Countdown, NodeTime
-from bt_actions.behaviours.node import backend_in
+from bt_actions.behaviours.connected import Connected, Countdown, limit
 from bt_actions.behaviours.reading import condition_of
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
@@ -20,7 +18,7 @@ from bt_actions.traffic.backend import Backend, Service
 __all__ = ["CallService"]
 
 
-class CallService(Behaviour):
+class CallService(Connected):
     """Calls a service once, and again as `retry` says.
 
     A call that was not answered in time may have been carried out all the same: it is tried again
@@ -58,26 +56,18 @@ class CallService(Behaviour):
         self.response: Any = None
         self.attempt = 0
         self._request = request
-        self._limits = (server, response)
+        self._limits = limit(server), limit(response)
         self._expect = expect
         self._when = condition_of(self.retry.when, "retry.when")
         self._save = save
-        self._clock = NodeTime()
-        self._countdown = Countdown(self._clock)
-        self._pause = Countdown(self._clock)
-        self._backend: Backend | None = None
+        self._pause = Countdown()
         self._client: Service | None = None
 
-    def setup(self, **kwargs: Any) -> None:
-        backend = backend_in(kwargs, self)
-        if backend is self._backend:
-            return
+    def _connect(self, backend: Backend) -> None:
         if isinstance(self.service_type, str):
             self.service_type = interface(self.service_type, "srv")
-        self.shutdown()
-        self._clock.setup(backend)
+        self._pause.setup(backend)
         self._client = backend.service(self.service_type, self.service_name)
-        self._backend = backend
 
     def initialise(self) -> None:
         assert self._client is not None, "not set up"
@@ -85,7 +75,7 @@ class CallService(Behaviour):
         self.attempt = 1
         self.response = None
         self._pause.start(0.0)
-        self._countdown.start(self._limits[0] or 0.0)
+        self._countdown.start(self._limits[0])
 
     def update(self) -> Status:
         assert self._client is not None, "not set up"
@@ -95,7 +85,7 @@ class CallService(Behaviour):
             return self._try_to_call(self._client)
         if not self._client.answered:
             self.feedback_message = f"waiting for an answer of {self._client.name}"
-            if self._limits[1] is not None and self._countdown.left() <= 0.0:
+            if self._countdown.left() <= 0.0:
                 self._client.drop()
                 return self._failed(f"no answer within {self._limits[1]:g} s")
             return Status.RUNNING
@@ -125,12 +115,12 @@ class CallService(Behaviour):
             return self._pause.left()
         if self._client is None or not self._client.calling:
             return 0.05  # nothing announces that a service has come up
-        return None if self._limits[1] is None else self._countdown.left()
+        return self._countdown.left()
 
     def _try_to_call(self, client: Service) -> Status:
         if not client.ready:
             self.feedback_message = f"waiting for the service {client.name}"
-            if self._limits[0] is not None and self._countdown.left() <= 0.0:
+            if self._countdown.left() <= 0.0:
                 why = client.why_absent()
                 return self._failed(f"no service {client.name} within {self._limits[0]:g} s{why}")
             return Status.RUNNING
@@ -144,7 +134,7 @@ class CallService(Behaviour):
             self.feedback_message = str(error)
             return Status.FAILURE
         client.call(request)
-        self._countdown.start(self._limits[1] or 0.0)
+        self._countdown.start(self._limits[1])
         self.feedback_message = f"called {client.name}"
         return Status.RUNNING
 
@@ -156,7 +146,7 @@ class CallService(Behaviour):
         self._pause.start(self.retry.pause(self.attempt, self._backend.randomness))
         self.attempt += 1
         self.response = None
-        self._countdown.start((self._limits[0] or 0.0) + self._pause.left())
+        self._countdown.start(self._limits[0] + self._pause.left())
         return Status.RUNNING
 
     def _worth_it(self) -> bool:

@@ -8,9 +8,8 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.clock import Countdown, NodeTime
+from bt_actions.behaviours.connected import Connected, limit
 from bt_actions.behaviours.latest import Latest
-from bt_actions.behaviours.node import backend_in
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
@@ -110,7 +109,7 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
     behaviour.due_in = due  # type: ignore[attr-defined]
 
 
-class WaitForMessage(Behaviour):
+class WaitForMessage(Connected):
     """Succeeds with the first message, since it started, for which a condition holds.
 
     Args:
@@ -140,22 +139,13 @@ class WaitForMessage(Behaviour):
         self._topic = topic
         self._qos = qos
         self._until = until
-        self._timeout = timeout
+        self._timeout = limit(timeout)
         self._save = save
-        self._clock = NodeTime()
-        self._countdown = Countdown(self._clock)
         self._came_before = 0
-        self._backend: Backend | None = None
         self._latest: Latest | None = None
 
-    def setup(self, **kwargs: Any) -> None:
-        backend = backend_in(kwargs, self)
-        if backend is self._backend:
-            return
-        self.shutdown()
-        self._clock.setup(backend)
+    def _connect(self, backend: Backend) -> None:
         self._latest = Latest(backend, _class(self._type), self._topic, self._qos)
-        self._backend = backend
         if self.status is Status.RUNNING:  # shut down in its visit, and set up again
             self._latest.keep()
 
@@ -163,8 +153,7 @@ class WaitForMessage(Behaviour):
         if self._latest is not None:  # what a latched topic delivered before is as good as new
             self._latest.keep(with_latest=self._qos == "latched")
             self._came_before = self._latest.came
-        if self._timeout is not None:
-            self._countdown.start(self._timeout)
+        self._countdown.start(self._timeout)
 
     def update(self) -> Status:
         assert self._latest is not None, "not set up"
@@ -179,7 +168,7 @@ class WaitForMessage(Behaviour):
                 self.feedback_message = "a message came, but not the one waited for"
             except ValueError as error:  # ExpressionError, or what is saved does not fit
                 self.feedback_message = str(error)
-        if self._timeout is not None and self._countdown.left() <= 0.0:
+        if self._countdown.left() <= 0.0:
             topic, before = self._latest.topic, self._came_before
             why = f"; {before} came before it began" if before else ""
             why = why if self._latest.came else self._latest.why_silent()
@@ -193,7 +182,7 @@ class WaitForMessage(Behaviour):
 
     def due_in(self) -> float | None:
         """Seconds until it fails."""
-        return None if self._timeout is None else self._countdown.left()
+        return self._countdown.left()
 
     def shutdown(self) -> None:
         if self._latest is not None:
@@ -201,7 +190,7 @@ class WaitForMessage(Behaviour):
         self._latest = self._backend = None
 
 
-class Publish(Behaviour):
+class Publish(Connected):
     """Publishes one message and succeeds; fails when the message cannot be built.
 
     Before it publishes it waits for who listens: for `subscribers` where given; without that only
@@ -239,25 +228,15 @@ class Publish(Behaviour):
         self._data = data
         self._qos = qos
         self._subscribers = subscribers
-        self._timeout = timeout
-        self._clock = NodeTime()
-        self._countdown = Countdown(self._clock)
-        self._backend: Backend | None = None
+        self._timeout = limit(timeout)
         self._publisher: Publisher | None = None
 
-    def setup(self, **kwargs: Any) -> None:
-        backend = backend_in(kwargs, self)
-        if backend is self._backend:
-            return
-        self.shutdown()
-        self._clock.setup(backend)
+    def _connect(self, backend: Backend) -> None:
         self._publisher = backend.publisher(_class(self._type), self._topic, self._qos)
-        self._backend = backend
 
     def initialise(self) -> None:
         self.warning = ""
-        if self._timeout is not None:
-            self._countdown.start(self._timeout)
+        self._countdown.start(self._timeout)
 
     def update(self) -> Status:
         assert self._publisher is not None, "not set up"
@@ -285,9 +264,7 @@ class Publish(Behaviour):
 
     def _is_late(self, publisher: Publisher) -> bool:
         """Whether nobody more is waited for: the time is over, and who is there is discovered."""
-        if self._timeout is None or self._countdown.left() > 0.0:
-            return False
-        return publisher.listener_may_come() <= 0.0
+        return self._countdown.left() <= 0.0 and publisher.listener_may_come() <= 0.0
 
     def due_in(self) -> float | None:
         """Seconds until it looks again for who listens."""

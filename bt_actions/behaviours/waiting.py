@@ -8,7 +8,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.clock import Countdown, NodeTime
+from bt_actions.behaviours.connected import Countdown, limit
 from bt_actions.behaviours.limits import seconds
 from bt_actions.expressions.expression import ExpressionError
 
@@ -21,12 +21,11 @@ class Wait(Behaviour):
     def __init__(self, name: str, duration: Callable[[], object]) -> None:
         super().__init__(name)
         self._duration = duration
-        self._clock = NodeTime()
-        self._countdown = Countdown(self._clock)
+        self._countdown = Countdown()
         self._refused = ""
 
     def setup(self, **kwargs: Any) -> None:
-        self._clock.setup(kwargs.get("node"))
+        self._countdown.setup(kwargs.get("node"))
 
     def initialise(self) -> None:
         self._refused = ""
@@ -59,16 +58,14 @@ class WaitUntil(Behaviour):
     ) -> None:
         super().__init__(name)
         self._condition = condition
-        self._timeout = timeout
-        self._clock = NodeTime()
-        self._countdown = Countdown(self._clock)
+        self._timeout = limit(timeout)
+        self._countdown = Countdown()
 
     def setup(self, **kwargs: Any) -> None:
-        self._clock.setup(kwargs.get("node"))
+        self._countdown.setup(kwargs.get("node"))
 
     def initialise(self) -> None:
-        if self._timeout is not None:
-            self._countdown.start(self._timeout)
+        self._countdown.start(self._timeout)
 
     def update(self) -> Status:
         try:
@@ -78,11 +75,11 @@ class WaitUntil(Behaviour):
         if holds:
             self.feedback_message = ""
             return Status.SUCCESS
-        if self._timeout is not None and self._countdown.left() <= 0.0:
+        if self._countdown.left() <= 0.0:
             self.feedback_message = f"not within {self._timeout:g} s: {self.feedback_message}"
             return Status.FAILURE
         return Status.RUNNING
 
     def due_in(self) -> float | None:
         """Seconds until it fails."""
-        return None if self._timeout is None else self._countdown.left()
+        return self._countdown.left()

@@ -199,15 +199,15 @@ class Retry:
         """Return `value` as Retry: a bare number means the attempts."""
         return value if isinstance(value, Retry) else cls(attempts=value)
 
-    def pause(self, attempt: int, chance: random.Random) -> float:
-        """Return the seconds to wait after `attempt` (from 1) before the next."""
+    def pause(self, attempt: int, chance: random.Random | None = None) -> float:
+        """Return the seconds to wait after `attempt` (from 1) before the next; or their mean."""
         if self.backoff == 0.0:
             return 0.0
         try:
             pause = min(self.backoff * self.factor ** (attempt - 1), self.max_backoff)
         except OverflowError:
             pause = self.max_backoff
-        return pause * (1.0 + self.jitter * chance.uniform(-1.0, 1.0))
+        return pause * (1.0 + self.jitter * chance.uniform(-1.0, 1.0)) if chance else pause
 
 
 def _outcomes(values: Iterable[Outcome | str]) -> frozenset[Outcome]:

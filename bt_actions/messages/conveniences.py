@@ -145,6 +145,6 @@ def _interface(name: str) -> type:
     if kind not in ("action", "srv", "msg"):
         raise ValueError(f"{name!r} is no type name: it is written package/msg/Name")
     try:
-        return interface(name, kind)  # type: ignore[arg-type]
+        return interface(name, kind)
     except UnknownInterface as error:
         raise ValueError(str(error)) from None

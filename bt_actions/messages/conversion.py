@@ -25,29 +25,12 @@ from bt_actions.messages.fields import (
     Scalar,
     describe,
 )
-from bt_actions.messages.interfaces import (
-    UnknownInterface,
-    find_action,
-    interface,
-    interface_name,
-    short_name,
-)
+from bt_actions.messages.interfaces import interface_name, short_name
 from bt_actions.utilities.plain_data import numbers_only, plain, scalar
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = [
-    "MessageError",
-    "Problem",
-    "UnknownInterface",
-    "examine",
-    "fill",
-    "fill_value",
-    "find_action",
-    "interface",
-    "interface_name",
-    "to_plain",
-]
+__all__ = ["MessageError", "Problem", "examine", "fill", "fill_value", "to_plain"]
 
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
@@ -60,6 +43,9 @@ _CODES = MappingProxyType(
 )  # fmt: skip
 """How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code."""
 _NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")
+
+_NO_TEXT = re.compile(r"[\0\ud800-\udfff]")
+"""The end of C's strings, and halves of characters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +272,7 @@ def _wrong(kind: Scalar, value: object) -> str | None:
         return f"a text is needed, not {show(value)}"
     if kind.limit is not None and len(value) > kind.limit:
         return f"at most {kind.limit} characters fit, not {len(value)}"
-    if "\0" in value or not _encodable(value):
+    if _NO_TEXT.search(value):
         return "this text holds characters that no ROS string can carry"
     return None
 
@@ -318,12 +304,9 @@ def _wrong_integer(name: str, value: object) -> str | None:
         return f"a whole number ({name}) is needed, not {show(value)}{_number_in(value)}"
     least, greatest = INTEGERS[name]
     if not least <= value <= greatest:
-        return f"{show(value)} does not fit {_an(name)}: {least} to {greatest}"
+        a = "an" if name.startswith("i") else "a"
+        return f"{show(value)} does not fit {a} {name}: {least} to {greatest}"
     return None
-
-
-def _an(name: str) -> str:
-    return f"an {name}" if name.startswith("i") else f"a {name}"
 
 
 def _no_field(cls: type, name: str, known: Mapping[str, FieldType]) -> str:
@@ -332,14 +315,6 @@ def _no_field(cls: type, name: str, known: Mapping[str, FieldType]) -> str:
     if near:
         return text + near
     return f"{text}; it has {', '.join(known)}" if known else f"{text}: it has no fields"
-
-
-def _encodable(value: str) -> bool:
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def show(value: object) -> str:

@@ -38,17 +38,13 @@ class UnknownInterface(LookupError):
         self.name = name
 
 
+@lru_cache(maxsize=1024)
 def interface(name: str, kind: Kind) -> type:
     """The class of ``"pkg/action/Name"``; ``"pkg/Name"`` will do, since the kind is known.
 
-    Raises UnknownInterface, which names the package, or what it holds instead.
+    Raises UnknownInterface, which names the package, or what it holds instead. A class that was
+    found is looked for no more.
     """
-    return _found(name, kind)
-
-
-@lru_cache(maxsize=1024)
-def _found(name: str, kind: Kind) -> type:
-    """As `interface`; a class that was found is looked for no more."""
     package, short = _split(name, kind)
     folder = _folder(package, kind)
     if folder is None:

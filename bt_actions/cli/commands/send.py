@@ -90,7 +90,8 @@ def run(args: argparse.Namespace) -> int:
 def _leaf(server: str, type_name: str, data: dict[str, object]) -> ActionBehaviour:
     """Check everything that can be checked without a server."""
     from bt_actions.document.language.ros_names import why_not
-    from bt_actions.messages.conversion import MessageError, UnknownInterface, fill, find_action
+    from bt_actions.messages.conversion import MessageError, fill
+    from bt_actions.messages.interfaces import UnknownInterface, find_action
 
     why = why_not(server)
     if why:

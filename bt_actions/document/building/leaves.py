@@ -96,7 +96,7 @@ def _interface(name: object, kind: str, context: Context) -> Any:
         return name
     from bt_actions.messages.interfaces import interface
 
-    return interface(str(name), kind)  # type: ignore[arg-type]
+    return interface(str(name), kind)
 
 
 def _check(node: TreeNode, context: Context) -> Behaviour:
