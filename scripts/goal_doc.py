@@ -1,4 +1,4 @@
-"""Writes docs/goal.md from the transition table in bt_actions/goals/goal.py.
+"""Writes docs/goal.md from the transition table in bt_actions/goals/table.py.
 
 `python scripts/goal_doc.py` writes it; with `--check` it exits 1, and says so, when what is there
 is stale.
@@ -10,8 +10,9 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-from bt_actions.goals.goal import TABLE, Row
 from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Outcome
+from bt_actions.goals.steps.step import Step, drop
+from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import Command, Event, State
 
 PATH = Path(__file__).resolve().parent.parent / "docs" / "goal.md"
@@ -19,15 +20,20 @@ PATH = Path(__file__).resolve().parent.parent / "docs" / "goal.md"
 HEAD = """\
 # The life of a goal
 
-<!-- Made by scripts/goal_doc.py from TABLE in bt_actions/goals/goal.py. Do not edit. -->
+<!-- Made by scripts/goal_doc.py from TABLE in bt_actions/goals/table.py. Do not edit. -->
 
 One goal on one action server, from wish to end. What happens is told to `Goal.on` as an event, or
 found out by `Goal.poll` when a deadline has passed; what to do comes back as commands. Every pair
 of state and event is decided. What is not in these tables came too late, or twice, to mean
-anything: it is counted and dropped.
+anything, and is dropped.
 
-An arrow for SERVER_LOST into CANCELING may surprise: the leaf is free at once, and the goal is kept
-in mind, because a server that was only out of reach may come back with the goal still running.
+As a rule it is QUEUED, WAITING_FOR_SERVER, SENDING, EXECUTING and DONE, with CANCELING before the
+end where it is not wanted any more. The other states are for what goes wrong: a request without an
+answer, a server that is lost. A leaf goes on as soon as its outcome is decided, and some goals live
+on after that, so that they are canceled should they run all the same.
+
+`--json` and the terminal tell less finely: REPLACED is shown as EXECUTING there, and UNWANTED,
+UNCONFIRMED, PRESUMED_NOT_RECEIVED, NOT_RECEIVED and LOST as CANCELING.
 """
 OUTCOMES = {
     Outcome.SUCCEEDED: "the server succeeded, and `expect` holds",
@@ -55,48 +61,39 @@ Whatever `retry.outcomes` names, nothing is tried again beside a goal whose end 
 where it is SERVER_GONE, unless SERVER_LOST is named; nor what has SUCCEEDED, but for
 UNEXPECTED_RESULT.
 """
-STATES = {
-    State.QUEUED: "It waits for its resources.",
-    State.WAITING_FOR_SERVER: "It holds its resources, and waits for a server to send to.",
-    State.SENDING: "The request is out, and not answered.",
-    State.EXECUTING: "The server has accepted it.",
-    State.CANCELING: "It is not wanted any more, or nobody knows where it is; its end is awaited.",
-    State.DONE: "There is nothing left to do for it.",
-}
 
 
-def rows(state: State) -> dict[Event, Row]:
+def steps(state: State) -> dict[Event, Step]:
     """Return the decisions of one state, without what is dropped."""
-    return {event: TABLE[state, event] for event in Event if not TABLE[state, event].drops}
+    return {event: TABLE[state, event] for event in Event if TABLE[state, event] is not drop}
 
 
-def says(row: Row) -> str:
+def says(step: Step) -> str:
     """Return a step in words, as they stand in a table."""
-    return row.says if row.says[1].isupper() else row.says[0].lower() + row.says[1:]
+    return step.says if step.says[1].isupper() else step.says[0].lower() + step.says[1:]
 
 
 def diagram() -> str:
     """Return the diagram: an arrow for each pair of states, with the events that take it."""
     arrows: dict[tuple[State, State], list[Event]] = defaultdict(list)
     for state in State:
-        for event, row in rows(state).items():
-            for to in sorted(row.to, key=list(State).index):
-                if to is not state:
-                    arrows[state, to].append(event)
-    lines = ["stateDiagram-v2", "    direction TB", f"    [*] --> {State.QUEUED.value}"]
+        for event, step in steps(state).items():
+            for to in sorted(step.to - {state}, key=list(State).index):
+                arrows[state, to].append(event)
+    lines = ["stateDiagram-v2", "    direction TB", f"    [*] --> {State.QUEUED.name}"]
     for (state, to), events in arrows.items():
         label = "<br/>".join(event.name for event in events)
-        lines.append(f"    {state.value} --> {to.value}: {label}")
-    lines.append(f"    {State.DONE.value} --> [*]")
+        lines.append(f"    {state.name} --> {to.name}: {label}")
+    lines.append(f"    {State.DONE.name} --> [*]")
     return "\n".join(["```mermaid", *lines, "```"])
 
 
 def table(state: State) -> str:
     """Return the decisions of one state as a table."""
-    lines = ["| event | what is done | next |", "|---|---|---|"]
-    for event, row in rows(state).items():
-        following = " or ".join(to.value for to in State if to in row.to)
-        lines.append(f"| {event.name} | {says(row)} | {following} |")
+    lines = ["| event | what is done | may lead to |", "|---|---|---|"]
+    for event, step in steps(state).items():
+        following = " or ".join(to.name for to in State if to in step.to - {state})
+        lines.append(f"| {event.name} | {says(step)} | {following} |")
     return "\n".join(lines)
 
 
@@ -114,7 +111,7 @@ def page() -> str:
     """Return the whole page."""
     parts = [HEAD, diagram(), "## Outcomes and ends", outcomes(), ENDS, "## States"]
     for state in State:
-        parts += [f"### {state.value}", STATES[state], table(state)]
+        parts += [f"### {state.name}", state.value, table(state)]
     parts += ["## Events", "| event | meaning |\n|---|---|"]
     parts[-1] += "".join(f"\n| {event.name} | {event.value} |" for event in Event)
     parts += ["## Commands", "| command | what the caller does |\n|---|---|"]

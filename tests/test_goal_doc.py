@@ -18,5 +18,5 @@ def test_the_page_in_docs_is_made_from_the_table_as_it_is() -> None:
 
 def test_every_state_and_event_is_explained() -> None:
     page = SCRIPT["page"]()
-    assert all(f"### {state.value}\n" in page for state in State)
+    assert all(f"### {state.name}\n" in page for state in State)
     assert all(f"| {event.name} | {event.value} |" in page for event in Event)

@@ -154,7 +154,7 @@ class ActionBehaviour(Behaviour):
             return Progress("BACKOFF", self.attempt, attempts, None, left, "backoff")
         goal, deadline = handle.goal, backend.traffic.deadline(handle, now)
         what, due = ("", None) if deadline is None else (DEADLINES[deadline[0]], deadline[1])
-        return Progress(goal.state.value, self.attempt, attempts, goal.feedback, due, what)
+        return Progress(goal.state.shown, self.attempt, attempts, goal.feedback, due, what)
 
     @property
     def drained(self) -> bool:
@@ -389,7 +389,7 @@ class ActionBehaviour(Behaviour):
         if feedback is not self._shown_feedback[0]:
             told = f": {shorten_fields(feedback)}" if feedback is not None else ""
             self._shown_feedback = feedback, told
-        state = handle.goal.state.value.lower().replace("_", " ")
+        state = handle.goal.state.shown.lower().replace("_", " ")
         return f"{state}{tries}{self._shown_feedback[1]}"
 
     def _leave_endpoint(self) -> None:

@@ -1,6 +1,6 @@
 """The words in which a goal's life is told: its states, what can happen to it, what it commands.
 
-Values only; what follows from what is decided in goal.py.
+Values only; what follows from what is decided in table.py.
 """
 
 from __future__ import annotations
@@ -22,12 +22,36 @@ class Now(NamedTuple):
 class State(Enum):
     """Where a goal is in its life."""
 
-    QUEUED = "QUEUED"
-    WAITING_FOR_SERVER = "WAITING_FOR_SERVER"
-    SENDING = "SENDING"
-    EXECUTING = "EXECUTING"
-    CANCELING = "CANCELING"
-    DONE = "DONE"
+    QUEUED = "It waits for its resources."
+    WAITING_FOR_SERVER = "It holds its resources, and waits for a server to send to."
+    SENDING = "The request is out, and not answered."
+    EXECUTING = "The server has accepted it."
+    REPLACED = "A newer goal of ours was accepted in its place: it is given time to end by itself."
+    CANCELING = "The server has accepted it, and it is not wanted any more: its end is awaited."
+    UNWANTED = "Not wanted any more before the request was answered: canceled once accepted."
+    UNCONFIRMED = "The request was not answered in time: the server may have it, and is asked."
+    PRESUMED_NOT_RECEIVED = (
+        "The server denies it, so the tree goes on; should it turn up, it is canceled."
+    )
+    NOT_RECEIVED = "Denied for so long that nobody waits for it; canceled should it turn up."
+    LOST = (
+        "Its server went away, or its node was closed. The leaf is free; should its server be "
+        "seen again, perhaps by another node of this process, it is canceled first of all."
+    )
+    DONE = "There is nothing left to do for it."
+
+    @property
+    def shown(self) -> str:
+        """The name in ``--json`` and on the terminal, which tell less finely."""
+        if self is State.REPLACED:
+            return State.EXECUTING.name
+        return State.CANCELING.name if self in _NOT_SHOWN else self.name
+
+
+UNANSWERED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
+"""It was sent, is not wanted any more, and may still be accepted."""
+ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
+_NOT_SHOWN = UNANSWERED | {State.NOT_RECEIVED, State.LOST}
 
 
 class Command(Enum):
@@ -86,4 +110,15 @@ OUTCOMES = {
     STATUS_CANCELED: Outcome.CANCELED_BY_OTHER,
     STATUS_ABORTED: Outcome.ABORTED,
 }
+FROM_SERVER = frozenset(
+    {
+        Event.ACCEPTED,
+        Event.REJECTED,
+        Event.FEEDBACK,
+        Event.STATUS,
+        Event.RESULT,
+        Event.RESULT_UNKNOWN,
+        Event.CANCEL_ANSWERED,
+    }
+)
 ON_ROS_CLOCK = frozenset({Event.RESULT_DUE, Event.FEEDBACK_DUE})

@@ -25,7 +25,7 @@ from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
-from bt_actions.goals.goal import DENIED_FOR_GOOD
+from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.ids import Author, author_of
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS

@@ -118,7 +118,7 @@ class RunGoals:
                     GoalChanged(
                         now,
                         handle.owner,
-                        change.state.value,
+                        change.state.shown,
                         handle.attempt,
                         change.outcome,
                         change.end,

@@ -270,7 +270,7 @@ class TreeRunner:
             futures.wait([future], None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         if not future.done():
             goals = [
-                f"{handle.name} on {handle.goal.server} is {handle.goal.state.value}"
+                f"{handle.name} on {handle.goal.server} is {handle.goal.state.shown}"
                 for handle in self._loop.goals.not_over
             ]
             what = f"; {', '.join(goals)}" if goals else ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 
-from bt_actions.goals.goal import ASK_AGAIN
+from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.terms import Event, State
 from bt_actions.traffic import alarm
 from bt_actions.traffic.shared import GoalHandle, changed, lock
@@ -62,10 +62,7 @@ def drain(
     _send_what_waits(waits)
     with lock:
         for handle in waits:
-            if handle.looked_out_for:
-                handle.goal.waited_for = True
-            else:
-                handle.endpoint.tell(handle, Event.DRAINED)
+            handle.endpoint.tell(handle, Event.DRAINED)
     return [handle for handle in wanted if not handle.is_over]
 
 

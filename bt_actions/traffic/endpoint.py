@@ -52,7 +52,7 @@ LATE = 0.5
 """Seconds by which a look is so late that answers may have come in between, unseen."""
 SILENT_FOR = 40.0
 """Seconds without a word of their server until goals whose node is gone are left to whoever can see
-whether it is there: longer than a ghost is shown, or a question waits (goal.DENIED_FOR_GOOD)."""
+whether it is there: longer than a ghost is shown, or a question waits (asking.DENIED_FOR_GOOD)."""
 BESIDE = 1.0
 """Seconds for which a server may be in sight before another one that was there all the time, or
 that came back with it; 0.5 measured."""
@@ -268,18 +268,18 @@ class ActionEndpoint:
         self, handle: GoalHandle, step: Callable[[Any], tuple[Command, ...]], message: Any
     ) -> None:
         goal = handle.goal
-        before = (goal.state, goal.outcome, goal.end)
+        before, shown = goal.state, (goal.state.shown, goal.outcome, goal.end)
         was_accepted, was_in_the_way, was_lost = goal.accepted, _in_the_way(goal), goal.lost
         now = self.traffic.clocks.now()
         commands = step(now)
-        if goal.outcome is Outcome.SERVER_UNAVAILABLE and before[0] is State.WAITING_FOR_SERVER:
+        if goal.outcome is Outcome.SERVER_UNAVAILABLE and before is State.WAITING_FOR_SERVER:
             goal.reason += self._instead(handle)
-        elif goal.outcome is Outcome.SERVER_BUSY and before[0] is State.QUEUED:
+        elif goal.outcome is Outcome.SERVER_BUSY and before is State.QUEUED:
             goal.reason += self._in_use(handle)
         newly_gone = goal.lost and not was_lost and goal.end is End.SERVER_GONE
         if newly_gone and handle.look_out_left is None:
             handle.look_out_left = LOOKED_OUT_FOR
-        if before != (goal.state, goal.outcome, goal.end):
+        if shown != (goal.state.shown, goal.outcome, goal.end):
             handle.traffic.note(handle)
         if _in_the_way(goal) != was_in_the_way:
             self._tell_who_waits()
@@ -562,7 +562,7 @@ class ActionEndpoint:
             for handle in self.goals.values()
             if handle.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
             and handle.goal.outcome is not None
-            and not handle.goal.suspect
+            and not handle.goal.unconfirmed
         ]
         for handle in settled[:-LOST_KEPT]:
             self.tell(handle, Event.PROCESS_EXITING)

@@ -126,7 +126,7 @@ class Route:
             return False  # nobody here wants it; it is remembered, as what is put away is
         domain = endpoint.traffic.domain
         known = domain.lost_sight or (self.name, endpoint.action_type) in domain.known
-        running = (State.SENDING, State.EXECUTING)
+        running = (State.SENDING, State.EXECUTING, State.REPLACED)
         still = all(handle.goal.state not in running for handle in endpoint.goals.values())
         return (known and self._is_absent(now) and still) or self._is_unresponsive(now)
 

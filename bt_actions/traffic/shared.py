@@ -143,7 +143,7 @@ class GoalHandle:
     def accounted_for(self) -> bool:
         """Whether the goal's end is known."""
         goal = self.goal
-        return goal.outcome is not None and goal.end is not End.UNKNOWN and not goal.suspect
+        return goal.outcome is not None and goal.end is not End.UNKNOWN and not goal.unconfirmed
 
     @property
     def is_over(self) -> bool:

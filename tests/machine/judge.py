@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goals.goal import PATIENCE, Goal
+from bt_actions.goals.facts import PATIENCE
+from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
 from tests.machine.parts import Before, GoalHandle, Leaf, Ledger
@@ -53,7 +54,7 @@ class Judge:
     def before(self, handle: GoalHandle) -> Before:
         goal = handle.goal
         self.sees_clock(handle)
-        return Before(goal.state, goal.outcome, goal.reason, goal.accepted, goal.end, goal.lost)
+        return Before(goal.state, goal.outcome, goal.reason, goal.accepted, goal.end)
 
     def after(
         self,
@@ -85,7 +86,7 @@ class Judge:
             if event is Event.INTERRUPTED and before.state is not State.DONE:
                 ledger.unwanted = True
             if event is Event.REPLACED and before.state is not State.QUEUED:
-                ledger.unwanted = ledger.replaced = True
+                ledger.unwanted = True
         if event is Event.REJECTED:
             ledger.refused = True
         ledger.left |= event is Event.NODE_CLOSED
@@ -102,9 +103,9 @@ class Judge:
         self._commands(handle, before, commands)
         self._outcome(handle, before)
         self._deadlines_are_kept_in_mind(handle)
-        if goal.accepted and not before.accepted and before.state is State.CANCELING:
+        if goal.accepted and not before.accepted and before.state is not State.SENDING:
             self._hold(Command.CANCEL in commands, "what turns up unwanted is canceled at once")
-        if before.lost and not goal.lost and goal.live:
+        if before.state is State.LOST is not goal.state and goal.state is not State.DONE:
             self._hold(Command.CANCEL in commands, "a lost goal that is back is canceled at once")
 
     def _commands(self, handle: GoalHandle, before: Before, commands: tuple[Command, ...]) -> None:
@@ -165,7 +166,7 @@ class Judge:
         return any(
             newer.goal.busy is Busy.REPLACE
             and int(newer.goal.id) > int(handle.goal.id)
-            and newer.goal.state in (State.SENDING, State.EXECUTING)
+            and newer.goal.state in (State.SENDING, State.EXECUTING, State.REPLACED)
             and newer.goal.resources & handle.goal.resources
             and newer.ledger.jobs
             for newer in self.caller.handles
@@ -184,14 +185,14 @@ class Judge:
             excused = limits.server is None
         elif state is State.SENDING:
             excused = limits.accept is None
-        elif state is State.EXECUTING and ledger.replaced:
+        elif state is State.REPLACED:
             excused = limits.cancel is None
         elif state is State.EXECUTING:
             excused = limits.result is None and limits.feedback is None
         else:
             settled = goal.outcome is not None and goal.end is not End.UNKNOWN
-            excused = settled or (goal.suspect and goal.waited_for and not goal.holding)
-        self._hold(excused, f"no deadline is forgotten ({state.value})")
+            excused = settled or (goal.unconfirmed and goal.waited_for and not goal.holding)
+        self._hold(excused, f"no deadline is forgotten ({state.name})")
 
     def polled(self, handle: GoalHandle) -> None:
         """Check that no deadline has passed without effect."""
@@ -209,38 +210,37 @@ class Judge:
             self._within(here, limits.server, "server")
         elif state is State.SENDING:
             self._within(here, limits.accept, "accept")
-        elif state is State.EXECUTING and not ledger.replaced:
+        elif state is State.EXECUTING:
             self._within(ledger.forward - ledger.begun_at, limits.result, "result")
             if ledger.heard_at is not None:
                 self._within(ledger.forward - ledger.heard_at, limits.feedback, "feedback")
-        elif state is State.CANCELING:
+        elif state in (State.UNWANTED, State.UNCONFIRMED):
             accept = limits.accept or limits.cancel or PATIENCE
-            here -= 2 * ledger.slow
-            if not goal.accepted:
-                self._within(here, 2 * accept, "accept")
-            elif limits.cancel is not None:
-                self._within(here, 2 * accept + limits.cancel, "cancel")
+            self._within(here - 2 * ledger.slow, accept, "accept")
+        elif state is State.CANCELING and limits.cancel is not None:
+            accept = limits.accept or limits.cancel or PATIENCE
+            self._within(here - 2 * ledger.slow, 2 * accept + limits.cancel, "cancel")
 
     def _not_early(self, handle: GoalHandle, state: State) -> None:
         """Check that a deadline that took effect had passed."""
         limits, ledger = handle.goal.timeouts, handle.ledger
         here = self.caller.world.now.steady - ledger.since
         if state is State.EXECUTING:
-            if not ledger.replaced and handle.goal.state is not State.DONE:
+            if handle.goal.state is not State.DONE:
                 running = ledger.forward - ledger.begun_at + JUST
                 silent = 0.0 if ledger.heard_at is None else ledger.forward - ledger.heard_at + JUST
                 passed = (limits.result is not None and running >= limits.result) or (
                     limits.feedback is not None and silent >= limits.feedback
                 )
                 self._hold(passed, "a running goal is stopped only after its time")
-        elif state is not State.CANCELING:
+        elif state in (State.QUEUED, State.WAITING_FOR_SERVER, State.SENDING):
             limit = {
                 State.QUEUED: limits.queue,
                 State.WAITING_FOR_SERVER: limits.server,
                 State.SENDING: limits.accept,
             }[state]
             in_time = limit is not None and here + JUST >= limit
-            self._hold(in_time, f"no deadline strikes early ({state.value})")
+            self._hold(in_time, f"no deadline strikes early ({state.name})")
 
     def _in_turn(self, handle: GoalHandle) -> None:
         """Check that nobody is overtaken in the queue."""
@@ -382,7 +382,7 @@ class Judge:
         return all(
             handle.goal.state is State.DONE
             or (handle.goal.outcome is not None and handle.goal.end is not End.UNKNOWN)
-            or (handle.goal.suspect and handle.goal.waited_for and not handle.goal.holding)
+            or (handle.goal.unconfirmed and handle.goal.waited_for and not handle.goal.holding)
             for handle in self.caller.handles
         )
 
@@ -393,7 +393,7 @@ class Judge:
         for handle in caller.handles:
             goal = handle.goal
             done = goal.state is State.DONE or goal.end is not End.UNKNOWN
-            done |= goal.suspect and goal.waited_for and not goal.holding  # and reported so
+            done |= goal.unconfirmed and goal.waited_for and not goal.holding  # and reported so
             self._hold(goal.outcome is not None and done, f"every goal ends: {handle} {goal!r}")
             self._hold(not goal.holding, f"every resource is given back: {handle} {goal!r}")
             self._the_end_is_true(handle)
@@ -421,7 +421,7 @@ class Judge:
         else:
             forgot = any(job.goal_id not in job.server.jobs for job in jobs)
             dead = any(not job.server.alive for job in jobs)
-            asked = goal.suspect and goal.waited_for  # a request that was never answered
+            asked = goal.unconfirmed and goal.waited_for  # a request that was never answered
             cause = closed or ledger.crowded or forgot or dead or asked
             self._hold(cause, f"UNKNOWN with a cause: {said}")
 

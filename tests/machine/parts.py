@@ -28,7 +28,6 @@ class Before(NamedTuple):
     reason: str
     accepted: bool
     end: End
-    lost: bool
 
 
 @dataclass(eq=False, slots=True)
@@ -53,7 +52,6 @@ class Ledger:
     cancels: int = 0
     unwanted: bool = False
     """Interrupted, or replaced, before it had an outcome."""
-    replaced: bool = False
     refused: bool = False
     denied: bool = False
     """The last answer to a cancel request was: unknown goal."""

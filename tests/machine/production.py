@@ -374,7 +374,7 @@ class Caller:
             for handle in self.handles
             if handle.real not in held
             and handle.goal.outcome is not None
-            and (handle.goal.end is End.UNKNOWN or handle.goal.suspect)
+            and (handle.goal.end is End.UNKNOWN or handle.goal.unconfirmed)
         ]
 
     # What arrives, and what time does

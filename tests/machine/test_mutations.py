@@ -11,12 +11,17 @@ from typing import Any
 
 import pytest
 
+from bt_actions.goals.asking import Asking
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.deadlines import Deadlines
-from bt_actions.goals.goal import TABLE, Goal, Row
+from bt_actions.goals.facts import Facts
+from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.resources import Answer, Resources
-from bt_actions.goals.terms import Command, Event, State
+from bt_actions.goals.steps import canceling, lost, running, unanswered
+from bt_actions.goals.steps.step import Does, Step, drop
+from bt_actions.goals.table import TABLE
+from bt_actions.goals.terms import UNANSWERED, Command, Event, State
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.shared import Domain, GoalHandle
@@ -37,30 +42,33 @@ def mutation(make: Callable[[Patch], None]) -> Callable[[Patch], None]:
     return make
 
 
-def decide(patch: Patch, state: State, event: Event, step: Callable[..., State]) -> None:
-    """Replace one row of the table."""
-    patch.setitem(TABLE, (state, event), Row(step, frozenset(State)))
+UNWANTED = (State.CANCELING, *UNANSWERED)
+
+
+def decide(patch: Patch, event: Event, does: Does, *states: State) -> None:
+    """Replace one row of the table, in some states."""
+    for state in states:
+        patch.setitem(TABLE, (state, event), Step(does, frozenset(State), "a mistake"))
 
 
 def ignore(patch: Patch, event: Event, *states: State) -> None:
     """Drop an event in some states, as if nobody had thought of it."""
-    for state in states:
-        decide(patch, state, event, lambda goal, now, detail: goal.state)
+    decide(patch, event, drop, *states)
 
 
 @mutation
 def forgets_the_cancel_before_acceptance(patch: Patch) -> None:
-    def accepted(goal: Goal, now: Any, detail: Any) -> State:
-        state = Goal._turned_up(goal, now, detail)
-        goal._commands = [c for c in goal._commands if c is not Command.CANCEL]
+    def accepted(goal: Facts, now: Any, detail: Any) -> State:
+        state = unanswered.turned_up(goal, now, detail)
+        goal.commands.remove(Command.CANCEL)
         return state
 
-    decide(patch, State.CANCELING, Event.ACCEPTED, accepted)
+    decide(patch, Event.ACCEPTED, accepted, *UNANSWERED)
 
 
 @mutation
 def begins_though_it_was_interrupted(patch: Patch) -> None:
-    decide(patch, State.CANCELING, Event.ACCEPTED, Goal._begin)
+    decide(patch, Event.ACCEPTED, unanswered.begin, *UNANSWERED)
 
 
 @mutation
@@ -101,76 +109,78 @@ def retries_beside_a_server_that_is_gone(patch: Patch) -> None:
 
 @mutation
 def waits_for_feedback_of_a_goal_that_has_ended(patch: Patch) -> None:
-    def seen(goal: Goal, now: Any, detail: Any) -> State:
-        state = Goal._terminal_status_seen(goal, now, detail)
-        goal._deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
+    def seen(goal: Facts, now: Any, detail: Any) -> State:
+        state = running.status(goal, now, detail)
+        goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
         return state
 
-    decide(patch, State.EXECUTING, Event.STATUS, seen)
+    decide(patch, Event.STATUS, seen, State.EXECUTING)
 
 
 @mutation
 def settles_twice(patch: Patch) -> None:
-    def settle(goal: Goal, outcome: Outcome, reason: str) -> None:
+    def settle(goal: Facts, outcome: Outcome, reason: str) -> None:
         goal.outcome, goal.reason = outcome, reason
 
-    patch.setattr(Goal, "_settle", settle)
+    patch.setattr(Facts, "settle", settle)
 
 
 @mutation
 def keeps_the_resource(patch: Patch) -> None:
-    patch.setattr(Goal, "_release", lambda self: None)
+    patch.setattr(Facts, "release", lambda self: None)
 
 
 @mutation
 def releases_when_the_leaf_stops_waiting(patch: Patch) -> None:
-    def cancel_due(goal: Goal, now: Any, detail: Any) -> State:
-        goal._release()
-        return Goal._cancel_due(goal, now, detail)
+    def cancel_due(goal: Facts, now: Any, detail: Any) -> State:
+        goal.release()
+        return canceling.cancel_due(goal, now, detail)
 
-    decide(patch, State.CANCELING, Event.CANCEL_DUE, cancel_due)
+    decide(patch, Event.CANCEL_DUE, cancel_due, State.CANCELING)
 
 
 @mutation
 def releases_when_the_cancel_is_sent(patch: Patch) -> None:
-    def interrupted(goal: Goal, now: Any, detail: Any) -> State:
-        goal._release()
-        return Goal._interrupted(goal, now, detail)
+    def interrupted(goal: Facts, now: Any, detail: Any) -> State:
+        goal.release()
+        return interrupt(goal, now, detail)
 
-    decide(patch, State.EXECUTING, Event.INTERRUPTED, interrupted)
+    interrupt = TABLE[State.EXECUTING, Event.INTERRUPTED]
+    decide(patch, Event.INTERRUPTED, interrupted, State.EXECUTING)
 
 
 @mutation
 def cancels_after_done(patch: Patch) -> None:
-    def again(goal: Goal, now: Any, detail: Any) -> State:
-        goal._commands.append(Command.CANCEL)
+    def again(goal: Facts, now: Any, detail: Any) -> State:
+        goal.commands.append(Command.CANCEL)
         return State.DONE
 
-    decide(patch, State.DONE, Event.INTERRUPTED, again)
+    decide(patch, Event.INTERRUPTED, again, State.DONE)
 
 
 @mutation
 def cancels_again_at_each_interruption(patch: Patch) -> None:
-    decide(patch, State.CANCELING, Event.INTERRUPTED, Goal._interrupted)
+    interrupt = TABLE[State.EXECUTING, Event.INTERRUPTED]
+    decide(patch, Event.INTERRUPTED, interrupt, State.CANCELING)
 
 
 @mutation
 def ignores_that_the_server_was_lost(patch: Patch) -> None:
-    ignore(patch, Event.SERVER_LOST, State.SENDING, State.EXECUTING, State.CANCELING)
+    ignore(patch, Event.SERVER_LOST, State.SENDING, State.EXECUTING, *UNWANTED)
 
 
 @mutation
 def forgets_a_lost_goal(patch: Patch) -> None:
-    def lose(goal: Goal, now: Any, detail: Any) -> State:
-        Goal._lose(goal, now, detail)
+    def lose(goal: Facts, now: Any, detail: Any) -> State:
+        lost.server_lost(goal, now, detail)
         return State.DONE
 
-    decide(patch, State.EXECUTING, Event.SERVER_LOST, lose)
+    decide(patch, Event.SERVER_LOST, lose, State.EXECUTING)
 
 
 @mutation
 def lets_a_lost_goal_run_on_when_its_server_is_back(patch: Patch) -> None:
-    ignore(patch, Event.SERVER_RETURNED, State.CANCELING)
+    ignore(patch, Event.SERVER_RETURNED, State.LOST)
 
 
 @mutation
@@ -227,33 +237,25 @@ def takes_what_has_not_come_in_yet_for_late(patch: Patch) -> None:
 
 @mutation
 def reports_success_though_it_was_interrupted(patch: Patch) -> None:
-    decide(patch, State.CANCELING, Event.RESULT, Goal._finished)
+    decide(patch, Event.RESULT, running.finished, *UNWANTED)
 
 
 @mutation
 def calls_a_failed_goal_succeeded(patch: Patch) -> None:
-    def finished(goal: Goal, now: Any, detail: Any) -> State:
-        return Goal._finished(goal, now, (4, detail[1]))
+    def finished(goal: Facts, now: Any, detail: Any) -> State:
+        return running.finished(goal, now, (4, detail[1]))
 
-    decide(patch, State.EXECUTING, Event.RESULT, finished)
+    decide(patch, Event.RESULT, finished, State.EXECUTING)
 
 
 @mutation
 def believes_that_an_unanswered_goal_never_started(patch: Patch) -> None:
-    def verdict(goal: Goal, now: Any) -> State:
-        goal._denied_at = goal._denied_since = now.steady
-        return original(goal, now)
-
-    original = Goal._verdict
-    patch.setattr(Goal, "_verdict", verdict)
+    patch.setattr(Asking, "denied_lately", lambda self, now: True)
 
 
 @mutation
 def asks_to_cancel_only_once(patch: Patch) -> None:
-    def ask(goal: Goal, now: Any) -> None:
-        goal._commands.append(Command.CANCEL)
-
-    patch.setattr(Goal, "_ask", ask)
+    patch.setattr(Facts, "ask", lambda goal, now: goal.commands.append(Command.CANCEL))
 
 
 @mutation
@@ -268,7 +270,7 @@ def never_asks_for_the_result(patch: Patch) -> None:
 
 @mutation
 def runs_on_beside_the_goal_that_replaced_it(patch: Patch) -> None:
-    ignore(patch, Event.REPLACED, State.SENDING, State.EXECUTING, State.CANCELING)
+    ignore(patch, Event.REPLACED, State.SENDING, State.EXECUTING, *UNWANTED)
 
 
 @mutation
@@ -279,15 +281,6 @@ def takes_preemption_for_a_failure(patch: Patch) -> None:
 @mutation
 def sends_what_replaces_a_goal_beside_the_request_of_that(patch: Patch) -> None:
     patch.setattr(ActionEndpoint, "may_overtake", lambda self, handle: False)
-
-
-@mutation
-def gives_a_replaced_goal_its_feedback_deadline_back(patch: Patch) -> None:
-    def feedback(goal: Goal, now: Any, detail: Any) -> State:
-        goal._deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
-        return State.EXECUTING
-
-    decide(patch, State.EXECUTING, Event.FEEDBACK, feedback)
 
 
 @mutation
@@ -331,12 +324,12 @@ def forgets_who_waits(patch: Patch) -> None:
 
 @mutation
 def says_gone_for_every_end(patch: Patch) -> None:
-    def close(goal: Goal, now: Any, detail: Any) -> State:
-        state = Goal._finished_while_canceling(goal, now, detail)
+    def close(goal: Facts, now: Any, detail: Any) -> State:
+        state = canceling.finished(goal, now, detail)
         goal.end = End.SERVER_GONE
         return state
 
-    decide(patch, State.CANCELING, Event.RESULT, close)
+    decide(patch, Event.RESULT, close, State.CANCELING)
 
 
 def forget(deadline: Event) -> Callable[[Patch], None]:

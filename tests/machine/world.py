@@ -1,7 +1,7 @@
 """A world of action servers in virtual time, in which every message may be lost, late or doubled.
 
 It holds what is true: both clocks, the network, and what really runs on each server. It knows
-nothing of goals/goal.py (production.py has that driven) and judges nothing (judge.py does). No ROS,
+nothing of goals/ (production.py has that driven) and judges nothing (judge.py does). No ROS,
 no thread, no randomness: a move is offered by `World.options` and made by `World.make`.
 """
 

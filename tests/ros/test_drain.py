@@ -27,10 +27,10 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Any:
     return clock
 
 
-def handle(end: End, look_out_left: float | None, state: State = State.CANCELING) -> GoalHandle:
+def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> GoalHandle:
     """One whose server has gone."""
     goal = Goal(b"1" * 16, "/move", LIMITS, Now(0.0, 0.0))
-    goal.outcome, goal.end, goal.state, goal.lost = Outcome.SERVER_LOST, end, state, True
+    goal.outcome, goal.end, goal.state = Outcome.SERVER_LOST, end, state
     line: Any = SimpleNamespace(route=SimpleNamespace(in_doubt=lambda _: 0.0))
     made = GoalHandle(goal, line, line, None, "m")
     made.look_out_left = look_out_left
@@ -40,11 +40,11 @@ def handle(end: End, look_out_left: float | None, state: State = State.CANCELING
 @pytest.mark.parametrize(
     ("end", "look_out_left", "state", "over"),
     [
-        (End.SERVER_GONE, 2.0, State.CANCELING, False),
-        (End.SERVER_GONE, 0.0, State.CANCELING, True),
-        (End.SERVER_GONE, None, State.CANCELING, True),
+        (End.SERVER_GONE, 2.0, State.LOST, False),
+        (End.SERVER_GONE, 0.0, State.LOST, True),
+        (End.SERVER_GONE, None, State.LOST, True),
         (End.SUCCEEDED, 2.0, State.DONE, True),
-        (End.UNKNOWN, 0.0, State.CANCELING, False),
+        (End.UNKNOWN, 0.0, State.LOST, False),
     ],
     ids=["looked out for", "long enough", "not at all", "has told its end", "unknown"],
 )
@@ -76,10 +76,10 @@ def test_who_is_back_has_the_time_of_a_cancel_but_only_once(clock: Any) -> None:
     goal = handle(End.SERVER_GONE, 2.0)
     patience = draining._Patience([goal])
     for back_again in (False, True):
-        goal.goal.lost = True
+        goal.goal.state = State.LOST
         patience.is_over([goal])
         clock.now += 50.0
-        goal.goal.lost = False
+        goal.goal.state = State.CANCELING
         assert patience.is_over([goal]) is back_again
         clock.now += goal.goal.drains_within + 2 * draining.JUST_PAST
         assert patience.is_over([goal])

@@ -328,7 +328,11 @@ def test_the_oldest_of_many_lost_goals_are_given_up(suspect: bool, closed: list[
     """But none that its server may still be deciding on."""
     given_up = list[int]()
     goal = SimpleNamespace(
-        end=End.NEVER_STARTED, outcome=Outcome.ACCEPT_TIMEOUT, suspect=suspect, lost=True, id=b""
+        end=End.NEVER_STARTED,
+        outcome=Outcome.ACCEPT_TIMEOUT,
+        unconfirmed=suspect,
+        lost=True,
+        id=b"",
     )
     handles = {n: SimpleNamespace(number=n, goal=goal) for n in range(LOST_KEPT + 3)}
     line: Any = SimpleNamespace(goals=handles)

@@ -583,7 +583,7 @@ class TestDeadlines:
     def test_a_request_that_was_denied_for_long_is_accounted_for(
         self, serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("bt_actions.goals.goal.DENIED_FOR_GOOD", 2.0)  # not 30 s
+        monkeypatch.setattr("bt_actions.goals.asking.DENIED_FOR_GOOD", 2.0)  # not 30 s
         serve("1:drop_goal")
         retry = Retry(2, outcomes={Outcome.ACCEPT_TIMEOUT})
         leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(accept=0.5), retry=retry)
@@ -657,7 +657,7 @@ class TestDeadlines:
     def test_a_result_that_is_never_given_ends_as_the_status_topic_says(
         self, serve: Any, name: str, run: Run, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("bt_actions.goals.goal.RESULT_QUESTIONS", 2)
+        monkeypatch.setattr("bt_actions.goals.asking.RESULT_QUESTIONS", 2)
         serve("1:drop_result")
         leaf = run(MoveRobot("m", 0.1, action_name=name))
         assert stood(leaf) == (Outcome.SERVER_LOST, End.SUCCEEDED)

@@ -23,7 +23,7 @@ from py_trees.decorators import FailureIsSuccess
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
-from bt_actions.goals.goal import ASK_AGAIN
+from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.ros.action_client import TAKE_AT_MOST
 from bt_actions.simulation.journal import live_intervals
 from bt_actions.traffic.endpoint import ActionEndpoint

@@ -20,7 +20,7 @@ from py_trees.composites import Selector
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.goals.attempts import AttemptRecord
-from bt_actions.goals.goal import State
+from bt_actions.goals.terms import State
 from bt_actions.servers.presence import (
     NOT_READY_FOR,
     PROBE_EVERY,

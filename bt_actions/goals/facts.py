@@ -1,0 +1,143 @@
+"""What is known of one goal, and the small tools with which the steps of the table change it.
+
+Nothing is decided here. Whoever has a goal reads these facts; only the steps (goals/steps) write
+them, but for `reason`, to which a caller may add.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from bt_actions.goals.asking import Asking, LostResult
+from bt_actions.goals.deadlines import Deadlines
+from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
+from bt_actions.goals.terms import ACCEPTED, ENDS, UNANSWERED, Command, Event, Now, State
+
+PATIENCE = 5.0
+"""Seconds for an answer that nobody wants any more, where the user gave no deadline."""
+
+
+class Facts:
+    """One goal as it stands."""
+
+    def __init__(
+        self,
+        goal_id: bytes,
+        server: str,
+        timeouts: Timeouts,
+        now: Now,
+        *,
+        resources: frozenset[str] = frozenset(),
+        busy: Busy = Busy.WAIT,
+        settles: Callable[[Any], bool] = lambda result: True,
+    ) -> None:
+        self.id = goal_id
+        self.server = server
+        self.timeouts = timeouts
+        self.resources = resources or frozenset({server})
+        self.busy = busy
+        self.settles = settles
+        """Whether a result (None: a lost one) says that nothing it began still runs."""
+        self.state = self.before = State.QUEUED
+        """Where it is, and where it was before it was LOST or DONE."""
+        self.planned: Outcome | None = None
+        """What its outcome will be when it has ended, where it is not wanted any more."""
+        self.outcome: Outcome | None = None
+        self.reason = ""
+        self.end = End.NEVER_STARTED
+        self.result: Any = None
+        self.feedback: Any = None
+        self.holding = True
+        """It holds its resources, or a place in the queue for them."""
+        self.waited_for = False
+        """The end of its tree was held up for it, in vain; nobody waits for it again, unless its
+        server comes back."""
+        self.asking = Asking()
+        self.lost_result = LostResult()
+        self.deadlines = Deadlines(now)
+        self.deadlines.arm(Event.QUEUE_DUE, timeouts.queue, now)
+        self.commands: list[Command] = []
+        """Of the step that is being made."""
+
+    @property
+    def phase(self) -> State:
+        """Where it is, or was when its server could last be asked."""
+        return self.before if self.state in (State.LOST, State.DONE) else self.state
+
+    @property
+    def sent(self) -> bool:
+        """Whether a request went out, so that answers may come."""
+        return self.phase not in (State.QUEUED, State.WAITING_FOR_SERVER)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the server is known to have accepted the goal."""
+        return self.phase in ACCEPTED
+
+    @property
+    def unconfirmed(self) -> bool:
+        """Whether the request may still be accepted, though nobody wants it any more.
+
+        Also where its server denies it by now: the tree goes on, but must not end without asking
+        again.
+        """
+        return self.state in UNANSWERED
+
+    @property
+    def patience(self) -> float:
+        """Seconds within which the server is to answer what it was asked of an unanswered goal."""
+        return self.timeouts.accept or self.timeouts.cancel or PATIENCE
+
+    # For the steps
+
+    def say(self, why: str, detail: Any = None) -> str:
+        """Return a reason with the names and numbers of this goal in it."""
+        names = ", ".join(sorted(self.resources))
+        return why.format(names=names, server=self.server, limits=self.timeouts, detail=detail)
+
+    def plan(self, outcome: Outcome, reason: str) -> None:
+        """Let it have this outcome when it has ended."""
+        self.planned, self.reason = outcome, reason
+
+    def settle(self, outcome: Outcome, reason: str) -> None:
+        """Decide the outcome, once: the leaf may go on."""
+        if self.outcome is None:
+            self.outcome, self.reason = outcome, reason
+
+    def settle_as_planned(self, otherwise: Outcome = Outcome.CANCELED, reason: str = "") -> None:
+        """Decide the outcome: the one that was planned, if there is one."""
+        if self.planned is None:
+            self.settle(otherwise, reason)
+        else:
+            self.settle(self.planned, self.reason)
+
+    def take_result(self, detail: tuple[int, Any]) -> int:
+        """Keep the result, and note how it ended; return the status."""
+        status, self.result = detail
+        self.end = ENDS[status] if self.settles(self.result) else End.UNKNOWN
+        return status
+
+    def end_by_status(self) -> State:
+        """Believe the status, if one has shown the end; nothing more is asked."""
+        if self.lost_result.status is not None:
+            self.end = ended = ENDS[self.lost_result.status]
+            if ended is End.ABORTED and not self.settles(None):
+                self.end = End.UNKNOWN  # only its result could have told what goes on below it
+            if self.outcome is None:
+                self.reason += f"; it ended as {ended}, and its result was lost"
+        self.settle_as_planned()
+        return State.DONE
+
+    def release(self) -> None:
+        """Give the resources back, once."""
+        if self.holding:
+            self.holding = False
+            self.commands.append(Command.RELEASE)
+
+    def ask(self, now: Now) -> None:
+        """Ask to cancel and, where there will be one, for the result; again in a while."""
+        self.commands.append(Command.CANCEL)
+        if self.accepted:
+            self.commands.append(Command.ASK_RESULT)
+        self.deadlines.arm(Event.POLL_DUE, self.asking.ask(now.steady), now)

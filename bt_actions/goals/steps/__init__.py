@@ -1,0 +1,1 @@
+"""The steps of the table, by phase. What a step is stands in step.py."""

@@ -1,0 +1,112 @@
+"""Steps of a goal that its server has accepted: feedback, status, result, and what is lost of them.
+
+Most of them are the same whether it is still wanted or not.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bt_actions.goals.asking import ASK_AGAIN, ASK_IN_ANY_CASE, DOUBTS, LostResult
+from bt_actions.goals.facts import PATIENCE, Facts
+from bt_actions.goals.policy import Outcome
+from bt_actions.goals.steps import canceling
+from bt_actions.goals.steps.step import leads_to
+from bt_actions.goals.terms import (
+    ENDS,
+    OUTCOMES,
+    STATUS_ABORTED,
+    STATUS_CANCELED,
+    Command,
+    Event,
+    Now,
+    State,
+)
+
+
+@leads_to()
+def feedback(goal: Facts, now: Now, detail: Any) -> State:
+    """The silence is over; timeout.feedback begins anew."""
+    goes_on(goal, now, detail)
+    if goal.lost_result.status is None:
+        goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
+    return State.EXECUTING
+
+
+@leads_to()
+def goes_on(goal: Facts, now: Now, detail: Any) -> State:
+    """It runs, whoever has denied it, or, long ago, shown that it had ended."""
+    goal.feedback = detail
+    goal.lost_result.denials = 0
+    if goal.lost_result.questions > 0:
+        goal.lost_result = LostResult()
+    return goal.state
+
+
+@leads_to()
+def status(goal: Facts, now: Now, detail: Any) -> State:
+    """If it has ended, its result is due, and asked for again in case it was lost."""
+    if detail not in ENDS:
+        goal.lost_result = LostResult()
+    elif goal.lost_result.status is None:
+        goal.lost_result.status = detail
+        goal.deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended
+        goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)
+    return goal.state
+
+
+@leads_to(State.DONE)
+def ask_for_result(goal: Facts, now: Now, detail: Any) -> State:
+    """Ask again; after several questions believe the status, or go on asking."""
+    if goal.lost_result.asked_in_vain():
+        goal.settle_as_planned(Outcome.SERVER_LOST, f"{goal.server} finished, but gave no result")
+        return goal.end_by_status()
+    goal.commands.append(Command.ASK_RESULT)
+    again = ASK_IN_ANY_CASE if goal.lost_result.status is None else ASK_AGAIN
+    goal.deadlines.arm(Event.POLL_DUE, again, now)
+    return goal.state
+
+
+@leads_to(State.DONE)
+def finished(goal: Facts, now: Now, detail: Any) -> State:
+    """SUCCEEDED, ABORTED or CANCELED_BY_OTHER."""
+    ended = goal.take_result(detail)
+    told = {
+        STATUS_CANCELED: "canceled, and not by this process",
+        STATUS_ABORTED: f"aborted by {goal.server}",
+    }
+    goal.settle(OUTCOMES[ended], told.get(ended, ""))
+    return State.DONE
+
+
+@leads_to(State.DONE)
+def denied(goal: Facts, now: Now, detail: Any) -> State:
+    """Ask again; believed the third time: SERVER_LOST, or what it was canceled for."""
+    goal.lost_result.denials += 1
+    if goal.lost_result.denials < DOUBTS:
+        goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)
+        return goal.state
+    ended = goal.lost_result.status
+    if ended is None:
+        goal.commands.append(Command.CANCEL)  # should it run all the same
+        why = f"{goal.server} no longer knows the goal it accepted"
+    else:
+        why = (
+            f"it ended as {ENDS[ended]}, but {goal.server} knew its result no longer when asked "
+            "for it"
+        )
+    goal.settle_as_planned(Outcome.SERVER_LOST, why)
+    return goal.end_by_status()
+
+
+@leads_to(State.REPLACED, State.CANCELING)
+def replaced(goal: Facts, now: Now, detail: Any) -> State:
+    """Give it timeout.cancel to end by itself; where another server has the newer, cancel."""
+    if detail not in (None, goal.server):
+        return canceling.stop(goal, now, Outcome.CANCELED, f"replaced by a newer goal on {detail}")
+    if goal.state is State.EXECUTING:  # else by a newer one still, which gives it no more time
+        goal.plan(Outcome.CANCELED, "replaced by a newer goal")
+        goal.deadlines.disarm(Event.RESULT_DUE)
+        goal.deadlines.disarm(Event.FEEDBACK_DUE)
+        goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel or PATIENCE, now)
+    return State.REPLACED

@@ -1,0 +1,41 @@
+"""What a step of the table is: it changes the facts of a goal, and says where the goal is then.
+
+A step sends nothing: what its caller has to do is left in the goal's `commands`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from bt_actions.goals.facts import Facts
+from bt_actions.goals.terms import Now, State
+
+Does = Callable[[Facts, Now, Any], State]
+"""Takes the goal, the moment, and what came with the event; returns the next state."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One decision: what is done, in words too, and which states may follow."""
+
+    does: Does
+    to: frozenset[State]
+    """Beside the state in which it is made."""
+    says: str
+
+    def __call__(self, goal: Facts, now: Now, detail: Any = None) -> State:
+        """Make it."""
+        return self.does(goal, now, detail)
+
+
+def leads_to(*to: State) -> Callable[[Does], Step]:
+    """Make a function a step, which leads to one of these states or stays where it is."""
+    return lambda does: Step(does, frozenset(to), (does.__doc__ or "").splitlines()[0].rstrip("."))
+
+
+@leads_to()
+def drop(goal: Facts, now: Now, detail: Any) -> State:
+    """Nothing: it came too late, or twice, to mean anything."""
+    return goal.state
