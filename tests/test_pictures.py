@@ -59,32 +59,3 @@ def test_a_picture_is_stale_when_its_tree_changes(picture: Path) -> None:
     tree = PICTURES[picture]
     tree.write_text(tree.read_text().replace("success: a", "success: another"))
     assert not is_fresh(picture)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("dot", lambda root: 'digraph { n0 [label="other"]; }'),
-        ("draw", lambda *_: b'<svg xmlns="http://www.w3.org/2000/svg"><g/></svg>'),
-    ],
-)
-def test_a_picture_is_stale_when_the_renderer_changes(
-    name: str, value: object, picture: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(is_fresh.__globals__, name, value)  # type: ignore[attr-defined]
-    assert not is_fresh(picture)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"), [("#ffc46b", "#ffffff"), (">Work<", ">Play<"), ("dot: ", "dot: 0")]
-)
-def test_a_picture_that_was_edited_is_stale(old: str, new: str, picture: Path) -> None:
-    image = picture.read_text()
-    assert old in image
-    picture.write_text(image.replace(old, new))
-    assert not is_fresh(picture)
-
-
-def test_a_picture_that_is_not_there_is_stale(picture: Path) -> None:
-    picture.unlink()
-    assert not is_fresh(picture)

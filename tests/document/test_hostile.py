@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import time
 import tracemalloc
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -27,14 +25,9 @@ from bt_actions.document import (
     load_tree,
     source_of,
 )
-from bt_actions.document.checking import hazards, verdicts
-from bt_actions.document.reading import settings as node_settings
-from bt_actions.document.reading import workspace
 from bt_actions.document.reading.inputs import parse_input
-from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.workspace import MAX_LEVELS
-from bt_actions.document.yaml import source
-from bt_actions.document.yaml.source import MAX_BYTES, MAX_ERRORS, Source
+from bt_actions.document.yaml.source import MAX_BYTES, MAX_ERRORS
 from tests.document.test_wrong_documents import CASES
 
 EMPTY = '""'
@@ -431,12 +424,6 @@ def test_classes_that_fail_when_they_are_made_are_refused_whatever_their_number(
     assert len(caught.value.findings) == MAX_ERRORS
 
 
-def test_a_long_line_is_shown_cut() -> None:
-    (finding,) = check_bytes(b"tree: t\nroot: {success: A, x" + b"x" * 100_000 + b": 1}\n")
-    assert len(str(finding)) < 200_000
-    assert max(len(line) for line in str(finding).splitlines()[1:]) < 200
-
-
 def _words(findings: list[Finding]) -> None:
     for finding in findings:
         assert finding.line >= 1
@@ -465,60 +452,21 @@ def test_any_pieces_of_trees_are_answered_with_findings(text: str) -> None:
     _words(check_bytes(text.encode()))
 
 
-def _mutated(text: str, chance: random.Random) -> str:
-    lines = text.splitlines(keepends=True)
-    for _ in range(chance.randint(1, 4)):
-        at = chance.randrange(len(lines)) if lines else 0
-        way = chance.randrange(6)
-        if not lines:
-            break
-        if way == 0:
-            del lines[at]
-        elif way == 1:
-            lines.insert(at, chance.choice(lines))
-        elif way == 2:
-            lines[at] = chance.choice(["  ", " ", "- ", "\t"]) + lines[at]
-        elif way == 3:
-            lines[at] = lines[at].lstrip()
-        else:
-            line = lines[at]
-            place = chance.randrange(len(line) + 1)
-            insert = chance.choice(
-                ["", "{", "}", ":", "$", "'", '"', "#", "[", "&a", "*a", "\n", "0"]
-            )
-            lines[at] = line[:place] + insert + line[place + (way == 5) :]
-    return "".join(lines)
-
-
-def test_mutated_trees_are_answered_with_findings() -> None:
-    texts = [path.read_text(encoding="utf-8") for path in sorted(TREES.glob("*.yaml"))]
-    texts += [case.text for case in CASES]
-    seed = random.randrange(10**9)
-    chance = random.Random(seed)
-    until = time.monotonic() + 5
-    while time.monotonic() < until:
-        text = _mutated(chance.choice(texts), chance)
-        try:
-            _words(check_bytes(text.encode()))
-        except Exception as error:
-            raise AssertionError(f"seed {seed}: {error!r} for\n{text}") from error
-
-
-@pytest.mark.parametrize("alone", [False, True])
-def test_the_time_for_ignores_grows_with_their_number_and_no_faster(alone: bool) -> None:
-    def seconds(count: int) -> float:
-        ignore = "# bt: ignore[BT304] an operator stops it"
-        node = f"    {ignore}\n    - retry: R\n" if alone else f"    - retry: R  {ignore}\n"
-        node += "      child: {check: $ready}\n"
-        text = "tree: t\ninputs: {ready: bool}\nroot:\n  sequence: S\n  children:\n" + node * count
-        started = time.process_time()
-        assert check_bytes(text.encode()) == []
-        return time.process_time() - started
-
-    assert seconds(8000) < 8 * seconds(2000) + 0.5
+@settings(deadline=None, max_examples=500)
+@given(st.sampled_from([case.text for case in CASES]), st.floats(0, 1), st.integers(0, 9), _PIECES)
+def test_any_document_with_a_piece_in_another_s_place_is_answered_with_findings(
+    text: str, where: float, left_out: int, piece: str
+) -> None:
+    at = int(where * len(text))
+    _words(check_bytes((text[:at] + piece + text[at + left_out :]).encode()))
 
 
 @pytest.mark.parametrize(("head", "each", "tail"), [
+    (
+        "inputs: {ready: bool}\nroot:\n  sequence: S\n  children:\n",
+        "    - {retry: R, child: {check: $ready}}  # bt: ignore[BT304] an operator stops it\n",
+        "",
+    ),
     ("root: {log: '", "$(x)", "'}\ninputs: {x: {type: int32, default: 1}}\n"),
     ("root:\n  set:\n", "    v{n}: 1\n", ""),
     ("root:\n  sequence: S\n  memory: false\n  children:\n", "    - log: a\n", ""),
@@ -589,36 +537,8 @@ def test_a_number_in_a_file_that_no_float_can_be_is_refused(tmp_path: Path) -> N
         load_tree(path)
 
 
-def test_a_file_that_cannot_be_read_is_read_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "bad.yaml").write_bytes(b"\xff")
-    tree = "tree: t\nroot:\n  sequence: S\n  children:\n" + "    - subtree: bad.yaml\n" * 10
-    (tmp_path / "tree.yaml").write_text(tree)
-    read: list[str] = []
-
-    def read_source(path: Path, *args: Any, **more: Any) -> Source:
-        read.append(path.name)
-        return source.read_source(path, *args, **more)
-
-    monkeypatch.setattr(workspace, "read_source", read_source)
-    (finding,) = check_file(tmp_path / "tree.yaml")
-    assert finding.code == "BT101"
-    assert read.count("bad.yaml") == 1
-
-
-def test_what_trees_inside_each_other_hold_is_looked_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_trees_inside_each_other_hold_is_looked_at_once(tmp_path: Path) -> None:
     """Unfolded, it is half a million nodes, below each of thirty others."""
-    looked: list[object] = []
-
-    def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
-        looked.append(node)
-        return node_settings.settings_of(node, document)
-
-    monkeypatch.setattr(verdicts, "settings_of", settings_of)
-    monkeypatch.setattr(hazards, "settings_of", settings_of)
     below = "move: M, goal: {distance: 1.0}"
     names = ["c.yaml", "b.yaml", "a.yaml"]
     declared = "actions: {move: {type: robot_control_interfaces/action/MoveRobot, server: m}}"
@@ -633,8 +553,9 @@ def test_what_trees_inside_each_other_hold_is_looked_at_once(
         root = f"{{parallel: P, children: [{root}, {{success: A}}]}}"
         root = f"{{sequence: R, memory: false, children: [{root}, {{success: B}}]}}"
     (tmp_path / "tree.yaml").write_text(f"tree: t\nroot: {root}\n")
+    started = time.process_time()
     check_file(tmp_path / "tree.yaml")
-    assert len(looked) < 2000
+    assert time.process_time() - started < 5
 
 
 def test_json_may_write_a_character_as_two_halves(tmp_path: Path) -> None:

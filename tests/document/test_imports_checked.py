@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
-import nav_msgs.msg
 import pytest
-import std_msgs.msg
 
 from bt_actions.document import check_file
-from bt_actions.messages import conversion as messages
 
 MOVE = "{{type: robot_control_interfaces/action/MoveRobot, server: m, timeout: 3 s, {}}}"
 MAIN = """\
@@ -132,28 +127,3 @@ def test_a_whole_tree_may_be_imported_for_its_words(tmp_path: Path) -> None:
     )
     assert check_file(tmp_path / "a.yaml") == []
     assert check_file(tmp_path / "t.yaml") == []
-
-
-def test_a_large_goal_that_nodes_add_to_is_looked_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "t.yaml").write_text(
-        "tree: t\nactions:\n  go: {type: a/action/B, server: s, timeout: 1 s, goal:"
-        f" {{header: {{frame_id: a}}, poses: [{'{}, ' * 200}]}}}}\nroot:\n  sequence: S\n"
-        "  children:\n" + "    - {go: G, goal: {header: {frame_id: b}}}\n" * 50
-    )
-    monkeypatch.setattr(
-        "bt_actions.document.checking.checker.interface_of",
-        lambda _name, _kind: SimpleNamespace(Goal=nav_msgs.msg.Path, Result=std_msgs.msg.Empty),
-    )
-    looked = 0
-    convert = messages._Filler.convert
-
-    def count(self: Any, *args: Any) -> Any:
-        nonlocal looked
-        looked += 1
-        return convert(self, *args)
-
-    monkeypatch.setattr(messages._Filler, "convert", count)
-    assert [each for each in check_file(tmp_path / "t.yaml") if each.code == "BT204"] == []
-    assert 200 < looked < 2000

@@ -11,8 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
-from bt_actions.document import Severity, check_source, source_of, tree_outputs
-from bt_actions.document.language.kinds import KINDS, Kind
+from bt_actions.document import tree_outputs
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]
@@ -36,13 +35,6 @@ def run(load: Load, node: str, ticks: int = 50) -> tuple[Status, dict[str, objec
     root = load(HEAD + textwrap.indent(textwrap.dedent(node), "  "))
     status = tick(root, ticks)
     return status, tree_outputs(root), root
-
-
-@pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)
-def test_the_example_of_each_kind_is_a_tree_without_errors(kind: Kind) -> None:
-    text = HEAD + textwrap.indent(kind.example, "  ")
-    found = check_source(source_of(text.encode(), kind.name))
-    assert [finding for finding in found if finding.severity is Severity.ERROR] == []
 
 
 @pytest.mark.parametrize(
@@ -105,11 +97,6 @@ def test_retry_runs_its_child_until_it_succeeds_or_the_attempts_are_used(load: L
     status, outputs, root = run(load, COUNTING % f"{{retry: R, attempts: 2, child: {child}}}")
     assert (status, outputs) == (Status.FAILURE, {"n": 2})
     assert root.children[1].feedback_message == "attempt 2 of 2 failed"
-
-
-def test_a_number_may_be_a_variable(load: Load) -> None:
-    status, outputs, _ = run(load, COUNTING % f"{{repeat: R, times: = $count + 1, child: {STEP}}}")
-    assert (status, outputs) == (Status.SUCCESS, {"n": 2})
 
 
 def test_retry_waits_for_its_backoff(load: Load) -> None:

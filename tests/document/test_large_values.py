@@ -66,9 +66,7 @@ def test_a_large_result_is_expected_and_saved_as_it_is(load: Load) -> None:
     with at_once():
         assert leaf.expect(result)
         saved = [function(result) for function in leaf.save.values()]
-        told = leaf._unexpected(result)
     assert saved == [7, MANY]
-    assert told.endswith(", but the result is: {sequence: [7, 7, 7, … 4000000 items]}")
 
 
 def test_a_large_variable_is_read_set_and_handed_on_as_it_is(load: Load) -> None:
@@ -80,23 +78,6 @@ def test_a_large_variable_is_read_set_and_handed_on_as_it_is(load: Load) -> None
     same = tree_outputs(root)["same"]
     assert isinstance(same, list)
     assert len(same) == 4_000_000
-
-
-def test_an_image_is_saved_as_it_is(load: Load) -> None:
-    root = load(
-        """
-        tree: t
-        inputs: {seen: sensor_msgs/msg/Image}
-        outputs: {kept: sensor_msgs/msg/Image}
-        root: {set: {kept: $seen}}
-        """,
-        {"seen": {}},
-    )
-    scope = getattr(root, LOADED).scope
-    scope.write("seen", Image(data=array.array("B", bytes(24_000_000))))
-    with at_once():
-        assert tick(root) is Status.SUCCESS, root.feedback_message
-    assert len(scope.read("kept").data) == 24_000_000
 
 
 @pytest.mark.parametrize("given", [MANY, MANY.tolist()], ids=["an array", "a list"])

@@ -468,13 +468,6 @@ def test_a_tree_that_includes_itself_is_an_error_that_shows_the_chain(
     assert finding.file == str(tmp_path / "b.yaml")
 
 
-def test_errors_of_an_included_tree_are_told_at_their_own_place(load: Load) -> None:
-    with pytest.raises(DocumentError) as caught:
-        load("tree: a\nroot: {subtree: b.yaml}\n", b="tree: b\nroot: {sucess: A}\n")
-    (finding,) = caught.value.findings
-    assert (Path(finding.file).name, finding.code) == ("b.yaml", "BT201")
-
-
 def test_imports_bring_actions_topics_and_defaults_and_the_own_ones_win(load: Load) -> None:
     root = load(
         """

@@ -15,7 +15,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
-from bt_actions.document import DocumentError, tree_outputs
+from bt_actions.document import DocumentError
 from bt_actions.document.language.keys import NODE, NODES, TOP_KEYS
 from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.scalars import Condition, Duration, Place, Text
@@ -171,24 +171,3 @@ def test_a_name_in_an_expression_is_the_trees_own(
     assert tree.status is (Status.FAILURE if where[-1] == "when" else Status.SUCCESS)
     assert "/order" not in blackboard.read
     assert any(key.startswith("/bt/t/") and key.endswith("/order") for key in blackboard.read)
-
-
-def test_a_result_is_saved_with_the_trees_own_values(
-    load: Load, run: Any, blackboard: Watched, graph: dict[str, str]
-) -> None:
-    tree = run(
-        load(
-            f"""
-            tree: t
-            inputs: {{order: {{type: int32, default: 5}}}}
-            outputs: {{got: float64}}
-            root:
-              action: Go
-              type: robot_control_interfaces/action/MoveRobot
-              server: {graph["action"]}
-              goal: {{distance: 0.5}}
-              save: {{got: 2 * result.final_pose + $order}}
-            """
-        )
-    )
-    assert (tree.status, tree_outputs(tree)) == (Status.SUCCESS, {"got": 6.0})

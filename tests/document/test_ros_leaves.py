@@ -105,13 +105,6 @@ def test_an_answer_that_is_not_expected_fails_and_is_tried_again(
     assert (root.status, len(asked)) == (Status.SUCCESS, 4)
 
 
-def test_a_service_that_is_not_there_fails_in_time(load: Load, run: Run, name: str) -> None:
-    more = "timeout: {server: 200 ms}"
-    root = run(load(CALL.format(server=f"{name}/nobody", more=more)))
-    assert root.status is Status.FAILURE
-    assert root.feedback_message == f"no service {name}/nobody within 0.2 s: nobody offers it"
-
-
 def test_a_service_that_does_not_answer_fails_in_time(
     load: Load, node: Any, name: str, run: Run
 ) -> None:
@@ -237,20 +230,6 @@ def test_a_visit_begins_when_no_topic_is_waited_for_any_more(
     assert begun == [Status.INVALID], "as the first tick of any visit"
 
 
-def test_a_message_that_is_too_old_fails_a_check(load: Load, run: Run, name: str) -> None:
-    topic = f"{name}/door"
-    children = [PUBLISH.format(topic=topic), "{wait_until: $door.data, timeout: 10 s}",
-                "{wait: 1200 ms}", "{check: $door.data}"]  # fmt: skip
-    text = TOPICS.format(
-        topic=topic,
-        more=", max_age: 1 s",
-        root=f"{{sequence: S, children: [{', '.join(children)}]}}",
-    )
-    root = run(load(text))
-    assert root.status is Status.FAILURE
-    assert "s old ($door)" in root.children[-1].feedback_message
-
-
 @pytest.fixture
 def paced(context: Any, no_leaks: None) -> Iterator[tuple[SimulatedTime, Any]]:
     """Simulated time, and a node that goes by it as soon as somebody spins it."""
@@ -292,21 +271,6 @@ def test_the_age_of_a_message_is_that_of_the_node_s_clock(
         clock.jump(20.0)
         assert runner.wait(10.0) is Status.FAILURE
     assert "s old ($door)" in guard.feedback_message
-
-
-def test_a_message_grows_no_older_while_simulated_time_is_paused(
-    load: Load, name: str, paced: tuple[SimulatedTime, Any]
-) -> None:
-    clock, node = paced
-    clock.rate = 0.0
-    root = watching(load, f"{name}/door", "500 ms")
-    with TreeRunner(root, node=node) as runner:
-        runner.start()
-        guard = root.children[-1]
-        until(lambda: guard.status is Status.RUNNING, what="a fresh message was seen")
-        assert holds_for(lambda: guard.status is Status.RUNNING, 1.0)
-        clock.rate = 1.0
-        assert runner.wait(10.0) is Status.FAILURE
 
 
 def test_a_message_is_waited_for_and_kept(load: Load, run: Run, name: str) -> None:
@@ -602,18 +566,6 @@ def test_a_message_that_nobody_listens_to_is_published_with_a_warning_when_the_n
     hasty.shutdown()
     assert (root.status, root.warning) == (Status.SUCCESS, f"nobody listens on {name}")
     assert root.feedback_message == root.warning
-
-
-def test_a_message_that_does_not_come_fails_in_time(load: Load, run: Run, name: str) -> None:
-    text = (
-        "tree: t\nroot: {wait_for_message: W, topic: %s, type: std_msgs/msg/Bool, timeout: 50 ms}"
-    )
-    root = run(load(text % f"{name}/door"))
-    assert root.status is Status.FAILURE
-    assert (
-        root.feedback_message
-        == f"no such message on {name}/door within 0.05 s: nobody publishes on it"
-    )
 
 
 def test_timeout_waits_until_the_goal_it_stopped_has_ended(

@@ -43,7 +43,7 @@ def taken(name: str) -> bool:
 @example("~/a")
 @example("/")
 @example("a/{node}0")
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 def test_a_name_is_taken_exactly_when_ros_takes_it(name: str) -> None:
     # rcl makes '/space/nodea' of '~a', which its own rules forbid; {ns} holds slashes of its own.
     if "{ns}" not in name and not re.match("~[^/]", name):

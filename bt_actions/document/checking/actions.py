@@ -115,26 +115,13 @@ def _check_together(checker: Checker, node: TreeNode, declared: Declared) -> Non
     def problems(goal: object) -> list[Problem]:
         return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]
 
-    over, under = _where_both(own, shared), _where_both(shared, own)
-    told = {*problems(over), *problems(under)}
-    for problem in problems(merged(under, over)):
+    told = {*problems(own), *problems(shared)}
+    for problem in problems(merged(shared, own)):
         if problem not in told:
             checker.source.report(
                 "BT204", span_of(locate(node.written["goal"], problem.path)), problem.text,
                 related=Related(declared.place, "merged with the goal here"),
             )  # fmt: skip
-
-
-def _where_both(goal: dict[str, object], other: dict[str, object]) -> dict[str, object]:
-    """What a goal says in the mappings that another writes too: beside it, each may be large."""
-    part: dict[str, object] = {}
-    for name, value in goal.items():
-        inner = other.get(name)
-        if isinstance(value, dict) and isinstance(inner, dict):
-            part[name] = _where_both(value, inner)
-        elif not isinstance(value, dict | list):
-            part[name] = value
-    return part
 
 
 def _is_computed(value: object, _kind: FieldType, _path: tuple[str | int, ...]) -> bool:

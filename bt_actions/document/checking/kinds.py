@@ -164,15 +164,22 @@ def _for_each(checker: Checker, node: TreeNode) -> None:
         checker.value(None, items, node.written["in"], prose=True)
 
 
-def _action(checker: Checker, node: TreeNode) -> None:
-    name = node.values.get("type")
-    cls = checker.interface(name, "action", node.written["type"]) if isinstance(name, str) else None
-    checker.call(
-        node.values, node.node,
-        request=None if cls is None else Message(cls.Goal),  # type: ignore[attr-defined]
-        result=None if cls is None else Message(cls.Result),  # type: ignore[attr-defined]
-        request_key="goal",
-    )  # fmt: skip
+def _asks(
+    interface: str, asked: str, answer: str, request_key: str
+) -> Callable[[Checker, TreeNode], None]:
+    def check(checker: Checker, node: TreeNode) -> None:
+        name = node.values.get("type")
+        cls = None
+        if isinstance(name, str):
+            cls = checker.interface(name, interface, node.written["type"])
+        checker.call(
+            node.values, node.node,
+            request=None if cls is None else Message(getattr(cls, asked)),
+            result=None if cls is None else Message(getattr(cls, answer)),
+            request_key=request_key,
+        )  # fmt: skip
+
+    return check
 
 
 def _run_tree(checker: Checker, node: TreeNode) -> None:
@@ -188,17 +195,6 @@ def _run_tree(checker: Checker, node: TreeNode) -> None:
     for condition in (node.values.get("expect"), when_of(node.values)):
         checker.condition(condition, roots)
     checker.save(node.values.get("save"), roots)
-
-
-def _service(checker: Checker, node: TreeNode) -> None:
-    name = node.values.get("type")
-    cls = checker.interface(name, "srv", node.written["type"]) if isinstance(name, str) else None
-    checker.call(
-        node.values, node.node,
-        request=None if cls is None else Message(cls.Request),  # type: ignore[attr-defined]
-        result=None if cls is None else Message(cls.Response),  # type: ignore[attr-defined]
-        request_key="request",
-    )  # fmt: skip
 
 
 def _publish(checker: Checker, node: TreeNode) -> None:
@@ -286,7 +282,7 @@ def _python(checker: Checker, node: TreeNode) -> None:
 
 CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
     {
-        "action": _action,
+        "action": _asks("action", "Goal", "Result", "goal"),
         "check": _condition_of("check"),
         "for_each": _for_each,
         "log": _log,
@@ -296,7 +292,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "repeat": _number_of("times", INTEGER),
         "retry": _number_of("attempts", INTEGER, 1),
         "run_tree": _run_tree,
-        "service": _service,
+        "service": _asks("srv", "Request", "Response", "request"),
         "set": _set,
         "subtree": _subtree,
         "timeout": _number_of("after", FLOAT, zero=False),
