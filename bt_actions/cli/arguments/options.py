@@ -8,45 +8,47 @@ from __future__ import annotations
 import argparse
 import math
 import re
-
-
-def seconds(text: str) -> float:
-    """Read a positive number of seconds from the command line."""
-    return positive(text, "number of seconds")
-
+from collections.abc import Callable
+from typing import Any
 
 FASTEST = 1e5
 """The largest factor for the simulation's time, and one by the smallest."""
+MOST = 1000
+"""Goals, robots and the like that one server can be asked for."""
+
+
+def number(
+    what: str, kind: Callable[[str], Any] = float, least: float = -math.inf, most: float = math.inf
+) -> Callable[[str], Any]:
+    """Return what reads a number within bounds; the error that argparse reports calls it `what`."""
+
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
+        return value
+
+    return read
+
+
+seconds = number("positive number of seconds", least=math.ulp(0.0))
+metres = number("number of metres")
 
 
 def speed(text: str) -> float:
-    """Read a factor from the command line, with which timers can still be made."""
-    value = positive(text, "factor")
+    """Read a factor, with which timers can still be made."""
+    value: float = number("positive factor", least=math.ulp(0.0))(text)
     if not 1.0 / FASTEST <= value <= FASTEST:
         raise argparse.ArgumentTypeError(f"{text!r} is not from {1.0 / FASTEST:g} to {FASTEST:g}")
     return value
 
 
-def positive(text: str, what: str) -> float:
-    """Read a positive, finite number; argparse reports the error."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or value <= 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no positive {what}")
-    return value
-
-
-def metres(text: str) -> float:
-    """Read a finite number of metres from the command line."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of metres")
-    return value
+def count(what: str) -> Callable[[str], Any]:
+    """Return what reads how many of something; the error calls them `what`."""
+    return number(f"number of {what}, 1 to {MOST}", int, 1, MOST)
 
 
 def namespace(text: str) -> str:
@@ -72,23 +74,41 @@ def node_name(text: str) -> str:
     return text
 
 
-def add_set(parser: argparse.ArgumentParser) -> None:
-    """Add the option of every command that gives inputs of a tree their values."""
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="give an input of the tree a value; repeatable",
-    )
-
-
-def add_no_python(parser: argparse.ArgumentParser) -> None:
-    """Add the option of every command that reads a tree with its `python:` nodes."""
-    parser.add_argument(
-        "--no-python",
-        dest="python",
-        action="store_false",
-        help="refuse a tree with python: nodes, and import no class for it; for trees that are "
+_SHARED: dict[str, dict[str, Any]] = {
+    "--set": {
+        "metavar": "NAME=VALUE",
+        "action": "append",
+        "default": [],
+        "help": "give an input of the tree a value; repeatable",
+    },
+    "--no-python": {
+        "dest": "python",
+        "action": "store_false",
+        "help": "refuse a tree with python: nodes, and import no class for it; for trees that are "
         "not trusted",
-    )
+    },
+    "--executor": {
+        "choices": ("multi", "single"),
+        "default": "multi",
+        "help": "rclpy's multi-threaded (default) or single-threaded executor",
+    },
+    "--namespace": {"metavar": "NS", "type": namespace, "default": ""},
+    "--timeout": {
+        "metavar": "S",
+        "type": seconds,
+        "help": "cancel after so many seconds, exit code 124",
+    },
+    "--json": {"action": "store_true", "help": "print one JSON object a line, the result last"},
+    "--quiet": {
+        "action": "store_true",
+        "help": "show only what went wrong; the exit code tells",
+    },
+    "--seed": {"metavar": "N", "type": int, "help": "seed of faults that happen by chance"},
+}
+_SHORT = {"--quiet": "-q"}
+
+
+def add_option(parser: argparse._ActionsContainer, name: str, **other: Any) -> None:
+    """Add an option that several commands have; `other` replaces what it is elsewhere."""
+    names = [_SHORT[name], name] if name in _SHORT else [name]
+    parser.add_argument(*names, **_SHARED[name] | other)

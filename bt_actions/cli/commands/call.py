@@ -12,7 +12,7 @@ import uuid
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.cli.arguments.options import add_set, namespace, seconds
+from bt_actions.cli.arguments.options import add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.arguments.values import goal_fields, nested
 from bt_actions.cli.exits import BadInput, Exit
@@ -53,22 +53,14 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("tree", metavar="TREE", help="name of the tree at the server")
-    add_set(parser)
+    add_option(parser, "--set")
     parser.add_argument(
         "--server", metavar="NAME", default="run_tree", help="its action; run_tree if not given"
     )
-    parser.add_argument(
-        "--namespace", metavar="NS", type=namespace, default="", help="namespace of the server"
-    )
-    parser.add_argument(
-        "--timeout", metavar="S", type=seconds, help="cancel after so many seconds, exit code 124"
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print one JSON object a line, the result last"
-    )
-    parser.add_argument(
-        "-q", "--quiet", action="store_true", help="show only what went wrong; the exit code tells"
-    )
+    add_option(parser, "--namespace", help="namespace of the server")
+    add_option(parser, "--timeout")
+    add_option(parser, "--json")
+    add_option(parser, "--quiet")
     add_ros_args(parser, "; parameters (-p NAME:=VALUE) give inputs their values as of `run`")
 
 

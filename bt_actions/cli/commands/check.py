@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.arguments.options import add_no_python
+from bt_actions.cli.arguments.options import add_option
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.streams.results import keep_results_apart, results
 from bt_actions.cli.streams.writing import columns, write
@@ -43,7 +43,7 @@ def add_parser(subparsers: Subparsers) -> None:
         action="store_true",
         help="look up no ROS interface, and no class of a python: node",
     )
-    add_no_python(parser)
+    add_option(parser, "--no-python")
     parser.add_argument(
         "--format",
         choices=("text", "json", "github", "sarif"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.cli.arguments.options import namespace
+from bt_actions.cli.arguments.options import add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.exits import Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart, results
@@ -35,10 +35,8 @@ def add_parser(subparsers: Subparsers) -> None:
         description="Show the trees that servers of trees (`bt-actions serve`) offer.",
         epilog=_EPILOG,
     )
-    parser.add_argument(
-        "--namespace", metavar="NS", type=namespace, default="", help="only servers in or below it"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_option(parser, "--namespace", help="only servers in or below it")
+    add_option(parser, "--json", help="print one JSON object")
     add_ros_args(parser)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.loading import load
-from bt_actions.cli.arguments.options import add_no_python, add_set
+from bt_actions.cli.arguments.options import add_option
 from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.results import keep_results_apart, results
 from bt_actions.cli.streams.writing import write
@@ -57,8 +57,8 @@ def add_parser(subparsers: Subparsers) -> None:
         help="show so many levels below the root and say how many nodes are left out; "
         "an .html file has all and starts folded to it",
     )
-    add_set(parser)
-    add_no_python(parser)
+    add_option(parser, "--set")
+    add_option(parser, "--no-python")
 
 
 def _levels(text: str) -> int:

@@ -10,15 +10,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.loading import load
-from bt_actions.cli.arguments.options import (
-    add_no_python,
-    add_set,
-    metres,
-    namespace,
-    node_name,
-    seconds,
-    speed,
-)
+from bt_actions.cli.arguments.options import add_option, metres, node_name, speed
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart
@@ -54,18 +46,11 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("tree", metavar="TREE", help="path of a tree, or name of an installed one")
-    add_set(parser)
-    parser.add_argument(
-        "--executor",
-        choices=("multi", "single"),
-        default="multi",
-        help="rclpy's multi-threaded (default) or single-threaded executor",
-    )
-    parser.add_argument(
+    add_option(parser, "--set")
+    add_option(parser, "--executor")
+    add_option(
+        parser,
         "--namespace",
-        metavar="NS",
-        type=namespace,
-        default="",
         help="namespace of the node, and thereby of every relative action name",
     )
     parser.add_argument(
@@ -74,22 +59,15 @@ def add_parser(subparsers: Subparsers) -> None:
         type=node_name,
         help="name of the node; bt_actions_ and the tree's name where not given",
     )
-    parser.add_argument(
-        "--timeout",
-        metavar="S",
-        type=seconds,
-        help="end the run after so many seconds, with exit code 124",
-    )
+    add_option(parser, "--timeout", help="end the run after so many seconds, with exit code 124")
     parser.add_argument(
         "--cleanup-first",
         action="store_true",
         help="cancel what a killed orchestrator of this machine left, before the tree starts; "
         "waits 30 s for the tree's servers, and does not run where it cannot see what was left",
     )
-    add_no_python(parser)
-    parser.add_argument(
-        "--json", action="store_true", help="print one JSON object a line, the result last"
-    )
+    add_option(parser, "--no-python")
+    add_option(parser, "--json")
     parser.add_argument(
         "--plain",
         action="store_true",
@@ -123,9 +101,7 @@ def add_parser(subparsers: Subparsers) -> None:
         type=speed,
         help="speed of the simulation (not of the tree's deadlines); 1 where not given",
     )
-    simulated.add_argument(
-        "--seed", metavar="N", type=int, help="seed of faults that happen by chance"
-    )
+    add_option(simulated, "--seed")
     simulated.add_argument(
         "--check-part",
         metavar="METRES",

@@ -9,7 +9,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.arguments.options import namespace, seconds
+from bt_actions.cli.arguments.options import add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.arguments.values import goal_fields
 from bt_actions.cli.exits import BadInput
@@ -52,21 +52,15 @@ def add_parser(subparsers: Subparsers) -> None:
         default=[],
         help="fields of the goal; others keep defaults",
     )
-    parser.add_argument(
-        "--timeout", metavar="S", type=seconds, help="cancel after so many seconds, exit code 124"
-    )
-    parser.add_argument(
-        "--namespace", metavar="NS", type=namespace, default="", help="namespace of the server"
-    )
+    add_option(parser, "--timeout")
+    add_option(parser, "--namespace", help="namespace of the server")
     parser.add_argument(
         "--feedback",
         action=argparse.BooleanOptionalAction,
         default=True,
         help="show feedback (default), or not",
     )
-    parser.add_argument(
-        "-q", "--quiet", action="store_true", help="show only what went wrong; the exit code tells"
-    )
+    add_option(parser, "--quiet")
     add_ros_args(parser)
 
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.cli.arguments.options import namespace
+from bt_actions.cli.arguments.options import MOST, add_option, count
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.driving.serving import say, serve
 from bt_actions.cli.driving.signals import SAME_WISH
@@ -45,7 +45,6 @@ and says which goals are not accounted for (exit code 3).
 
 _POLICIES = ("reject", "queue", "replace", "parallel")
 _LISTS = {"trees": "DIR", "python": "PACKAGE"}
-_MOST = 1000
 _HELP = {
     "trees": "a folder of trees, or package://NAME/trees; repeatable; nothing outside is read; "
     "./trees where not given",
@@ -66,7 +65,7 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     for name, help_text in _HELP.items():
-        kind: dict[str, Any] = {"metavar": "N", "type": _count}
+        kind: dict[str, Any] = {"metavar": "N", "type": count("goals")}
         if name in _LISTS:
             kind = {"metavar": _LISTS[name], "action": "append"}
         elif name == "policy":
@@ -74,11 +73,9 @@ def add_parser(subparsers: Subparsers) -> None:
         elif name == "managed":
             kind = {"action": "store_true", "default": None}
         parser.add_argument(f"--{name}", help=help_text, **kind)
-    parser.add_argument(
+    add_option(
+        parser,
         "--namespace",
-        metavar="NS",
-        type=namespace,
-        default="",
         help="namespace of the node, and thereby of run_tree and every relative action name",
     )
     more = f"; the parameters {listing(_HELP)} are used where the options are not given"
@@ -185,8 +182,8 @@ def _checked(name: str, value: object) -> object:
     elif name == "policy":
         wanted, fits = listing(_POLICIES), value in _POLICIES
     elif name == "max":
-        wanted = f"a whole number, 1 to {_MOST}"
-        fits = type(value) is int and 1 <= value <= _MOST
+        wanted = f"a whole number, 1 to {MOST}"
+        fits = type(value) is int and 1 <= value <= MOST
     else:
         wanted, fits = "true or false", isinstance(value, bool)
     if not fits:
@@ -205,7 +202,7 @@ def _server(node: Any, options: Mapping[str, Any]) -> TreeServer:
         if name == "policy":
             descriptor.additional_constraints = listing(_POLICIES)
         elif name == "max":
-            descriptor.integer_range = [IntegerRange(from_value=1, to_value=_MOST, step=1)]
+            descriptor.integer_range = [IntegerRange(from_value=1, to_value=MOST, step=1)]
         node.declare_parameter(name, value, descriptor, ignore_override=True)
     try:
         return TreeServer(
@@ -232,13 +229,3 @@ def _announce(server: TreeServer, *, managed: bool) -> None:
     more = f", {len(broken)} broken: {listing(broken)}" if broken else ""
     name = f"{server.node.get_namespace().rstrip('/')}/run_tree"
     say(f"ready: {name}, {len(entries) - len(broken)} trees{more}")
-
-
-def _count(text: str) -> int:
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if not 1 <= number <= _MOST:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of goals, 1 to {_MOST}")
-    return number

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.cli.arguments.options import namespace, seconds, speed
+from bt_actions.cli.arguments.options import add_option, count, seconds, speed
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.driving.serving import say, serve
 from bt_actions.cli.exits import BadInput, Exit
@@ -48,16 +48,15 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG + table(),
     )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument(
+    add_option(
+        which,
         "--namespace",
-        metavar="NS",
-        type=namespace,
         action="append",
         default=[],
         help="move all names into this namespace; repeat it for several robots",
     )
     which.add_argument(
-        "--robots", metavar="N", type=_count, help="serve so many robots, in /r1, /r2, ..."
+        "--robots", metavar="N", type=count("robots"), help="serve so many robots, in /r1, /r2, ..."
     )
     parser.add_argument(
         "--speed",
@@ -80,20 +79,13 @@ def add_parser(subparsers: Subparsers) -> None:
         default=[],
         help="make a server misbehave; repeatable, see below",
     )
-    parser.add_argument(
-        "--seed", metavar="N", type=int, help="seed of faults that happen by chance"
-    )
+    add_option(parser, "--seed")
     parser.add_argument(
         "--journal",
         metavar="FILE",
         help="append what happens to every goal, one JSON object a line",
     )
-    parser.add_argument(
-        "--executor",
-        choices=("multi", "single"),
-        default="multi",
-        help="rclpy's multi-threaded (default) or single-threaded executor",
-    )
+    add_option(parser, "--executor")
     add_ros_args(parser)
 
 
@@ -150,13 +142,3 @@ def _announce(simulation: Simulation, args: argparse.Namespace) -> None:
 
 def _tell(_namespace: str, event: WorldEvent) -> None:
     say(str(event))
-
-
-def _count(text: str) -> int:
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if not 1 <= number <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of robots, 1 to 1000")
-    return number
