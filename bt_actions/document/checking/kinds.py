@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Mapping
 from types import MappingProxyType
 
+from py_trees.timers import Timer
+
 from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.infer import FLOAT, INTEGER, named
@@ -271,6 +273,9 @@ def _python(checker: Checker, node: TreeNode) -> None:
     except ClassError as error:
         checker.source.report("BT214", span_of(node.written["python"]), str(error))
         return
+    if issubclass(cls, Timer):
+        text = "this timer goes by the wall clock: it cannot be run in virtual time"
+        checker.source.report("BT316", span_of(node.written["python"]), text, hint="wait: 5 s")
     if not isinstance(arguments, dict):
         return
     for wrong in wrong_arguments(cls, arguments):

@@ -112,4 +112,11 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree('inputs: {part: string}\nroot: {log: "Part {part}"}\n'),
         tree("inputs: {part: string}\nroot: {log: Part $(part)}\n"),
     ),
+    "BT316": Page(
+        "py_trees' own timer reads the wall clock. It goes on where a simulator is paused, jumps "
+        "with a clock that is set, and in a test in virtual time it would never end. 'wait' goes "
+        "by the node's clock.",
+        tree("root: {python: py_trees.timers.Timer, arguments: {duration: 5.0}}\n"),
+        tree("root: {wait: 5 s}\n"),
+    ),
 }  # fmt: skip

@@ -249,8 +249,8 @@ PAGES: Mapping[str, Page] = {
     ),
     "BT215": Page(
         "The arguments do not fit the constructor of the class. Its name is given by the node.",
-        tree("root: {python: py_trees.timers.Timer, arguments: {duratoin: 1.0}}\n"),
-        tree("root: {python: py_trees.timers.Timer, arguments: {duration: 1.0}}\n"),
+        tree("root: {python: py_trees.behaviours.Periodic, arguments: {number: 3}}\n"),
+        tree("root: {python: py_trees.behaviours.Periodic, arguments: {n: 3}}\n"),
     ),
     "BT216": Page(
         "Two things have one name, so that it is not clear which is meant.",

@@ -84,6 +84,7 @@ RULES = MappingProxyType(
             _warning("BT313", "a key that not every item has"),
             _warning("BT314", "an inverted check of what nobody may know"),
             _warning("BT315", "a text that holds a variable's name"),
+            _warning("BT316", "a timer that goes by the wall clock"),
         )
     }
 )

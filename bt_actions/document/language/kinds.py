@@ -312,7 +312,7 @@ def _all() -> Iterable[Kind]:
         "python",
         Text("a class, such as package.module.Class, as a text"),
         "A behaviour of one's own, made with its name and `arguments`.",
-        "python: py_trees.timers.Timer\narguments: {duration: 0.1}",
+        "python: py_trees.behaviours.Periodic\narguments: {n: 3}",
         Key("arguments", Values(), "For its constructor."),
     )
     yield _leaf(
