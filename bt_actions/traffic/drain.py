@@ -83,7 +83,7 @@ class _Patience:
         if max(alarm.stalls.answers_take(now), *doubts) > 0.0:
             self._deadline = max(self._deadline, now + ASK_AGAIN)
         self._lost.update(handle for handle in waits if handle.goal.lost)
-        back = {handle for handle in self._lost if not handle.goal.lost}
+        back = {each for each in self._lost if each.goal.state not in (State.LOST, State.DONE)}
         self._allow(back - self._were_back)  # once: else one that comes and goes had no end
         self._lost, self._were_back = self._lost - back, self._were_back | back
         looks_out = any(handle.looked_out_for for handle in waits)

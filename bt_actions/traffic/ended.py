@@ -17,7 +17,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, ENDS, Event
+from bt_actions.goals.policy import End
+from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, Event
 from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.servers.duplicates import DuplicateReplies
 from bt_actions.traffic import alarm
@@ -67,7 +68,7 @@ class Past:
         )
         endpoint.see()
         elsewhere = handle.replies.may_run_at(endpoint.watch)
-        given_up = handle.goal.lost and handle.goal.end not in ENDS.values()
+        given_up = handle.goal.end is End.SERVER_GONE
         if elsewhere and not given_up:
             duplicate.replies = DuplicateReplies(duplicate.goal, handle.replies, elsewhere)
             duplicate.replies.taken_over()

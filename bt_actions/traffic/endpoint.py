@@ -287,7 +287,7 @@ class ActionEndpoint:
             self._carry_out(handle, command, message)
         if _is_answered(handle):
             ledger.strike(goal.id)
-        elif goal.lost != was_lost and goal.id in ledger:
+        elif goal.lost != was_lost and goal.state is not State.DONE and goal.id in ledger:
             self._put_on_record(handle)
         if goal.state is State.DONE:
             self.retire(handle)

@@ -153,7 +153,7 @@ class GoalHandle:
     @property
     def looked_out_for(self) -> bool:
         """Whether a server is looked out for that went away with it, and has not told its end."""
-        return self.goal.lost and self.goal.state is not State.DONE and bool(self.look_out_left)
+        return self.goal.lost and bool(self.look_out_left)
 
 
 @dataclass(frozen=True, slots=True)

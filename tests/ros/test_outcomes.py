@@ -685,7 +685,7 @@ class TestDeadlines:
             runner.observe(tell)
             runner.run(timeout=20.0)
             assert leaf.end is told[-1] is End.UNKNOWN
-            until(lambda: leaf.history[0].goal._seen_status)
+            until(lambda: leaf.history[0].goal.lost_result.status)
         assert leaf.end is told[-1] is End.CANCELED
         assert runner.unaccounted == []
 
@@ -700,7 +700,7 @@ class TestDeadlines:
 
         runner.observe(leave)
         runner.run(timeout=20.0)
-        until(lambda: leaf.history[0].goal._seen_status)
+        until(lambda: leaf.history[0].goal.lost_result.status)
         with pytest.raises(SystemExit):
             runner.shutdown()
         runner.shutdown()
