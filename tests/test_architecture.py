@@ -16,7 +16,7 @@ import bt_actions
 ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
     {"cli"},
-    {"serving"},
+    {"serving", "testing"},
     {"render", "recovery", "running", "simulation"},
     {"document"},
     {"behaviours"},

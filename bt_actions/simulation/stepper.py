@@ -46,7 +46,7 @@ class Stepper:
         self._wall_period = step_period / speed
         self._most_steps = max(1, math.ceil(CATCH_UP / self._wall_period))
         self._moving: dict[Stepped, None] = {}
-        self._next_step = math.inf
+        self._since, self._made = 0.0, 0  # when the motion began, and the steps since then
         self._alarms: list[tuple[float, int, Callable[[float], None]]] = []
         self._counter = itertools.count()
         self._armed_for = math.inf
@@ -62,7 +62,7 @@ class Stepper:
         """Step `stepped` from now on, until its `step` returns False."""
         with self.lock:
             if not self._moving:
-                self._next_step = self.now() + self._wall_period
+                self._since, self._made = self.now(), 0
             self._moving[stepped] = None
             self._arm()
 
@@ -110,10 +110,14 @@ class Stepper:
             return 0
         steps = 1 + int((now - self._next_step) / self._wall_period)
         if steps > self._most_steps:
-            self._next_step = now + self._wall_period
+            self._since, self._made = now, 0
             return self._most_steps
-        self._next_step += steps * self._wall_period
+        self._made += steps
         return steps
+
+    @property
+    def _next_step(self) -> float:
+        return self._since + (self._made + 1) * self._wall_period
 
     def _arm(self) -> None:
         """Set the timer to the next time something is due, or switch it off."""

@@ -14,6 +14,12 @@ from tests.simulation.conftest import Bench, Client
 
 
 @pytest.fixture
+def stands_on() -> str:
+    """What a server decides is the same everywhere."""
+    return "virtual"
+
+
+@pytest.fixture
 def world() -> World:
     return World(part_at=0.0)
 

@@ -18,13 +18,14 @@ from tests.simulation.conftest import Bench
 from tests.simulation.test_simulation import Robot
 from tests.support.processes import ROOT, Process
 
+pytestmark = pytest.mark.ros
 MAIN = "import sys; from bt_actions.cli import main; sys.exit(main())"
 
 
-@pytest.fixture(params=["multi"])
-def executor(request: pytest.FixtureRequest) -> str:
+@pytest.fixture
+def stands_on() -> str:
     """The bench lends only its clients here: one kind of executor is enough for it."""
-    return str(request.param)
+    return "multi"
 
 
 @pytest.fixture

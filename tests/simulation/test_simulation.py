@@ -12,9 +12,10 @@ from sensor_msgs.msg import BatteryState
 
 from bt_actions.simulation import FaultError, Simulation, WorldEvent
 from bt_actions.simulation import journal as j
-from tests.simulation.conftest import Bench, Client
+from tests.simulation.conftest import Bench, Client, RosBench
 from tests.support.waiting import until
 
+IN_VIRTUAL_TIME = pytest.mark.parametrize("stands_on", ["virtual"])
 SUCCEEDED = GoalStatus.STATUS_SUCCEEDED
 
 
@@ -66,6 +67,7 @@ def test_the_part_is_carried_to_the_shelf(bench: Bench, space: str) -> None:
     assert set(j.ends(bench.entries()).values()) == {j.Event.SUCCEEDED}
 
 
+@IN_VIRTUAL_TIME
 def test_each_namespace_has_a_world_of_its_own(bench: Bench, space: str) -> None:
     names = [f"{space}/a", f"{space}/b"]
     robots = [Robot(bench, name) for name in names]
@@ -80,12 +82,12 @@ def test_each_namespace_has_a_world_of_its_own(bench: Bench, space: str) -> None
         simulation.world("/c")
 
 
-def test_fifty_robots_move_at_once_without_a_thread_each(bench: Bench, space: str) -> None:
+def test_fifty_robots_move_at_once_without_a_thread_each(ros_bench: RosBench, space: str) -> None:
     names = [f"{space}/r{number}" for number in range(50)]
-    clients = [bench.client(MoveRobot, f"{name}/move_robot") for name in names]
+    clients = [ros_bench.client(MoveRobot, f"{name}/move_robot") for name in names]
     threads = threading.active_count()
-    simulation = bench.serve(
-        Simulation(bench.node, namespaces=names, speed=10.0, journal=bench.path)
+    simulation = ros_bench.serve(
+        Simulation(ros_bench.node, namespaces=names, speed=10.0, journal=ros_bench.path)
     )
     for client in clients:
         client.until_ready()
@@ -93,13 +95,14 @@ def test_fifty_robots_move_at_once_without_a_thread_each(bench: Bench, space: st
     assert {goal.until_ended(20.0).status for goal in goals} == {SUCCEEDED}
     assert threading.active_count() <= threads + 2
     assert len(simulation.servers) == 100
-    starts = [each for each in bench.entries() if each.event is j.Event.ACCEPTED]
-    ends = [each for each in bench.entries() if each.event is j.Event.SUCCEEDED]
+    starts = [each for each in ros_bench.entries() if each.event is j.Event.ACCEPTED]
+    ends = [each for each in ros_bench.entries() if each.event is j.Event.SUCCEEDED]
     took = [end.t - next(s.t for s in starts if s.goal == end.goal) for end in ends]
     assert len(took) == 50
     assert max(took) < 10.0, "51 steps of 10 ms, on a machine that does other work besides"
 
 
+@IN_VIRTUAL_TIME
 def test_a_dropped_part_lies_on_the_way(bench: Bench, space: str) -> None:
     robot = Robot(bench, space)
     simulation = bench.serve(
@@ -112,6 +115,7 @@ def test_a_dropped_part_lies_on_the_way(bench: Bench, space: str) -> None:
     assert 3.0 < part.position < 4.5
 
 
+@IN_VIRTUAL_TIME
 def test_death_in_a_shared_process_takes_one_server_only(bench: Bench, space: str) -> None:
     robot = Robot(bench, space)
     simulation = bench.serve(
@@ -119,26 +123,27 @@ def test_death_in_a_shared_process_takes_one_server_only(bench: Bench, space: st
     )
     robot.until_ready()
     robot.move.send(distance=5.0)
-    bench.until(lambda: not robot.move.rclpy_client.server_is_ready())
+    bench.until(lambda: not robot.move.is_ready())
     stands_at = simulation.world(space).robot.current_pose
     assert 2.5 <= stands_at < 5.0
     assert robot.gripper.send(position=100.0).until_ended().status == SUCCEEDED
     assert simulation.world(space).robot.current_pose == stands_at
 
 
-def test_the_battery_is_published_and_empties_on_the_way(bench: Bench, space: str) -> None:
+def test_the_battery_is_published_and_empties_on_the_way(ros_bench: RosBench, space: str) -> None:
     charges: list[float] = []
-    subscription = bench.client_node.create_subscription(
+    subscription = ros_bench.client_node.create_subscription(
         BatteryState, f"{space}/battery_state", lambda m: charges.append(m.percentage), 10
     )
-    robot = Robot(bench, space)
-    bench.serve(Simulation(bench.node, namespaces=(space,), speed=20.0))
+    robot = Robot(ros_bench, space)
+    ros_bench.serve(Simulation(ros_bench.node, namespaces=(space,), speed=20.0))
     robot.until_ready().move.send(distance=-10.0).until_ended()
-    bench.until(lambda: charges and charges[-1] < 0.995, 4.0)
+    ros_bench.until(lambda: charges and charges[-1] < 0.995, 4.0)
     assert all(0.0 <= charge <= 1.0 for charge in charges)
-    bench.client_node.destroy_subscription(subscription)
+    ros_bench.client_node.destroy_subscription(subscription)
 
 
+@IN_VIRTUAL_TIME
 def test_a_listener_that_raises_is_told_no_more_and_ends_no_goal(bench: Bench, space: str) -> None:
     told: list[WorldEvent] = []
 
@@ -152,6 +157,7 @@ def test_a_listener_that_raises_is_told_no_more_and_ends_no_goal(bench: Bench, s
     assert len(told) == 1
 
 
+@IN_VIRTUAL_TIME
 def test_a_relative_namespace_is_the_nodes_own(bench: Bench) -> None:
     with Simulation(bench.node, namespaces=("", "r1", "/r2", "r3/")) as simulation:
         names = [server.name for server in simulation.servers]
@@ -174,31 +180,33 @@ def test_a_relative_namespace_is_the_nodes_own(bench: Bench) -> None:
     ],
 )
 def test_a_wrong_setting_is_an_error_that_leaves_nothing_behind(
-    bench: Bench, settings: dict[str, Any], error: type[Exception], says: str
+    ros_bench: RosBench, settings: dict[str, Any], error: type[Exception], says: str
 ) -> None:
     def entities() -> tuple[int, int, int]:
-        node = bench.node
+        node = ros_bench.node
         return len(list(node.waitables)), len(list(node.timers)), len(list(node.publishers))
 
     before = entities()
     with pytest.raises(error, match=says):
-        Simulation(bench.node, **settings)
+        Simulation(ros_bench.node, **settings)
     assert entities() == before
 
 
-def test_it_closes_under_running_goals_while_the_executor_spins(bench: Bench, space: str) -> None:
+def test_it_closes_under_running_goals_while_the_executor_spins(
+    ros_bench: RosBench, space: str
+) -> None:
     for cycle in range(15):
-        robot = Robot(bench, f"{space}/c{cycle}")
-        simulation = Simulation(bench.node, namespaces=(f"{space}/c{cycle}",), speed=2.0)
+        robot = Robot(ros_bench, f"{space}/c{cycle}")
+        simulation = Simulation(ros_bench.node, namespaces=(f"{space}/c{cycle}",), speed=2.0)
         robot.until_ready().move.send(distance=9.0).until_moving()
         robot.gripper.send(position=100.0).until_moving().cancel()
         simulation.close()
         simulation.close()
         assert not any(server.is_open for server in simulation.servers)
-    bench.spin_for(0.1)
+    ros_bench.go_on_for(0.1)
 
 
-def test_it_closes_after_the_executor_has_stopped(own_bench: Bench, space: str) -> None:
+def test_it_closes_after_the_executor_has_stopped(own_bench: RosBench, space: str) -> None:
     robot = Robot(own_bench, space)
     simulation = Simulation(own_bench.node, namespaces=(space,), journal=own_bench.path)
     goal = robot.until_ready().move.send(distance=9.0).until_moving()
@@ -217,7 +225,7 @@ def test_it_closes_after_its_node_was_destroyed(contexts: tuple[Any, Any]) -> No
     simulation.close()
 
 
-def test_a_client_in_the_same_executor_is_served(own_bench: Bench, space: str) -> None:
+def test_a_client_in_the_same_executor_is_served(own_bench: RosBench, space: str) -> None:
     from rclpy.action import ActionClient
     from rclpy.node import Node
 
@@ -249,6 +257,7 @@ def test_a_client_in_the_same_executor_is_served(own_bench: Bench, space: str) -
     node.destroy_node()
 
 
+@IN_VIRTUAL_TIME
 def test_servers_count_their_goals_apart(bench: Bench, space: str) -> None:
     robot = Robot(bench, space)
     bench.serve(Simulation(bench.node, namespaces=(space,), speed=20.0, faults=["*:2:reject"]))

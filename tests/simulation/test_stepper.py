@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
-from bt_actions.simulation.ros.platform import NodePlatform
+from bt_actions.simulation.server import platform_of
 from bt_actions.simulation.stepper import CATCH_UP, Stepper
-from tests.simulation.conftest import Bench
+from tests.simulation.conftest import Bench, RosBench
 
 
 class Walker:
@@ -28,21 +29,23 @@ class Walker:
 
 @pytest.fixture
 def stepper(bench: Bench) -> Iterator[Stepper]:
-    each = Stepper(NodePlatform(bench.node), speed=1.0, step_period=0.02)
+    each = Stepper(platform_of(bench.node), speed=1.0, step_period=0.02)
     yield each
     each.close()
 
 
 def is_off(stepper: Stepper) -> bool:
-    return bool(stepper._timer.rclpy_timer.is_canceled())
+    timer: Any = stepper._timer
+    on_rclpy = getattr(timer, "rclpy_timer", None)
+    return bool(on_rclpy.is_canceled()) if on_rclpy else timer.is_off
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, math.inf])
 def test_a_senseless_speed_is_an_error(bench: Bench, speed: float) -> None:
     with pytest.raises(ValueError, match="speed"):
-        Stepper(NodePlatform(bench.node), speed=speed)
+        Stepper(platform_of(bench.node), speed=speed)
     with pytest.raises(ValueError, match="step_period"):
-        Stepper(NodePlatform(bench.node), step_period=speed)
+        Stepper(platform_of(bench.node), step_period=speed)
 
 
 def test_it_is_off_until_something_moves_and_after(bench: Bench, stepper: Stepper) -> None:
@@ -65,7 +68,7 @@ def test_steps_come_in_their_period(bench: Bench, stepper: Stepper) -> None:
 
 
 def test_a_high_speed_makes_several_steps_at_once(bench: Bench) -> None:
-    stepper = Stepper(NodePlatform(bench.node), speed=1000.0, step_period=0.1)
+    stepper = Stepper(platform_of(bench.node), speed=1000.0, step_period=0.1)
     walker = Walker(2000)
     began = stepper.now()
     stepper.start(walker)
@@ -117,19 +120,19 @@ def test_what_raises_is_dropped_and_the_others_go_on(bench: Bench, stepper: Step
     assert len(broken.times) == 1
 
 
-def test_a_late_timer_makes_up_for_a_moment_but_not_for_ever(
-    bench: Bench, stepper: Stepper
-) -> None:
-    walker = Walker()
+def test_a_late_timer_makes_up_for_a_moment_but_not_for_ever(ros_bench: RosBench) -> None:
+    bench, walker = ros_bench, Walker()
+    stepper = Stepper(platform_of(bench.node), speed=1.0, step_period=0.02)
     stepper.start(walker)
     bench.until(lambda: walker.times)
     with stepper.lock:  # as a process that was stopped with SIGSTOP
         before = len(walker.times)
-        bench.spin_for(1.0)
+        bench.go_on_for(1.0)
     bench.until(lambda: len(walker.times) > before)
     stepper.stop(walker)
     most = CATCH_UP / 0.02
     assert most / 2 <= len(walker.times) - before <= most + 5, "1 s would be 50 steps"
+    stepper.close()
 
 
 def test_closing_ends_everything_and_may_be_done_twice(bench: Bench, stepper: Stepper) -> None:
@@ -141,7 +144,7 @@ def test_closing_ends_everything_and_may_be_done_twice(bench: Bench, stepper: St
     stepper.close()
     count = len(walker.times)
     stepper.start(walker)
-    bench.spin_for(0.15)
+    bench.go_on_for(0.15)
     assert len(walker.times) == count
     assert rung == []
 

@@ -14,21 +14,21 @@ from test_msgs.action import Fibonacci
 
 from bt_actions.simulation import ScriptedServer
 from bt_actions.simulation.ros.wire import InterceptedActionServer
-from tests.simulation.conftest import Bench
+from tests.simulation.conftest import RosBench
 
 
 @pytest.fixture
-def gone(bench: Bench, space: str) -> InterceptedActionServer:
+def gone(ros_bench: RosBench, space: str) -> InterceptedActionServer:
     """The rclpy side of a server that an executor has just put into its wait set."""
-    server = ScriptedServer(bench.node, Fibonacci, f"{space}/fibonacci")
+    server = ScriptedServer(ros_bench.node, Fibonacci, f"{space}/fibonacci")
     wire: Any = server._wire
     server.close()
     return wire
 
 
-def test_it_is_left_out_of_the_wait_set(gone: InterceptedActionServer, bench: Bench) -> None:
-    with bench.node.context.handle:
-        wait_set = _rclpy.WaitSet(0, 0, 0, 0, 0, 0, bench.node.context.handle)
+def test_it_is_left_out_of_the_wait_set(gone: InterceptedActionServer, ros_bench: RosBench) -> None:
+    with ros_bench.node.context.handle:
+        wait_set = _rclpy.WaitSet(0, 0, 0, 0, 0, 0, ros_bench.node.context.handle)
     gone.add_to_wait_set(wait_set)
     assert not gone.is_ready(wait_set)
     assert gone.get_num_entities().num_services in {0, 3}
@@ -57,9 +57,11 @@ def test_it_may_be_destroyed_twice(gone: InterceptedActionServer) -> None:
     gone.destroy()
 
 
-def test_python_does_not_warn_of_what_an_executor_did_not_come_to(bench: Bench, space: str) -> None:
+def test_python_does_not_warn_of_what_an_executor_did_not_come_to(
+    ros_bench: RosBench, space: str
+) -> None:
     """As where a signal ends the process in mid-goal."""
-    node = Node("ends", context=bench.node.context)
+    node = Node("ends", context=ros_bench.node.context)
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     server = ScriptedServer(node, Fibonacci, f"{space}/fibonacci")

@@ -1,0 +1,200 @@
+"""One action as one participant of the virtual network sees it, and the participant.
+
+The ActionTransport and the Participant of traffic/transport.py. What is sent arrives a little later
+and in order; what arrives is delivered at once, so a `pump` finds nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Literal
+
+from bt_actions.goals.terms import Now
+from bt_actions.messages.interfaces import interface_name
+from bt_actions.servers.presence import GID
+from bt_actions.servers.reachability import Reachability
+from bt_actions.testing.medium import Medium, Served, VirtualRequest
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, Seeker
+from bt_actions.utilities.suggest import did_you_mean
+
+LONG_AGO = float("-inf")
+
+
+@dataclass(slots=True, eq=False)
+class _Question:
+    kind: Literal["goal", "cancel", "result"]
+    about: bytes | int
+    """A goal's id, or a probe's number."""
+    asked: float
+    answers: list[Any] = field(default_factory=list)
+
+
+class VirtualTransport:
+    """Requests out, answers to its listener."""
+
+    def __init__(
+        self,
+        participant: VirtualParticipant,
+        action_type: Any,
+        name: str,
+        listener: Listener,
+    ) -> None:
+        self.on_trial = False
+        self.closed = False
+        self.reachability = Reachability()
+        self.seen_since = LONG_AGO
+        self.has_more = False
+        self.name = name
+        self.action_type = action_type
+        self._participant = participant
+        self._medium = participant.medium
+        self._listener = listener
+        self._questions: dict[_Question, None] = {}
+        self._past: list[_Question] = []
+        self._medium.add_client(self)
+
+    # Requests
+
+    def send(self, goal_id: bytes, goal: Any) -> None:
+        """Send the goal request."""
+        self._ask(_Question("goal", goal_id, self._now), goal_id, goal)
+
+    def ask_result(self, goal_id: bytes) -> None:
+        """Ask for the result."""
+        self._ask(_Question("result", goal_id, self._now), goal_id)
+
+    def cancel(self, goal_id: bytes) -> None:
+        """Ask to cancel this goal."""
+        self._ask(_Question("cancel", goal_id, self._now), goal_id)
+
+    def probe(self, probe: int, random_id: bytes) -> None:
+        """Ask for a goal that nobody knows."""
+        self._ask(_Question("result", probe, self._now), random_id)
+
+    def forget(self, goal: bytes | int) -> None:
+        """Tell no more answers, but for further acceptances of the newest goals."""
+        about = [question for question in self._questions if question.about == goal]
+        for question in about:
+            del self._questions[question]
+        self._past += [question for question in about if question.kind == "goal"]
+        del self._past[:-GOALS_KEPT]
+
+    @property
+    def _now(self) -> float:
+        return self._medium.timeline.now
+
+    def _ask(self, question: _Question, goal_id: bytes, goal: Any = None) -> None:
+        if self.closed or not self._participant.alive():
+            raise RuntimeError(f"{self.name}: this transport, or its participant, was closed")
+        self._questions[question] = None
+        if question.kind != "result" or isinstance(question.about, int):
+            self.reachability.asked(question.asked)
+        reply = partial(self._medium.soon, self._answered, question)
+        request = VirtualRequest(question.kind, goal_id.hex(), goal, reply)
+        for server in self._shown():
+            self._medium.soon(server.receive, request)
+
+    # Answers
+
+    def pump(self) -> bool:
+        """Find nothing: what has arrived was delivered."""
+        return False
+
+    def _answered(self, question: _Question, answer: Any) -> None:
+        if self.closed or not (question in self._questions or question in self._past):
+            return
+        tell, about = self._listener, question.about
+        self.reachability.answered(question.asked)
+        question.answers.append(answer)
+        answers = tuple(question.answers)
+        if self.on_trial:
+            return
+        if isinstance(about, int):
+            tell.probe_answered(about)
+        elif question.kind == "goal":
+            tell.goal_answered(about, answers)
+        elif question.kind == "cancel":
+            tell.cancel_answered(about, question.asked, answers)
+        else:
+            tell.result_came(about, question.asked, answers)
+        tell.all_delivered()
+
+    def hear_feedback(self, goal_id: bytes, feedback: Any) -> None:
+        """Take feedback, as the network brings it."""
+        if not (self.closed or self.on_trial):
+            self._listener.feedback_came(goal_id, feedback)
+            self._listener.all_delivered()
+
+    def hear_status(self, statuses: dict[bytes, int]) -> None:
+        """Take a status message, as the network brings it."""
+        if not self.closed:
+            self._listener.statuses_came(statuses)
+            self._listener.all_delivered()
+
+    # What is in sight
+
+    def _shown(self) -> list[Served]:
+        return self._medium.servers_of(self)
+
+    def servers(self) -> frozenset[GID]:
+        """Return who is shown to take goal requests."""
+        if not self._participant.alive():
+            raise RuntimeError("this participant is gone")
+        return frozenset(server.gid for server in self._shown())
+
+    def ready(self) -> bool:
+        """Whether a server is shown."""
+        return bool(self.servers())
+
+    def close(self) -> None:
+        """Send and deliver nothing any more."""
+        if not self.closed:
+            self.closed = True
+            self._medium.remove_client(self)
+
+
+class VirtualParticipant:
+    """A node on the virtual network; it has discovered long ago who is there."""
+
+    seen_since = LONG_AGO
+    long_stalls = 0
+
+    def __init__(self, medium: Medium, name: str, namespace: str) -> None:
+        self.medium = medium
+        self.name = name
+        self.namespace = namespace
+        self.domain = 0
+        self._alive = True
+
+    def now(self) -> Now:
+        """Return this moment; both clocks are one."""
+        return Now(self.medium.timeline.now, self.medium.timeline.now)
+
+    def alive(self) -> bool:
+        """Whether it was not closed."""
+        return self._alive
+
+    def close(self) -> None:
+        """Be gone, as a node that was destroyed."""
+        self._alive = False
+
+    def full_name(self, action: str) -> str:
+        """Return the full name of an action."""
+        return action if action.startswith("/") else f"{self.namespace.rstrip('/')}/{action}"
+
+    def open_transport(self, action_type: Any, name: str, listener: Listener) -> VirtualTransport:
+        """Open a transport."""
+        return VirtualTransport(self, action_type, name, listener)
+
+    def instead(self, action_type: Any, name: str) -> str:
+        """Say what is there where the action is not."""
+        served = self.medium.actions
+        if name in served:
+            return f"; there is one of another type, {interface_name(served[name])}"
+        if not served:
+            return "; no action server at all is on this network"
+        return did_you_mean(name, served)
+
+    def seek(self, seeker: Seeker, name: str, *, at_once: bool) -> None:
+        """Look for nothing: a second participant would see the same."""
