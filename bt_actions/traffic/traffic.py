@@ -31,7 +31,7 @@ from bt_actions.goals.terms import Event, Now, State
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.log import log
-from bt_actions.ros.signals import ended_by_signals, insists
+from bt_actions.ros.signals import ended_by_signals
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import alarm, shared
 from bt_actions.traffic.begun import begun_in
@@ -396,7 +396,7 @@ def close_process() -> None:
             handles = [handle for endpoint in endpoints for handle in endpoint.goals.values()]
         left = [handle for handle in handles if not handle.goal.lost or handle.looked_out_for]
         try:
-            drain(left, lambda: hurried or insists())
+            drain(left, lambda: hurried)
         finally:
             for handle in left:
                 if not handle.is_over:

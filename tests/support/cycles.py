@@ -52,9 +52,6 @@ def threads() -> int:
 def held() -> dict[str, float]:
     """What this process holds: threads, open files, memory in MB."""
     gc.collect()
-    for thread in threading.enumerate():
-        if thread.name == "bt_actions-signals":  # has been told to end, and closes a file then
-            thread.join(ENDS_IN)
     status = Path("/proc/self/status").read_text()
     resident = next(line for line in status.splitlines() if line.startswith("VmRSS"))
     return {
