@@ -1,6 +1,8 @@
 """Trees written in YAML: read, checked and built. A library for editors and services, too.
 
-Importing this imports neither rclpy nor any message package.
+`findings/` says what is wrong, `yaml/` reads text, `language/` knows kinds and keys, `reading/`
+makes documents; above them, side by side, `checking/`, `building/` and `formatting/`; `load.py`
+puts them together. Importing this imports neither rclpy nor any message package.
 """
 
 from bt_actions.document.findings import (

@@ -1,1 +1,1 @@
-"""From a document without errors to py_trees behaviours."""
+"""From a document without errors to py_trees behaviours. Needs no node and no server."""

@@ -1,1 +1,1 @@
-"""Trees in canonical form."""
+"""Trees in canonical form: what moves, what stays. The meaning never changes."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.types import parse_type
-from bt_actions.document.language.values import names_file, read_data, resolve
+from bt_actions.document.language.values import names_file, read_data, read_value, resolve
 from bt_actions.document.reading.tree import Declared, Document
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.nodes import Node
@@ -137,8 +137,6 @@ def refuse_infinite(value: object) -> None:
 
 
 def _plain(node: Node) -> object:
-    from bt_actions.document.language.values import read_value
-
     source = Source("value", "")
     value: object = None
     with contextlib.suppress(TooManyErrors):  # which are filed
