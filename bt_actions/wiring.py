@@ -39,8 +39,8 @@ def ended_by_signals(
     interrupt: Callable[[bool, bool], bool | None],
 ) -> AbstractContextManager[None]:
     """Call `interrupt` at signals that would end the process; see ros/signals.py."""
+    from bt_actions.ros.exit import close_process
     from bt_actions.ros.signals import ended_by_signals
-    from bt_actions.traffic.traffic import close_process
 
     return ended_by_signals(interrupt, close_process)
 

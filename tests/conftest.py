@@ -271,14 +271,13 @@ def no_leaks(domain: int) -> Iterator[None]:
 
     Goals of servers that are gone stay open on purpose, in case the server returns.
     """
-    from bt_actions.traffic import alarm
-    from bt_actions.traffic.endpoint import ActionEndpoint
-    from bt_actions.traffic.shared import domain_of
+    from bt_actions.ros.host import host as process
     from tests.support.waiting import until
 
     def open_goals() -> list[Any]:
-        lines = [line for line in alarm.minded() if isinstance(line, ActionEndpoint)]
-        goals = [handle.goal for line in lines for handle in list(line.goals.values())]
+        with process.lock:
+            endpoints = [endpoint for each in process.domains for endpoint in each.open]
+            goals = [handle.goal for each in endpoints for handle in each.goals.values()]
         return [goal for goal in goals if not goal.lost]
 
     def threads() -> set[threading.Thread]:
@@ -287,7 +286,7 @@ def no_leaks(domain: int) -> Iterator[None]:
     before = threads()
     yield
     until(lambda: not open_goals(), 8.0, what="no goal is open any more")
-    until(lambda: not len(domain_of(domain).resources), what="no resource is held any more")
+    until(lambda: not len(process.domain(domain).resources), what="no resource is held any more")
     try:
         until(lambda: threads() <= before)
     except AssertionError:

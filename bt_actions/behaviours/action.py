@@ -28,7 +28,7 @@ from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.shared import GoalHandle
+    from bt_actions.traffic.handle import GoalHandle
 
 
 class ActionBehaviour(Behaviour):

@@ -16,6 +16,7 @@ somebody (traffic/traffic.py) keeps feeding it events. Whether to try again is n
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
@@ -56,14 +57,16 @@ class Goal(Facts):
         commands, self.commands = tuple(self.commands), []
         return commands
 
-    def poll(self, now: Now) -> tuple[Command, ...]:
-        """Let every deadline that has passed take effect, the earliest first."""
+    def due(self, now: Now) -> Iterator[Event]:
+        """Take each deadline that has passed, the earliest first, to be told to `on` at once."""
         self.deadlines.follow(now)
-        commands: tuple[Command, ...] = ()
         for _, event in self.deadlines.left(now):
             if self.deadlines.take_passed(event, now):
-                commands += self.on(event, now)
-        return commands
+                yield event
+
+    def poll(self, now: Now) -> tuple[Command, ...]:
+        """Let every deadline that has passed take effect, the earliest first."""
+        return tuple(command for event in self.due(now) for command in self.on(event, now))
 
     def postpone(self, seconds: float) -> None:
         """Give a goal that was not sent yet so much more time: the tree was paused."""

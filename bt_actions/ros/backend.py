@@ -11,13 +11,12 @@ from typing import Any
 
 from rclpy.node import Node
 
-from bt_actions.ros.clocks import Clocks
+from bt_actions.ros.host import host
 from bt_actions.ros.log import log
+from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.service_client import ServiceClient
 from bt_actions.ros.topics import Publisher, Subscription
-from bt_actions.traffic.drain import drain
-from bt_actions.traffic.shared import GoalHandle, lock
-from bt_actions.traffic.traffic import Traffic
+from bt_actions.traffic.handle import GoalHandle
 
 __all__ = ["RosBackend"]
 
@@ -28,20 +27,21 @@ _ON_NODE = "_bt_actions_backend"
 class RosBackend:
     """What leaves and runs do by one node."""
 
-    def __init__(self, node: Node, traffic: Traffic) -> None:
-        self.node = node
-        self.traffic = traffic
-        self.clock: Clocks = traffic.clocks
+    def __init__(self, participant: NodeParticipant) -> None:
+        self.node = participant.node
+        self.traffic = participant.traffic
+        self.clock = participant.clocks
+        self._seen_since = participant.seen_since
         self.randomness = RANDOMNESS
 
     @classmethod
     def of(cls, node: Node) -> RosBackend:
         """Return the one of `node`, or a new one where its traffic was destroyed."""
-        traffic = Traffic.of(node)
-        with lock:
+        participant = NodeParticipant.of(node)
+        with host.lock:
             backend: RosBackend | None = getattr(node, _ON_NODE, None)
-            if backend is None or backend.traffic is not traffic:
-                backend = cls(node, traffic)
+            if backend is None or backend.traffic is not participant.traffic:
+                backend = cls(participant)
                 setattr(node, _ON_NODE, backend)
             return backend
 
@@ -53,21 +53,21 @@ class RosBackend:
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
     ) -> Subscription:
         """Listen to a topic."""
-        return Subscription(self.node, self.traffic, message_type, topic, qos, take)
+        return Subscription(self.node, self._seen_since, message_type, topic, qos, take)
 
     def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
         """Become a publisher on a topic."""
-        return Publisher(self.node, self.traffic, message_type, topic, qos)
+        return Publisher(self.node, self._seen_since, message_type, topic, qos)
 
     def drain(
         self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
     ) -> list[GoalHandle]:
         """Cancel these goals and wait for their ends; it does not matter whether anybody spins."""
-        return drain(handles, hurry)
+        return self.traffic.drain(handles, hurry)
 
     def wake(self) -> None:
         """Have whoever runs a tree on this node tick it soon; callable from any thread."""
-        with lock:
+        with host.lock:
             self.traffic.notify(None)
 
     def log(self, level: str, text: str) -> None:

@@ -10,8 +10,8 @@ import time
 from typing import Any
 
 from bt_actions.goals.terms import Now
+from bt_actions.ros.host import host
 from bt_actions.ros.log import log
-from bt_actions.traffic.shared import lock
 
 MOMENT = 2.0
 """Seconds for which simulated time may not have begun until that is said."""
@@ -30,7 +30,9 @@ class Clocks:
 
     def now(self) -> Now:
         """Return this moment."""
-        with lock:  # two threads that find simulated time switched on must not both make up for it
+        with (
+            host.lock
+        ):  # two threads that find simulated time switched on must not both make up for it
             return self._now()
 
     def stamp(self) -> int:

@@ -19,16 +19,17 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.node import Node
 
-from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.graph import servers
+from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds import participant
-from bt_actions.traffic.shared import lock
+from bt_actions.traffic.transport import ActionTransport, Listener, Seeker
 from bt_actions.utilities.plain_text import raised
 
 FIRST_AFTER = 1.5
@@ -54,28 +55,6 @@ _lookouts: dict[tuple[int, str], Rediscovery] = {}
 _closing = False  # the process ends
 
 
-class Seeker(Protocol):
-    """Who has lost sight of a server, or is not heard by it any more (traffic/route.py)."""
-
-    name: str
-    """Of the action."""
-
-    def misses(self) -> bool:
-        """Whether a server is wanted, and is not in sight, or does not answer, by now."""
-
-    def is_waited_for(self) -> bool:
-        """Whether somebody wants to send a goal."""
-
-    def client_in(self, second: SecondParticipant) -> ActionClient:
-        """A client like its own in another participant."""
-
-    def prefers(self, client: ActionClient) -> bool:
-        """Whether this client, which is ready, does what its own does not."""
-
-    def move_to(self, second: SecondParticipant, client: ActionClient) -> None:
-        """Go on with this client."""
-
-
 class SecondParticipant:
     """A participant of our own, and who uses it."""
 
@@ -96,27 +75,34 @@ class SecondParticipant:
             context.try_shutdown()
             raise
         self.made_at = time.monotonic()
-        self.users: set[Seeker] = set()
+        self.users: set[ActionTransport] = set()
+        """Those that somebody goes on with."""
         self.looking = True
         """A look goes on in it, which must not find it closed."""
         self.closed = False
         self._context = context
-        with lock:
+        with host.lock:
             _participants.add(self)
 
     def shows(self, action: str) -> frozenset[bytes]:
         """The GIDs of the servers of an action."""
         return servers(self.node, action)
 
-    def left_by(self, user: Seeker) -> None:
+    def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
+        """Become a client of an action here."""
+        return RosTransport(self.node, action_type, name, listener, self.made_at, self._left_by)
+
+    def _left_by(self, transport: ActionTransport) -> None:
         """Close it when nobody uses it any more; on another thread, as the caller has the lock."""
-        self.users.discard(user)
+        if transport not in self.users:
+            return
+        self.users.discard(transport)
         if not self.users and not self.looking:
             _start(self.close)  # or else at exit
 
     def close(self) -> None:
         """Take the participant away, unless somebody uses it by now."""
-        with lock:
+        with host.lock:
             if self.closed or ((self.users or self.looking) and not _closing):
                 return
             self.closed = True
@@ -124,8 +110,10 @@ class SecondParticipant:
         participant.close(self.node, self._context)
 
 
-def look_for(endpoint: Seeker, domain: int, enclave: str, *, at_once: bool = False) -> None:
-    """Look for what this endpoint misses, until it misses nothing; the caller holds the lock.
+def look_for(
+    seeker: Seeker, action: str, domain: int, enclave: str, *, at_once: bool = False
+) -> None:
+    """Look for the servers that it misses, until it misses none; the caller holds the lock.
 
     In the enclave of its node, which may be allowed to look where others are not.
     With `at_once`, whatever pause between two looks for others has been reached begins anew.
@@ -133,7 +121,7 @@ def look_for(endpoint: Seeker, domain: int, enclave: str, *, at_once: bool = Fal
     rediscovery = _lookouts.get((domain, enclave))
     if rediscovery is None:
         rediscovery = _lookouts[domain, enclave] = Rediscovery(domain, enclave)
-    rediscovery.add(endpoint, at_once=at_once)
+    rediscovery.add(seeker, action, at_once=at_once)
 
 
 class Rediscovery:
@@ -147,17 +135,17 @@ class Rediscovery:
     def __init__(self, domain: int, enclave: str) -> None:
         self._domain = domain
         self._enclave = enclave
-        self._missing: set[Seeker] = set()
-        self._bell = threading.Condition(lock)
+        self._missing: dict[Seeker, str] = {}  # and the action's name
+        self._bell = threading.Condition(host.lock)
         self._thread: threading.Thread | None = None
         self._urgent_since: float | None = None
         self._told = False
         self._begins_anew = False
 
-    def add(self, endpoint: Seeker, *, at_once: bool = False) -> None:
-        """Look for what this endpoint misses, too."""
-        if endpoint not in self._missing:
-            self._missing.add(endpoint)
+    def add(self, seeker: Seeker, action: str, *, at_once: bool = False) -> None:
+        """Look for what this one misses, too."""
+        if seeker not in self._missing:
+            self._missing[seeker] = action
             self._begins_anew |= at_once
             self._bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
@@ -169,7 +157,7 @@ class Rediscovery:
 
     def _run(self) -> None:
         while True:
-            with lock:
+            with host.lock:
                 self._bell.wait_for(lambda: self._missing or _closing)
                 if _closing:
                     return
@@ -180,7 +168,7 @@ class Rediscovery:
         """Look now and then, until nothing is missed."""
         pause = FIRST_AFTER
         while True:
-            with lock:
+            with host.lock:
                 self._wait(pause)
                 if self._begins_anew:
                     pause, self._begins_anew, self._urgent_since = FIRST_AFTER, False, None
@@ -208,7 +196,7 @@ class Rediscovery:
 
     def _is_urgent(self) -> bool:
         now = time.monotonic()
-        if not any(endpoint.is_waited_for() for endpoint in self._missing):
+        if not any(seeker.is_waited_for() for seeker in self._missing):
             self._urgent_since = None
         elif self._urgent_since is None:
             self._urgent_since = now
@@ -216,7 +204,9 @@ class Rediscovery:
 
     def _still_missing(self) -> bool:
         self._missing = {
-            endpoint for endpoint in self._missing if not _closing and endpoint.misses()
+            seeker: action
+            for seeker, action in self._missing.items()
+            if not _closing and seeker.misses()
         }
         return bool(self._missing)
 
@@ -227,14 +217,14 @@ class Rediscovery:
         try:
             until = time.monotonic() + LASTS
             while time.monotonic() < until:
-                with lock:
-                    endpoints = set(self._missing) if self._still_missing() else set()
-                    look.go_on(endpoints)
-                if not endpoints:
+                with host.lock:
+                    seekers = dict(self._missing) if self._still_missing() else {}
+                    look.go_on(seekers)
+                if not seekers:
                     break
                 time.sleep(GLANCE)
         finally:
-            with lock:
+            with host.lock:
                 look.clear_up()
                 second.looking = False
                 found = bool(second.users)
@@ -243,44 +233,46 @@ class Rediscovery:
 
 
 class _Look:
-    """One look: clients on trial in a new participant. All of it under the lock."""
+    """One look: transports on trial in a new participant. All of it under the lock."""
 
     def __init__(self, second: SecondParticipant) -> None:
-        self._sight = second
-        self._clients: dict[Seeker, ActionClient] = {}
+        self._second = second
+        self._tried: dict[Seeker, ActionTransport] = {}
         self._ready_since: dict[Seeker, float] = {}
 
-    def go_on(self, endpoints: set[Seeker]) -> None:
-        """Try clients where a server is shown; move all endpoints that one is ready for, together.
+    def go_on(self, seekers: dict[Seeker, str]) -> None:
+        """Try where a server is shown; move all for whom that is ready, together.
 
         Together, because what one of them has lost may be in the way of another's next goal.
         """
         now = time.monotonic()
-        for endpoint in endpoints:
-            if endpoint not in self._clients and self._sight.shows(endpoint.name):
-                self._clients[endpoint] = endpoint.client_in(self._sight)
-            if endpoint in self._clients and self._clients[endpoint].server_is_ready():
-                self._ready_since.setdefault(endpoint, now)
+        for seeker, action in seekers.items():
+            if seeker not in self._tried and self._second.shows(action):
+                self._tried[seeker] = seeker.try_in(self._second)
+            if seeker in self._tried and self._tried[seeker].ready():
+                self._ready_since.setdefault(seeker, now)
         ready = [
-            endpoint
-            for endpoint in endpoints
-            if endpoint in self._ready_since and endpoint.prefers(self._clients[endpoint])
+            seeker
+            for seeker in seekers
+            if seeker in self._ready_since and seeker.prefers(self._tried[seeker])
         ]
-        if any(now - self._ready_since[endpoint] >= AHEAD for endpoint in ready):
-            for endpoint in ready:
-                endpoint.move_to(self._sight, self._clients.pop(endpoint))
+        if any(now - self._ready_since[seeker] >= AHEAD for seeker in ready):
+            for seeker in ready:
+                transport = self._tried.pop(seeker)
+                self._second.users.add(transport)
+                seeker.move_to(transport)
 
     def clear_up(self) -> None:
-        """Destroy the clients that nobody took."""
-        for client in self._clients.values():
-            client.destroy()
-        self._clients.clear()
+        """Close what nobody took."""
+        for transport in self._tried.values():
+            transport.close()
+        self._tried.clear()
 
 
 def _start(what: Callable[[], None]) -> threading.Thread | None:
     """Start a thread; None where there can be no more."""
     thread = threading.Thread(target=what, name="bt_actions-lookout", daemon=True)
-    with lock:
+    with host.lock:
         _threads.difference_update([each for each in _threads if not each.is_alive()])
         try:
             thread.start()
@@ -294,14 +286,14 @@ def _start(what: Callable[[], None]) -> threading.Thread | None:
 def _close_at_exit() -> None:
     """Let no thread of ours be within Fast DDS, and no participant be open, when Python goes."""
     global _closing
-    with lock:
+    with host.lock:
         _closing = True
         for rediscovery in _lookouts.values():
             rediscovery.wake()
         threads = list(_threads)
     for thread in threads:
         thread.join(LASTS)
-    with lock:
+    with host.lock:
         sights = list(_participants)
     for second in sights:
         second.close()

@@ -28,9 +28,9 @@ from rclpy.task import Task
 
 from bt_actions.ros.log import log
 from bt_actions.ros.naming import named_node
+from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.workarounds import participant
 from bt_actions.ros.workarounds.once_executor import OnceExecutor
-from bt_actions.traffic.traffic import Traffic
 
 THREADS = 2
 """Of the multi-threaded executor; the interpreter lock does the work, more are no faster."""
@@ -99,7 +99,7 @@ class Spinner:
             if self._context is not None:
                 self._context.shutdown()
             raise
-        self._traffic = Traffic.of(self.node)
+        self._traffic = traffic_of(self.node)
         self._own_executor = given is None
         self.executor: Executor = given or _make(executor, context)
         if self.node.executor is None:

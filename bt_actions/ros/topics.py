@@ -24,7 +24,6 @@ from rclpy.qos import (
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.in_sight import without_topic
 from bt_actions.ros.workarounds.closable import closable
-from bt_actions.traffic.traffic import Traffic
 
 __all__ = ["Publisher", "Subscription", "qos_profile"]
 
@@ -58,9 +57,9 @@ def qos_profile(name: str) -> QoSProfile:
 class _Topic:
     """What a subscription and a publisher have in common."""
 
-    def __init__(self, node: Node, traffic: Traffic, message_type: type, qos: str) -> None:
+    def __init__(self, node: Node, seen_since: float, message_type: type, qos: str) -> None:
         self._node = node
-        self._discovered_at = traffic.seen_since + DISCOVERS
+        self._discovered_at = seen_since + DISCOVERS
         self._type = message_type
         self._qos = qos_profile(qos)
         self.topic = ""
@@ -82,13 +81,13 @@ class Subscription(_Topic):
     def __init__(
         self,
         node: Node,
-        traffic: Traffic,
+        seen_since: float,
         message_type: type,
         topic: str,
         qos: str,
         take: Callable[[Any], None],
     ) -> None:
-        super().__init__(node, traffic, message_type, qos)
+        super().__init__(node, seen_since, message_type, qos)
         self._made_at = time.monotonic()
         self._subscription = closable(
             node.create_subscription(
@@ -123,9 +122,9 @@ class Publisher(_Topic):
     """That of a leaf; the Publisher of traffic/backend.py."""
 
     def __init__(
-        self, node: Node, traffic: Traffic, message_type: type, topic: str, qos: str
+        self, node: Node, seen_since: float, message_type: type, topic: str, qos: str
     ) -> None:
-        super().__init__(node, traffic, message_type, qos)
+        super().__init__(node, seen_since, message_type, qos)
         self._publisher = closable(node.create_publisher(message_type, topic, self._qos))
         self._has_all_by = 0.0
         self.topic = self._publisher.topic_name

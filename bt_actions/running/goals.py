@@ -20,7 +20,7 @@ from bt_actions.traffic.begun import begun_in
 from bt_actions.utilities.places import root_of
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.shared import Change, GoalHandle
+    from bt_actions.traffic.handle import Change, GoalHandle
 
 
 @dataclass(frozen=True, slots=True)

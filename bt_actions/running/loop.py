@@ -27,7 +27,7 @@ from bt_actions.utilities.stepping import Done, Sleep
 from bt_actions.wiring import backend_of
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.shared import GoalHandle
+    from bt_actions.traffic.handle import GoalHandle
 
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
@@ -180,9 +180,10 @@ class TickLoop:
         self._error, self._status = error, Status.INVALID
 
     def rest(self) -> None:
-        """Take note that the run is over; the caller holds the lock of the traffic."""
-        self._stop_wanted = self.abandoned = self._pause_wanted = False
-        self.goals.run_goes_on = False
+        """Take note that the run is over."""
+        with self._traffic.host.lock:
+            self._stop_wanted = self.abandoned = self._pause_wanted = False
+            self.goals.run_goes_on = False
 
     def _go_on(self) -> float | None:
         """Tick if that is wanted; return the seconds until the next look, None at the end."""

@@ -30,7 +30,8 @@ from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.shared import GoalHandle
+    from bt_actions.traffic.backend import Backend
+    from bt_actions.traffic.handle import GoalHandle
 
 PATIENCE_AT_EXIT = 30.0
 """Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
@@ -99,7 +100,7 @@ class TreeRunner:
             check=self._check,
             misbehaved=self._spinner.taken_away,
         )
-        # Before the exit hook of traffic/traffic.py: a tree that ticks on would send another goal,
+        # Before the exit hook of ros/exit.py: a tree that ticks on would send another goal,
         # and a daemon thread in spin() aborts the process that ends beside it.
         atexit.register(self._at_exit)
 
@@ -239,12 +240,9 @@ class TreeRunner:
             raise
 
     def _release(self) -> None:
-        from bt_actions.traffic.shared import lock
-
         self._runs_on = None
         try:
-            with lock:
-                self._loop.rest()
+            self._loop.rest()
         finally:
             _runs.discard(self)
             self._running.release()
@@ -398,19 +396,17 @@ class TreeRunner:
         self._wake_up.set()
 
     def _drain(self, handles: list[GoalHandle]) -> _Drain:
-        return _Drain(handles, self._loop)
+        return _Drain(handles, self._loop, wiring.backend_of(self.node))
 
 
 class _Drain:
     """Waits for goals within its one step."""
 
-    def __init__(self, handles: list[GoalHandle], loop: TickLoop) -> None:
-        self._handles, self._loop = handles, loop
+    def __init__(self, handles: list[GoalHandle], loop: TickLoop, backend: Backend) -> None:
+        self._handles, self._loop, self._backend = handles, loop, backend
 
     def step(self, now: float, *, hurry: bool) -> Sleep | Done[None]:
-        from bt_actions.traffic.drain import drain
-
-        drain(self._handles, self._hurry)
+        self._backend.drain(self._handles, self._hurry)
         return Done(None)
 
     def _hurry(self) -> bool:

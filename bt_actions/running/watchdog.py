@@ -81,17 +81,13 @@ class Watchdog:
 
     def mind(self) -> None:
         """Look at the goals until none is wanted; the caller holds the lock."""
-        from bt_actions.traffic import alarm
-
-        alarm.mind(self)
+        self._traffic.host.scheduler.add(self)
 
     def attend(self, now: float) -> float:
         """Cancel what is wanted where the last tick is overdue; return the seconds until a look."""
-        from bt_actions.traffic import alarm
-
         wanted = self._goals.wanted
         if not wanted:
-            alarm.forget(self)
+            self._traffic.host.scheduler.remove(self)
         if now - self._looked_at > LOOK + LATE and now >= self._ends_at and self._spared < SPARED:
             self._spared, self._grace_from = self._spared + 1, now
         self._looked_at = now

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 from bt_actions.goals.terms import Now
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.shared import GoalHandle
+    from bt_actions.traffic.handle import GoalHandle
     from bt_actions.traffic.traffic import Traffic
 
 __all__ = ["Backend", "Clock", "Publisher", "Service", "Subscription"]

@@ -10,22 +10,18 @@ one lock.
 from __future__ import annotations
 
 import dataclasses
-import time
 import weakref
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, Event
-from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.servers.duplicates import DuplicateReplies
-from bt_actions.traffic import alarm
-from bt_actions.traffic.shared import GoalHandle
-
-if TYPE_CHECKING:
-    from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.host import Host
+from bt_actions.traffic.transport import GOALS_KEPT
 
 STALE = 2.0
 """Seconds after a goal's end within which an older word of its server may still arrive."""
@@ -50,8 +46,8 @@ class Ended:
 class Past:
     """What has ended on one endpoint, the newest goals."""
 
-    def __init__(self, endpoint: ActionEndpoint) -> None:
-        self._endpoint = endpoint
+    def __init__(self, endpoint: Endpoint, host: Host) -> None:
+        self._endpoint, self._host = endpoint, host
         self._ended: dict[bytes, Ended] = {}
 
     def keep(self, handle: GoalHandle) -> None:
@@ -62,7 +58,7 @@ class Past:
         endpoint = self._endpoint
         duplicate = dataclasses.replace(
             handle,
-            goal=handle.goal.duplicate(endpoint.traffic.clocks.now()),
+            goal=handle.goal.duplicate(endpoint.participant.now()),
             keeps_feedback=False,
             feedback=deque(maxlen=1),
         )
@@ -72,18 +68,18 @@ class Past:
         if elsewhere and not given_up:
             duplicate.replies = DuplicateReplies(duplicate.goal, handle.replies, elsewhere)
             duplicate.replies.taken_over()
-            endpoint.goals[duplicate.goal.id] = duplicate
+            endpoint.take_in(duplicate)
             return
         duplicate.owner = None
         said = DuplicateReplies(duplicate.goal, handle.replies, handle.replies.sent_to)
         duplicate.replies = said
         owner = (lambda: None) if handle.owner is None else weakref.ref(handle.owner)
-        accepted, now = handle.goal.accepted, time.monotonic()
+        accepted, now = handle.goal.accepted, self._host.steady()
         self._ended[duplicate.goal.id] = Ended(owner, accepted, now, duplicate, said)
         if len(self._ended) > GOALS_KEPT:
             oldest = next(iter(self._ended))
             del self._ended[oldest]
-            endpoint.client.forget(oldest)
+            endpoint.transport.forget(oldest)
 
     def accepted(self, goal_id: bytes, answers: Sequence[bool] = (True,)) -> None:
         """Take an acceptance: it may have been overtaken by the result, or have come twice."""
@@ -111,7 +107,7 @@ class Past:
         ended = self._get(goal_id)
         if ended is None:
             return
-        if time.monotonic() - ended.since > STALE:
+        if self._host.steady() - ended.since > STALE:
             self.accepted(goal_id)
         elif self._may_be_several(ended):
             self._ask(ended)
@@ -135,7 +131,6 @@ class Past:
         del self._ended[duplicate.goal.id]
         duplicate.owner = ended.owner()
         endpoint.watch.two_answered()
-        ended.said.is_at_another(endpoint.watch, time.monotonic())
-        endpoint.goals[duplicate.goal.id] = duplicate
-        alarm.mind(endpoint)
+        ended.said.is_at_another(endpoint.watch, self._host.steady())
+        endpoint.take_in(duplicate)
         endpoint.tell(duplicate, Event.SERVER_RETURNED)

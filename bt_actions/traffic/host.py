@@ -10,7 +10,10 @@ from collections.abc import Collection
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
+from bt_actions.goals.terms import Command, Event
 from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.handle import GoalHandle
 from bt_actions.traffic.scheduler import Scheduler
 
 
@@ -62,6 +65,27 @@ class Changed(Protocol):
         """Wake whoever waits; the caller holds the lock."""
 
 
+class Trace:
+    """Is told of every step of every goal, under the lock; this one takes no note."""
+
+    def begun(self, handle: GoalHandle) -> None:
+        """A goal was begun; also the duplicate of one that has ended, which has its id."""
+
+    def tells(self, handle: GoalHandle, event: Event) -> None:
+        """A goal is about to be told what happened;"""
+
+    def told(
+        self, handle: GoalHandle, event: Event, detail: Any, commands: tuple[Command, ...]
+    ) -> None:
+        """and was told, and this is what it says."""
+
+    def polls(self, handle: GoalHandle) -> None:
+        """A goal is about to be shown the time."""
+
+    def retired(self, handle: GoalHandle) -> None:
+        """An endpoint sees to this goal no more."""
+
+
 class Host(Protocol):
     """What the goals of a process, or of one run that is explored, have in common."""
 
@@ -90,12 +114,19 @@ class Host(Protocol):
         """The endpoints with open goals."""
 
     @property
+    def trace(self) -> Trace:
+        """Who watches the goals' steps."""
+
+    @property
     def forks(self) -> int:
         """Forks between the first process and this one: what an older one made is not ours."""
 
     @property
     def closing(self) -> bool:
         """Whether the process ends: a tree that ticks on begins nothing any more."""
+
+    def domain(self, number: int) -> Domain:
+        """Return what is shared in the ROS domain of this number."""
 
     def steady(self) -> float:
         """Return seconds that only ever go forward."""

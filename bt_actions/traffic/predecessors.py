@@ -6,8 +6,10 @@ of them: `bt-actions cleanup`, or `run --cleanup-first`, does (cleanup.py), when
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from bt_actions.goals.ids import Author, author_of
-from bt_actions.ros.log import log
+from bt_actions.traffic.host import Log
 
 TOLD_AT_MOST = 10
 """Goals of one action that are named; who left more left them in the same way."""
@@ -16,16 +18,18 @@ TOLD_AT_MOST = 10
 class Predecessors:
     """Of one action."""
 
-    def __init__(self, action: str) -> None:
-        self._action = action
+    def __init__(self, action: str, log: Log) -> None:
+        self._action, self._log = action, log
         self._told: set[bytes] = set()
 
-    def see(self, running: set[bytes]) -> None:
+    def see(self, running: Collection[bytes]) -> None:
         """Take the ids of all goals that a status shows running, but our own."""
         if len(self._told) >= TOLD_AT_MOST:
             return
         dead: dict[Author, bool] = {}
-        for goal_id in running - self._told:
+        for goal_id in running:
+            if goal_id in self._told:
+                continue
             author = author_of(goal_id)
             if author is None or not author.here:
                 continue
@@ -33,7 +37,7 @@ class Predecessors:
                 dead[author] = not author.alive
             if dead[author] and len(self._told) < TOLD_AT_MOST:
                 self._told.add(goal_id)
-                log.warning(
+                self._log.warning(
                     f"{self._action}: a goal of process {author.pid}, which is dead, still runs "
                     f"there; `bt-actions cleanup` cancels it: {goal_id.hex()}"
                 )

@@ -16,6 +16,9 @@ from bt_actions.servers.stalls import Stalls
 AT_LEAST_EVERY = 0.2
 """Seconds; a clock that is not the steady one may run faster than anybody can know."""
 
+SHORTEST = 0.001
+"""Seconds of sleep in any case, should what is due stay due."""
+
 
 class Attended(Protocol):
     """What is attended to."""
@@ -34,7 +37,7 @@ class Scheduler:
         wake: Callable[[], None],
         failed: Callable[[Attended, Exception], None],
     ) -> None:
-        """`wake` is called when `run` is wanted earlier than it has said: now, or by `wakes_at`.
+        """`wake` is called when `run` is wanted earlier than it has said, or again after a rest.
 
         `failed` is told what an endpoint raised, which keeps no other from its turn.
         """
@@ -46,8 +49,9 @@ class Scheduler:
 
     def add(self, endpoint: Attended) -> None:
         """Attend to this endpoint until it is removed."""
+        if not self._open:
+            self._wake()
         self._open[endpoint] = None
-        self._wake()
 
     def remove(self, endpoint: Attended) -> None:
         """Attend to it no more."""
@@ -78,6 +82,6 @@ class Scheduler:
             except Exception as error:  # noqa: BLE001 - the last guard of every deadline
                 self._failed(endpoint, error)
         now = self._steady()
-        self.wakes_at = min(now + wait, self.wakes_at)
+        self.wakes_at = max(now + SHORTEST, min(now + wait, self.wakes_at))
         self._stalls.lives(now)
         self._stalls.sleeps(now, self.wakes_at)

@@ -1,4 +1,4 @@
-"""What all searches share: the model world, and how long they go on.
+"""How long all searches go on.
 
 That is a while on a desk, and thoroughly where CI or BT_THOROUGH is set.
 """
@@ -6,12 +6,8 @@ That is a while on a desk, and thoroughly where CI or BT_THOROUGH is set.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 
-import pytest
 from hypothesis import HealthCheck, settings
-
-from tests.machine.production import installed
 
 THOROUGH = bool(os.environ.get("CI") or os.environ.get("BT_THOROUGH"))
 
@@ -24,9 +20,3 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 settings.register_profile("machine", settings.get_profile("machine-ci"), max_examples=150)
-
-
-@pytest.fixture(autouse=True)
-def model_world() -> Iterator[None]:
-    with installed():
-        yield

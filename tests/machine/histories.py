@@ -115,10 +115,7 @@ def plan(number: int) -> LeafPlan:
 
 
 class Play:
-    """One world with its caller and its judge, and what happened so far, in words.
-
-    Only within `production.installed`.
-    """
+    """One world with its caller and its judge, and what happened so far, in words."""
 
     def __init__(self, plans: Iterable[int], *, aloud: bool = False) -> None:
         self.world, self.judge = World(ACTIONS), Judge()

@@ -430,6 +430,10 @@ class Judge:
         if self._violation is not None:
             raise self._violation
 
+    def found(self, mistake: str) -> None:
+        """Raise what production itself calls a mistake."""
+        self._hold(False, mistake)
+
     def _hold(self, kept: Any, rule: str) -> None:
         if not kept:
             self._violation = self._violation or Violation(rule)

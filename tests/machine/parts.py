@@ -15,8 +15,7 @@ from bt_actions.goals.terms import State
 from bt_actions.servers.replies import Replies
 
 if TYPE_CHECKING:
-    from bt_actions.traffic import shared
-    from bt_actions.traffic.endpoint import ActionEndpoint
+    from bt_actions.traffic import handle as traffic
     from tests.machine.world import Job
 
 
@@ -71,9 +70,9 @@ class Ledger:
 
 @dataclass(eq=False, slots=True)
 class GoalHandle:
-    """A goal on its way (shared.GoalHandle), with its name and what the judge keeps of it."""
+    """A goal on its way (traffic.GoalHandle), with its name and what the judge keeps of it."""
 
-    real: shared.GoalHandle
+    real: traffic.GoalHandle
     name: str
     ledger: Ledger = field(init=False)
 
@@ -82,14 +81,13 @@ class GoalHandle:
         return self.real.goal
 
     @property
-    def endpoint(self) -> ActionEndpoint:
+    def endpoint(self) -> traffic.Endpoint:
         return self.real.endpoint
 
     @property
     def node(self) -> int:
         """The number of the node that sees to it."""
-        number: int = self.endpoint.traffic.node.number
-        return number
+        return int(self.endpoint.participant.name)
 
     @property
     def replies(self) -> Replies:
@@ -125,7 +123,7 @@ class Leaf:
     name: str
     plan: LeafPlan
     attempts: Attempts | None = None
-    handle: shared.GoalHandle | None = None
+    handle: traffic.GoalHandle | None = None
     visits: int = 0
 
     def __repr__(self) -> str:

@@ -1,16 +1,15 @@
-"""Leaves, and the production traffic/endpoint.py and traffic/traffic.py beneath them, in a model
-world.
+"""Leaves, and the production traffic beneath them, in a model world.
 
-A model is what lies around them: the client, the node, the graph, the clocks and the alarm's
-thread. Of the two files themselves nothing is copied. Each step of a goal is shown to the judge.
+A model is what lies around it, as traffic/transport.py and traffic/host.py have it: transports,
+participants and the host. Of traffic/ itself nothing is copied, and nothing replaced. Each step of
+a goal is shown to the judge, by the host's trace.
 """
 
 from __future__ import annotations
 
+import contextlib
 import random
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from types import SimpleNamespace
+from collections.abc import Iterable
 from typing import Any
 
 from bt_actions.goals.attempts import AttemptRecord, Attempts
@@ -18,61 +17,52 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import Command, Event, Now, State
-from bt_actions.ros.action_client import GOALS_KEPT
 from bt_actions.servers.reachability import Reachability
 from bt_actions.servers.stalls import IN_A_ROW, Stalls
-from bt_actions.traffic import alarm, shared, traffic
-from bt_actions.traffic import ended as past
-from bt_actions.traffic import endpoint as endpoint
-from bt_actions.traffic import route as route
+from bt_actions.traffic import handle as traffic
+from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.host import Trace
+from bt_actions.traffic.scheduler import Scheduler
 from bt_actions.traffic.traffic import Traffic
+from bt_actions.traffic.transport import GOALS_KEPT, Listener
 from tests.machine.judge import Judge, Violation
-from tests.machine.parts import GoalHandle, Leaf, LeafPlan
+from tests.machine.parts import Before, GoalHandle, Leaf, LeafPlan
 from tests.machine.world import NODES, Job, Message, World
 
 DOMAIN = 1
 LEASE = 3.0
 """Seconds without a look after which a process has dropped the servers that it saw."""
-_playing: list[Caller] = []
-"""The caller of the play that goes on, last."""
 
 
-def now() -> Caller:
-    """Return the caller of the play that goes on."""
-    return _playing[-1]
+class ModelTransport:
+    """One action as one node sees it, whose messages go through the model world."""
 
+    seen_since = float("-inf")  # it has discovered who is there
+    has_more = on_trial = False
 
-class ModelTime:
-    """The module `time` of the code under test: no two moments are the same."""
-
-    @staticmethod
-    def monotonic() -> float:
-        return now().moment()
-
-
-class ModelClient:
-    """ros/action_client.py, whose messages go through the model world."""
-
-    def __init__(self, node: Any, action_type: Any, name: str, listener: Any) -> None:
-        self.node, self.name, self._listener = node, name, listener
-        self.closed = self.has_more = False
+    def __init__(self, caller: Caller, node: int, name: str, listener: Listener) -> None:
+        self._caller, self._node, self._name, self._listener = caller, node, name, listener
+        self.closed = False
         self.reachability = Reachability()
         self._asked: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
         self._past: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
 
-    def server_is_ready(self) -> bool:
-        return now().world.ready(self.name, self.node.number)
+    def ready(self) -> bool:
+        return self._caller.world.ready(self._name, self._node)
 
-    def send(self, goal_id: bytes, message: Any) -> None:
-        caller = now()
+    def servers(self) -> frozenset[bytes]:
+        return self._caller.world.shown(self._name, self._node)
+
+    def send(self, goal_id: bytes, goal: Any) -> None:
+        caller = self._caller
         if caller.takes("fails_to_send"):
             raise RuntimeError("no space left")
         if caller.takes("restarts_meanwhile"):
-            caller.world.restart(self.name)
+            caller.world.restart(self._name)
         for newcomer in ("opens_meanwhile", "another_opens_meanwhile"):
             if caller.takes(newcomer):
-                caller.world.start(self.name)
+                caller.world.start(self._name)
         caller.judge.sent(caller.seen[goal_id], self._ask("goal", goal_id, goal_id))
 
     def cancel(self, goal_id: bytes) -> None:
@@ -81,13 +71,13 @@ class ModelClient:
     def ask_result(self, goal_id: bytes) -> None:
         self._ask("result", goal_id, goal_id)
 
-    def probe(self, number: int, goal_id: bytes) -> None:
-        self._ask("probe", number, b"")
+    def probe(self, probe: int, random_id: bytes) -> None:
+        self._ask("probe", probe, random_id)
 
     def _ask(self, kind: str, about: Any, goal_id: bytes) -> int:
         if self.closed:
-            raise RuntimeError("the client is destroyed")
-        caller = now()
+            raise RuntimeError("the transport is closed")
+        caller = self._caller
         number = caller.file(self)
         self._asked[number] = (kind, about, caller.moment(), {})
         if kind != "result":
@@ -96,11 +86,11 @@ class ModelClient:
         name = "" if handle is None else handle.name
         nobody = caller.world.servers[0]
         message = Message(kind, nobody, goal_id, name, number=number, to_server=True)
-        return caller.world.send(message, self.name, self.node.number)
+        return caller.world.send(message, self._name, self._node)
 
-    def forget(self, about: Any) -> None:
+    def forget(self, goal: Any) -> None:
         for number, question in list(self._asked.items()):
-            if question[1] == about:
+            if question[1] == goal:
                 del self._asked[number]
                 if question[0] == "goal":
                     self._past[number] = question
@@ -110,7 +100,7 @@ class ModelClient:
     def pump(self) -> bool:
         return False
 
-    def destroy(self) -> None:
+    def close(self) -> None:
         self.closed = True
 
     def hear(self, message: Message) -> None:
@@ -136,47 +126,135 @@ class ModelClient:
             self._listener.result_came(about, asked, results)
 
 
-class Silence:
-    """The log, to which nobody listens."""
+class ModelParticipant:
+    """A node of the model world."""
 
-    def error(self, endpoint: str) -> None: ...
+    domain, namespace = DOMAIN, "/"
 
-    info = warning = error
+    def __init__(self, caller: Caller, number: int) -> None:
+        self._caller = caller
+        self.name = str(number)
+        self.seen_since = caller.moment()
+        self.long_stalls = caller.host.stalls.long_times
+
+    def now(self) -> Now:
+        return self._caller.world.now
+
+    def alive(self) -> bool:
+        return True
+
+    def full_name(self, action: str) -> str:
+        return action
+
+    def open_transport(self, action_type: Any, name: str, listener: Listener) -> ModelTransport:
+        return ModelTransport(self._caller, int(self.name), name, listener)
+
+    def instead(self, action_type: Any, name: str) -> str:
+        return ""
+
+    def seek(self, seeker: Any, name: str, *, at_once: bool) -> None:
+        """There is nothing that is out of sight for good."""
 
 
-class NoLedger:
+class ModelLog:
+    """The log, to which nobody listens; what production calls a mistake of its own is one."""
+
+    def __init__(self, caller: Caller) -> None:
+        self._caller = caller
+
+    def info(self, text: str) -> None: ...
+
+    warning = info
+
+    def error(self, text: str) -> None:
+        if "not accounted for" not in text:
+            self._caller.judge.found(text)
+
+
+class NoRecord:
     """The record of what is sent, which nobody reads."""
 
     def enter(self, *entry: Any, **more: Any) -> None: ...
 
-    strike = enter
+    strike = close = enter
 
     def __contains__(self, goal_id: bytes) -> bool:
         return False
 
 
-class Context:
-    """What Traffic asks of a context."""
+class Witness(Trace):
+    """Has the judge see what goals are told, and what they say; not those of a duplicate."""
 
-    def get_domain_id(self) -> int:
-        return DOMAIN
+    def __init__(self, caller: Caller) -> None:
+        self._caller, self._judge = caller, caller.judge
+        self._before: Before | None = None
+
+    def begun(self, handle: traffic.GoalHandle) -> None:
+        self._caller.begun(handle)
+
+    def polls(self, handle: traffic.GoalHandle) -> None:
+        if known := self._caller.known(handle.goal):
+            self._caller.judge.sees_clock(known)
+
+    def tells(self, handle: traffic.GoalHandle, event: Event) -> None:
+        self._caller.steps.add((handle.goal.state, event))
+        known = self._caller.known(handle.goal)
+        self._before = None if known is None else self._caller.judge.before(known)
+
+    def told(
+        self,
+        handle: traffic.GoalHandle,
+        event: Event,
+        detail: Any,
+        commands: tuple[Command, ...],
+    ) -> None:
+        known = self._caller.known(handle.goal)
+        if known is not None and self._before is not None:
+            shown = None if event.name.endswith("_DUE") else event
+            self._caller.judge.after(known, self._before, shown, detail, commands)
+
+    def retired(self, handle: traffic.GoalHandle) -> None:
+        if handle.goal.state is not State.DONE:
+            return
+        known = self._caller.known(handle.goal)
+        if known is None:
+            self._caller.judge.twin_is_done(handle.goal)
+        else:
+            self._caller.judge.is_done(known)
 
 
-class Node:
-    """What ActionEndpoint and Traffic ask of a node."""
+class ModelHost:
+    """A process, whose time is the model world's."""
 
-    def __init__(self, number: int) -> None:
-        self.number = number
-        self.context = Context()
+    forks, closing = 0, False
 
-    def get_clock(self) -> Any:
-        return SimpleNamespace(ros_time_is_active=False)
+    def __init__(self, caller: Caller) -> None:
+        self.caller = caller
+        self.lock = contextlib.nullcontext()
+        self.changed = self
+        self.log, self.record, self.trace = ModelLog(caller), NoRecord(), Witness(caller)
+        self.stalls = Stalls()
+        self.scheduler = Scheduler(self.steady, self.stalls, lambda: None, lambda *_: None)
+        self._domain = Domain(DOMAIN)
 
-    def get_namespace(self) -> str:
-        return "/"
+    def domain(self, number: int) -> Domain:
+        return self._domain
 
-    def get_name(self) -> str:
-        return "node"
+    def steady(self) -> float:
+        return self.caller.moment()
+
+    def new_goal_id(self) -> bytes:
+        return b"%d" % len(self.caller.seen)
+
+    def random_id(self) -> bytes:
+        return b""
+
+    def notify_all(self) -> None: ...
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Nobody else is there to change anything meanwhile."""
+        self.caller.passes(timeout or 0.0)
+        return False
 
 
 class Caller:
@@ -187,18 +265,17 @@ class Caller:
         self.leaves = [Leaf(f"leaf{number}", each) for number, each in enumerate(plans)]
         self.seen: dict[bytes, GoalHandle] = {}
         """Every goal that was ever begun, the oldest first."""
+        self.steps: set[tuple[State, Event]] = set()
+        """What any goal was told, and in which state it was."""
         self.closed = False
         self.froze = False
         self._freezes = 0
         self.misfortunes: set[str] = set()
-        self._clients: list[ModelClient] = []
-        self._moments = 0
+        self._transports: list[ModelTransport] = []
+        self._moments, self._passed = 0, 0.0
         self._next_name = ""
         self._chance = random.Random(0)
-        _playing[:] = [self]
-        shared._domains.clear()
-        alarm._open.clear()
-        alarm.stalls = Stalls()
+        self.host = ModelHost(self)
         self._traffics = {number: self._traffic(number) for number in NODES}
         self._endpoints: dict[
             tuple[str, int], ActionEndpoint
@@ -235,71 +312,38 @@ class Caller:
     def moment(self) -> float:
         """Return a moment, a little later each time it is asked for."""
         self._moments += 1
-        return self.world.now.steady + self._moments * 1e-9
+        return self.world.now.steady + self._passed + self._moments * 1e-9
 
-    def file(self, client: ModelClient) -> int:
-        """Return the number of a client's next question."""
-        self._clients.append(client)
-        return len(self._clients)
+    def passes(self, seconds: float) -> None:
+        """Time goes by for this process alone."""
+        self._passed += seconds
+
+    def file(self, transport: ModelTransport) -> int:
+        """Return the number of a transport's next question."""
+        self._transports.append(transport)
+        return len(self._transports)
 
     # What is beneath the leaves
 
     def _traffic(self, number: int) -> Traffic:
-        node: Any = Node(number)
-        clocks: Any = SimpleNamespace(now=lambda: self.world.now)
-        made = Traffic(node)
-        made.clocks = clocks
-        made.seen_since = float("-inf")  # it has discovered who is there
-        return made
+        return Traffic(self.host, ModelParticipant(self, number))
 
     def come(self, action: str, node: int) -> ActionEndpoint:
         """Return the line of a node to an action, made when it is first wanted."""
         found = self._endpoints.get((action, node))
         if found is None:
-            of_node = self._traffics[node]
-            found = of_node._endpoints.get(action)
-            if found is None:
-                found = of_node._endpoints[action] = ActionEndpoint(of_node, "type", action)
-            found.users += 1
-            self._endpoints[action, node] = found
+            found = self._endpoints[action, node] = self._traffics[node].endpoint("type", action)
         return found
 
-    def new_goal_id(self) -> bytes:
-        return b"%d" % len(self.seen)
-
-    def begun(self, real: shared.GoalHandle) -> None:
-        """Take note of a handle that is made, but for a duplicate's, which has its goal's id."""
-        if real.goal.id not in self.seen:
-            handle = self.seen[real.goal.id] = GoalHandle(real, self._next_name)
-            self.judge.begins(handle)
+    def begun(self, real: traffic.GoalHandle) -> None:
+        """Take note of a goal that was begun."""
+        handle = self.seen[real.goal.id] = GoalHandle(real, self._next_name)
+        self.judge.begins(handle)
 
     def known(self, goal: Goal) -> GoalHandle | None:
         """Return what the judge knows of a goal: nothing where that is a duplicate."""
         handle = self.seen.get(goal.id)
         return handle if handle is not None and handle.goal is goal else None
-
-    def told(
-        self, goal: Goal, event: Event, detail: Any, step: Callable[[], tuple[Command, ...]]
-    ) -> tuple[Command, ...]:
-        """Have the judge see what a goal is told, and what it says."""
-        handle = self.known(goal)
-        if handle is None:
-            return step()
-        before = self.judge.before(handle)
-        commands = step()
-        shown = None if event.name.endswith("_DUE") else event
-        self.judge.after(handle, before, shown, detail, commands)
-        return commands
-
-    def park(self, goal: Goal) -> None:
-        """Have the judge see that a goal is DONE, and its line has put it away."""
-        if goal.state is not State.DONE:
-            return
-        handle = self.known(goal)
-        if handle is None:
-            self.judge.twin_is_done(goal)
-        else:
-            self.judge.is_done(handle)
 
     # The leaves
 
@@ -330,7 +374,7 @@ class Caller:
             raise ValueError("no such variable")
         return "goal"
 
-    def _judge_attempt(self, leaf: Leaf, attempts: Attempts, handle: shared.GoalHandle) -> None:
+    def _judge_attempt(self, leaf: Leaf, attempts: Attempts, handle: traffic.GoalHandle) -> None:
         goal = handle.goal
         outcome = goal.outcome
         assert outcome is not None
@@ -355,7 +399,7 @@ class Caller:
         for leaf in self.leaves:
             if leaf.plan.node == node:
                 self.interrupt(leaf)
-        self._traffics[node].destroy()
+        self._traffics[node].destroy(lambda: True)
         self._traffics[node] = self._traffic(node)
         for action in self.world.actions:
             self._endpoints.pop((action, node), None)
@@ -382,13 +426,13 @@ class Caller:
     def receive(self, message: Message) -> None:
         """Pass on an answer to who asked, and the rest to whoever sees the server."""
         if message.number:
-            client = self._clients[message.number - 1]
-            client.hear(message)
-            if message.kind == "answer" and message.detail and not client.closed:
+            transport = self._transports[message.number - 1]
+            transport.hear(message)
+            if message.kind == "answer" and message.detail and not transport.closed:
                 self.judge.hears_acceptance(self.seen[message.goal_id], message.server)
             return
         for each in self._lines_to(message.server.action):
-            if self.world.in_sight(message.server, each.traffic.node.number):
+            if self.world.in_sight(message.server, int(each.participant.name)):
                 if message.kind == "feedback":
                     each.feedback_came(message.goal_id, message.detail)
                 elif message.kind == "status":
@@ -396,15 +440,15 @@ class Caller:
 
     def attend(self) -> None:
         """What the alarm does, which is late where the process was frozen."""
-        alarm.stalls.rests(self.moment())
+        self.host.stalls.rests(self.moment())
         self._attend()
         if self.takes("freezes"):
             self._freeze((0.9, 2.5, 6.0)[self._moments % 3])
 
     def _attend(self) -> None:
-        for each in list(alarm._open):
+        for each in self.host.scheduler.attended:
             assert isinstance(each, ActionEndpoint)
-            each._look_at = 0.0
+            each.watcher.rest()  # a look is due
             each.attend(self.moment())
             for real in each.goals.values():
                 handle = self.known(real.goal)
@@ -419,7 +463,7 @@ class Caller:
         """
         self.froze = True
         self._freezes += 1
-        alarm.stalls.lives(self.moment())
+        self.host.stalls.lives(self.moment())
         before = {
             handle: handle.goal.state
             for handle in self.handles
@@ -460,8 +504,8 @@ class Caller:
         return list(self.seen.values())
 
     @property
-    def resources(self) -> Resources[shared.GoalHandle]:
-        return shared.domain_of(DOMAIN).resources
+    def resources(self) -> Resources[traffic.GoalHandle]:
+        return self.host.domain(DOMAIN).resources
 
     @property
     def endpoints(self) -> list[ActionEndpoint]:
@@ -492,92 +536,5 @@ class Caller:
             lost.replies.sent_to & world.shown(action, wanted.node)
             and world.ready(action, wanted.node)
             for each in self._lines_to(action)
-            if each.traffic.node.number == wanted.node
+            if int(each.participant.name) == wanted.node
         )
-
-
-def _drain(handles: Iterable[shared.GoalHandle], hurry: Any = None) -> None:
-    """A drain whose patience is over at once."""
-    wanted = [handle for handle in handles if handle.goal.state is not State.DONE]
-    for handle in wanted:
-        handle.endpoint.tell(handle, Event.INTERRUPTED)
-    for handle in wanted:
-        if not handle.accounted_for:
-            handle.endpoint.tell(handle, Event.DRAINED)
-
-
-@contextmanager
-def installed() -> Iterator[None]:
-    """Put the model world around the production code; the one lock is ours meanwhile."""
-    made, retire = shared.GoalHandle.__post_init__, ActionEndpoint.retire
-    on, poll = Goal.on, Goal.poll
-
-    def post_init(handle: shared.GoalHandle) -> None:
-        made(handle)
-        now().begun(handle)
-
-    def told(goal: Goal, event: Event, moment: Any, detail: Any = None) -> Any:
-        return now().told(goal, event, detail, lambda: on(goal, event, moment, detail))
-
-    def polled(goal: Goal, moment: Now) -> tuple[Command, ...]:
-        handle = now().known(goal)
-        if handle is not None:
-            now().judge.sees_clock(handle)
-        return poll(goal, moment)
-
-    def park(of_ticket: ActionEndpoint, handle: shared.GoalHandle) -> None:
-        retire(of_ticket, handle)
-        now().park(handle.goal)
-
-    def fail(of_what: ActionEndpoint, what: str, error: Exception) -> None:
-        raise error
-
-    def appears() -> None:
-        alarm.stalls.lives(now().moment())
-        alarm.stalls.rests(now().moment())
-
-    patches: list[tuple[Any, str, Any]] = [
-        (endpoint, "time", ModelTime),
-        (past, "time", ModelTime),
-        (route, "time", ModelTime),
-        (traffic, "time", ModelTime),
-        (endpoint, "ActionClient", ModelClient),
-        (route, "ActionClient", ModelClient),
-        (route, "servers", lambda node, name: now().world.shown(name, node.number)),
-        (endpoint, "is_valid", lambda node: True),
-        (route, "is_valid", lambda node: True),
-        (traffic, "is_valid", lambda node: True),
-        (route, "_remapped", lambda node, name: True),  # nothing is looked for out of sight
-        (ActionEndpoint, "_instead", lambda self, handle: ""),
-        (ActionEndpoint, "retire", park),
-        (ActionEndpoint, "_warn_once", fail),
-        (
-            ActionEndpoint,
-            "__hash__",
-            lambda self: self.traffic.node.number,
-        ),  # sets are in the same order
-        (endpoint, "log", Silence()),
-        (route, "log", Silence()),
-        (traffic, "log", Silence()),
-        (traffic, "new_goal_id", lambda: now().new_goal_id()),
-        (traffic, "drain", _drain),
-        (alarm, "stalls", Stalls()),
-        (alarm, "_open", set()),
-        (alarm, "mind", lambda each: alarm._open.add(each)),
-        (alarm, "appears", appears),
-        (endpoint, "ledger", NoLedger()),
-        (shared, "_domains", {}),
-        (shared.GoalHandle, "__post_init__", post_init),
-        (Goal, "on", told),
-        (Goal, "poll", polled),
-    ]
-    with shared.lock:
-        replaced = [(where, name, getattr(where, name)) for where, name, _ in patches]
-        for where, name, instead in patches:
-            setattr(where, name, instead)
-        try:
-            yield
-        finally:
-            for where, name, before in replaced:
-                setattr(where, name, before)
-            _playing.clear()

@@ -30,7 +30,11 @@ class Interleavings(RuleBasedStateMachine):
     @initialize(plans=st.lists(st.integers(0, 9_999), min_size=1, max_size=3))
     def begin(self, plans: list[int]) -> None:
         self.number = plans[0]
-        self._do(lambda: setattr(self, "play", Play(plans, aloud=True)))
+
+        def play() -> None:
+            self.play = Play(plans, aloud=True)
+
+        self._do(play)
 
     @rule()
     def exchange(self) -> None:

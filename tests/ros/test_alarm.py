@@ -8,9 +8,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from bt_actions.servers.stalls import STOOD_STILL, Stalls
-from bt_actions.traffic import alarm
-from bt_actions.traffic.shared import lock
+from bt_actions.ros import host as module
+from bt_actions.ros.host import RosHost
+from bt_actions.servers.stalls import STOOD_STILL
+from bt_actions.traffic.scheduler import AT_LEAST_EVERY
 from tests.support.waiting import until
 
 
@@ -18,6 +19,7 @@ class Attended:
     """A line that wants nothing, but that the next look comes when it says so."""
 
     def __init__(self) -> None:
+        self.host = RosHost()
         self.looks: list[float] = []
         self.wants = 10.0
         """Seconds of its own, told by `attend`;"""
@@ -29,21 +31,20 @@ class Attended:
         self.looks.append(now)
         if self.asks is not None:
             self.asked.append(now + self.asks)
-            alarm.wake_by(now + self.asks)
+            self.host.scheduler.wake_by(now + self.asks)
             self.asks = None
         return self.wants
 
 
 @pytest.fixture
-def attended(monkeypatch: pytest.MonkeyPatch) -> Iterator[Attended]:
+def attended() -> Iterator[Attended]:
     each = Attended()
-    monkeypatch.setattr(alarm, "stalls", Stalls(alarm._idle))
-    with lock:
-        alarm.mind(each)
+    with each.host.lock:
+        each.host.scheduler.add(each)
     until(lambda: len(each.looks) > 1)
     yield each
-    with lock:
-        alarm.forget(each)
+    with each.host.lock:
+        each.host.scheduler.remove(each)
 
 
 def test_who_asks_to_be_woken_while_it_is_attended_is_heard(attended: Attended) -> None:
@@ -55,19 +56,19 @@ def test_who_asks_to_be_woken_while_it_is_attended_is_heard(attended: Attended) 
         until(lambda: attended.looks[-1] >= attended.asked[-1])
         lateness.append(next(at for at in attended.looks if at >= attended.asked[-1]))
         lateness[-1] -= attended.asked[-1]
-    assert min(lateness) < alarm.AT_LEAST_EVERY / 4
+    assert min(lateness) < AT_LEAST_EVERY / 4
 
 
 def test_work_is_no_standstill() -> None:
     """A garbage collection, say: threads that take in what is sent do not wait for it."""
-    began, idle_before = time.monotonic(), alarm._idle(0.0)
+    began, idle_before = time.monotonic(), module._idle(0.0)
     end = time.thread_time() + STOOD_STILL
     while time.thread_time() < end:
         pass
-    assert time.monotonic() - began - (alarm._idle(0.0) - idle_before) >= STOOD_STILL - 0.01
+    assert time.monotonic() - began - (module._idle(0.0) - idle_before) >= STOOD_STILL - 0.01
 
 
 def test_the_alarm_notices_what_happens_while_it_works(attended: Attended) -> None:
-    with lock:
+    with attended.host.lock:
         threading.Event().wait(4 * STOOD_STILL)
-        assert alarm.stalls.answers_take(time.monotonic())
+        assert attended.host.stalls.answers_take(time.monotonic())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,32 +10,48 @@ import pytest
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome, Timeouts
-from bt_actions.goals.terms import Now, State
-from bt_actions.traffic import drain as draining
-from bt_actions.traffic.shared import GoalHandle
+from bt_actions.goals.terms import Event, Now, State
+from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic.drain import JUST_PAST, LOOKS_OUT_AT_MOST, Drain
+from bt_actions.traffic.handle import GoalHandle
 
 LIMITS = Timeouts(accept=1.0, cancel=2.0)
 
 
-@pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The seconds that the drain sees, in place of the steady clock's."""
-    clock = SimpleNamespace(now=100.0)
-    clock.monotonic = lambda: clock.now
-    monkeypatch.setattr(draining, "time", clock)
-    still = SimpleNamespace(answers_take=lambda _: 0.0)
-    monkeypatch.setattr(draining.alarm, "stalls", still)
-    return clock
+class Host(SimpleNamespace):
+    """A process that never stands still, at a time of the test's."""
+
+    def __init__(self) -> None:
+        super().__init__(now=100.0, lock=nullcontext())
+        self.stalls = SimpleNamespace(answers_take=lambda _: 0.0)
+
+    def steady(self) -> float:
+        return float(self.now)
 
 
 def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> GoalHandle:
     """One whose server has gone."""
     goal = Goal(b"1" * 16, "/move", LIMITS, Now(0.0, 0.0))
     goal.outcome, goal.end, goal.state = Outcome.SERVER_LOST, end, state
-    line: Any = SimpleNamespace(route=SimpleNamespace(in_doubt=lambda _: 0.0))
-    made = GoalHandle(goal, line, line, None, "m")
+    nothing = dict.fromkeys(("pump", "mind"), lambda *_: None)
+    endpoint: Any = Endpoint(
+        in_doubt=lambda _: 0.0, is_parents=False, cancels=Cancels(), tell=tell, **nothing
+    )
+    made = GoalHandle(goal, endpoint, endpoint, None, "m")
     made.look_out_left = look_out_left
     return made
+
+
+def tell(handle: GoalHandle, event: Event) -> None:
+    """Only what is the end of a drain."""
+    if event is Event.DRAINED:
+        handle.goal.on(event, Now(0.0, 0.0))
+
+
+class Endpoint(SimpleNamespace):
+    """One on which nothing happens."""
+
+    __hash__ = object.__hash__
 
 
 @pytest.mark.parametrize(
@@ -54,32 +71,38 @@ def test_a_goal_is_over_when_nothing_of_it_is_waited_for(
     assert handle(end, look_out_left, state).is_over is over
 
 
-def test_who_is_looked_out_for_is_waited_for_but_not_without_end(clock: Any) -> None:
+def test_who_is_looked_out_for_is_waited_for_but_not_without_end() -> None:
+    host: Any = Host()
     lost = handle(End.SERVER_GONE, 2.0)
-    patience = draining._Patience([lost])
-    clock.now += 10.0
-    assert not patience.is_over([lost]), "looks count, not time: the process may stand still"
-    clock.now += draining.LOOKS_OUT_AT_MOST
-    assert patience.is_over([lost])
+    drain = Drain(host, [lost])
+    host.now += 10.0
+    assert not drain.step(), "looks count, not time: the process may stand still"
+    host.now += LOOKS_OUT_AT_MOST
+    assert drain.step()
+    assert drain.finish() == [lost]
+    assert lost.goal.waited_for
+    assert Drain(host, [lost]).step(), "once"
 
 
-def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal(clock: Any) -> None:
+def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal() -> None:
+    host: Any = Host()
     left = handle(End.UNKNOWN, 0.0)
-    patience = draining._Patience([left])
-    clock.now += left.goal.drains_within
-    assert not patience.is_over([left])
-    clock.now += 2 * draining.JUST_PAST
-    assert patience.is_over([left])
+    drain = Drain(host, [left])
+    host.now += left.goal.drains_within
+    assert not drain.step()
+    host.now += 2 * JUST_PAST
+    assert drain.step()
 
 
-def test_who_is_back_has_the_time_of_a_cancel_but_only_once(clock: Any) -> None:
-    goal = handle(End.SERVER_GONE, 2.0)
-    patience = draining._Patience([goal])
+def test_who_is_back_has_the_time_of_a_cancel_but_only_once() -> None:
+    host: Any = Host()
+    handles = [handle(End.SERVER_GONE, 2.0), handle(End.UNKNOWN, 0.0)]
+    drain, goal = Drain(host, handles), handles[0].goal
+    host.now += 50.0
     for back_again in (False, True):
-        goal.goal.state = State.LOST
-        patience.is_over([goal])
-        clock.now += 50.0
-        goal.goal.state = State.CANCELING
-        assert patience.is_over([goal]) is back_again
-        clock.now += goal.goal.drains_within + 2 * draining.JUST_PAST
-        assert patience.is_over([goal])
+        goal.state = State.LOST
+        drain.step()
+        goal.state, goal.end = State.CANCELING, End.UNKNOWN
+        assert drain.step() is back_again
+        host.now += goal.drains_within + 2 * JUST_PAST
+        goal.end = End.SERVER_GONE

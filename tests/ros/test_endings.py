@@ -10,8 +10,8 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions import End, MoveRobot, Outcome
 from bt_actions.goals.terms import Now, State
-from bt_actions.traffic.drain import drain
-from bt_actions.traffic.shared import lock
+from bt_actions.ros.host import host as process
+from bt_actions.ros.node_participant import traffic_of
 from tests.support.processes import Host
 from tests.support.waiting import until
 
@@ -58,7 +58,7 @@ def test_a_process_that_ends_begins_nothing_any_more(
     leaf = MoveRobot("m", 0.1, action_name=name)
     tree = BehaviourTree(leaf)
     tree.setup(node=node)
-    monkeypatch.setattr("bt_actions.traffic.traffic._closing", True)
+    monkeypatch.setattr(process, "closing", True)
     until(lambda: bool(tree.tick() or leaf.outcome), what="the leaf ends")
     assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.NEVER_STARTED)
     assert journal.count("received") == 0
@@ -88,12 +88,12 @@ def test_a_goal_that_cannot_be_minded_keeps_no_other_from_its_deadline(
 
     (handle,) = broken.open_handles()
     with monkeypatch.context() as patched:
-        patched.setattr(handle.goal, "poll", fails)
+        patched.setattr(handle.goal, "due", fails)
         until(lambda: sound.drained, what="the other's deadline takes effect")
     assert journal.count("canceled") == 1
     for leaf in leaves:
         leaf.stop(Status.INVALID)
-    drain(broken.open_handles())
+    traffic_of(node).drain(broken.open_handles())
     assert journal.count("canceled") == 2
     for leaf in leaves:
         leaf.shutdown()
@@ -109,12 +109,13 @@ def test_a_deadline_that_passes_while_it_is_looked_at_is_judged_at_the_next_look
     leaf.setup(node=node)
     until(lambda: leaf.progress().state == "EXECUTING", 20.0, meanwhile=leaf.tick_once)
     (handle,) = leaf.open_handles()
-    with lock:  # the alarm does not look meanwhile
-        now = handle.traffic.clocks.now()
+    node_clock = traffic_of(node).participant
+    with process.lock:  # the alarm does not look meanwhile
+        now = node_clock.now()
         due = Now(now.steady + 31.0, now.ros + 31.0)
         moments = [now]
         with monkeypatch.context() as patched:
-            patched.setattr(handle.traffic.clocks, "now", lambda: moments.pop() if moments else due)
+            patched.setattr(node_clock, "now", lambda: moments.pop() if moments else due)
             handle.endpoint.poll(handle)
         assert handle.goal.state is State.EXECUTING
     leaf.stop(Status.INVALID)

@@ -33,9 +33,8 @@ from bt_actions.behaviours.variables import read, write
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import Busy
 from bt_actions.goals.terms import Event
-from bt_actions.traffic import traffic
-from bt_actions.traffic.shared import lock
-from bt_actions.traffic.traffic import Traffic
+from bt_actions.ros.host import host as process
+from bt_actions.ros.node_participant import traffic_of
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.waiting import until
@@ -225,7 +224,7 @@ class TestNoServer:
         self, context: Any, monkeypatch: pytest.MonkeyPatch, rules: list[str], told: list[str]
     ) -> None:
         said = list[str]()
-        monkeypatch.setattr(traffic.log, "warning", said.append)
+        monkeypatch.setattr(process.log, "warning", said.append)
         words = ["--ros-args", *(word for rule in rules for word in ("-r", rule))]
         node = Node("remapped", context=context, cli_args=words)
         for _ in range(2):
@@ -263,9 +262,9 @@ class TestNoServer:
             until(lambda: goal_id not in line.cancels._asked, what="asked, and answered")
             new_host().open(name)
             until_two_are_seen(node, name)
-            with lock:
+            with process.lock:
                 line.goal_answered(goal_id, (True, True))
-                assert goal_id in line.goals, (line.past._ended, line.watch.gids)
+                assert goal_id in line.goals, (line._past._ended, line.watch.gids)
                 duplicate = line.goals[goal_id]
                 line.tell(handle, Event.INTERRUPTED)
                 assert line.goals == {goal_id: duplicate}, "the goal that has ended is not its twin"
@@ -276,13 +275,13 @@ class TestNoServer:
         self, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, is_news: bool
     ) -> None:
         """The leaf has gone; behind the result lies a second server's acceptance, or feedback."""
-        traffic = Traffic.of(node)
+        traffic = traffic_of(node)
         line = traffic.endpoint(MoveRobotAction, name)
         shown = [frozenset({b"one", b"other"})]
-        monkeypatch.setattr(line.route, "shown", lambda: shown[-1])
-        monkeypatch.setattr(line.client, "server_is_ready", lambda: True)
+        monkeypatch.setattr(line.transport, "servers", lambda: shown[-1])
+        monkeypatch.setattr(line.transport, "ready", lambda: True)
         gone = MoveRobot("gone", 0.1, action_name=name)
-        with lock:
+        with process.lock:
             line.see()
             handle = traffic.begin(line, gone, Timeouts(), frozenset({"base"}), Busy.WAIT)
             line.tell(handle, Event.SERVER_READY, message=MoveRobotAction.Goal())
@@ -290,22 +289,22 @@ class TestNoServer:
             traffic.leave(line)
             asked, goal_id = time.monotonic(), handle.goal.id
             ended = (asked, ((5, MoveRobotAction.Result()), (0, None)))
-            line.client._inbox.append(("result", goal_id, ended))
+            line.transport._inbox.append(("result", goal_id, ended))
             if is_news:
-                line.client._inbox.append(("goal", goal_id, (asked, (True, True))))
+                line.transport._inbox.append(("goal", goal_id, (asked, (True, True))))
             else:
-                line.client._inbox.append(("feedback", b"somebody's", None))
-            line.client._deliver()
+                line.transport._inbox.append(("feedback", b"somebody's", None))
+            line.transport._deliver()
             assert handle.goal.end is End.CANCELED
-            assert line.client.closed is not is_news
+            assert line.transport.closed is not is_news
             if not is_news:
                 return
             duplicate = line.goals[goal_id]
             shown.append(frozenset())
         until(lambda: duplicate.goal.end is End.SERVER_GONE)
-        with lock:
+        with process.lock:
             line.tell(duplicate, Event.PROCESS_EXITING)
-            assert line.client.closed, "when there is nothing more to hear"
+            assert line.transport.closed, "when there is nothing more to hear"
 
     def test_two_servers_are_ambiguous_and_neither_gets_the_goal(
         self,
@@ -841,7 +840,7 @@ class TestInvalidGoal:
 
         class Mine(Exception):
             def __str__(self) -> str:
-                under_the_lock.append(lock._is_owned())  # type: ignore[attr-defined]
+                under_the_lock.append(process.lock._is_owned())  # type: ignore[attr-defined]
                 return "no such place"
 
         def goal() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.goals.ids import Author, new_goal_id
-from bt_actions.traffic import predecessors as module
 from bt_actions.traffic.predecessors import TOLD_AT_MOST, Predecessors
 
 
@@ -16,17 +15,21 @@ def of_the_dead() -> bytes:
     return bytes(made)
 
 
+class Said(list[str]):
+    """A log that keeps what is said."""
+
+    info = warning = error = list.append
+
+
 @pytest.fixture
-def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    said = list[str]()
-    monkeypatch.setattr(module.log, "warning", said.append)
-    return said
+def said() -> Said:
+    return Said()
 
 
 def test_a_goal_of_the_dead_is_named_once_though_statuses_of_two_servers_take_turns(
-    said: list[str],
+    said: Said,
 ) -> None:
-    seen, left = Predecessors("/move"), of_the_dead()
+    seen, left = Predecessors("/move", said), of_the_dead()
     for running in ({left}, {left}, set[bytes](), {left}):
         seen.see(running)
     [line] = said
@@ -35,17 +38,17 @@ def test_a_goal_of_the_dead_is_named_once_though_statuses_of_two_servers_take_tu
     assert left.hex() in line
 
 
-def test_goals_of_the_living_and_of_other_clients_are_nobodys_concern(said: list[str]) -> None:
+def test_goals_of_the_living_and_of_other_clients_are_nobodys_concern(said: Said) -> None:
     elsewhere = bytearray(of_the_dead())
     elsewhere[3] ^= 0xFF
-    Predecessors("/move").see({new_goal_id(), bytes(16), b"", bytes(elsewhere)})
+    Predecessors("/move", said).see({new_goal_id(), bytes(16), b"", bytes(elsewhere)})
     assert not said
 
 
 def test_who_dies_later_is_found_at_the_next_status(
-    said: list[str], monkeypatch: pytest.MonkeyPatch
+    said: Said, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen, goal = Predecessors("/move"), new_goal_id()
+    seen, goal = Predecessors("/move", said), new_goal_id()
     seen.see({goal})
     assert not said
     monkeypatch.setattr(Author, "alive", False)
@@ -54,15 +57,15 @@ def test_who_dies_later_is_found_at_the_next_status(
 
 
 def test_of_each_process_it_is_asked_once_whether_it_lives(
-    said: list[str], monkeypatch: pytest.MonkeyPatch
+    said: Said, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = list[Author]()
     monkeypatch.setattr(Author, "alive", property(lambda author: not asked.append(author)))
-    Predecessors("/move").see({new_goal_id() for _ in range(100)})
+    Predecessors("/move", said).see({new_goal_id() for _ in range(100)})
     assert len(asked) == 1
     assert not said
 
 
-def test_of_many_some_are_named(said: list[str]) -> None:
-    Predecessors("/move").see({of_the_dead() for _ in range(3 * TOLD_AT_MOST)})
+def test_of_many_some_are_named(said: Said) -> None:
+    Predecessors("/move", said).see({of_the_dead() for _ in range(3 * TOLD_AT_MOST)})
     assert len(said) == TOLD_AT_MOST

@@ -12,9 +12,11 @@ import pytest
 from bt_actions import MoveRobot, TreeRunner
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import Event
+from bt_actions.ros.action_transport import RosTransport
+from bt_actions.ros.host import host as process
+from bt_actions.ros.node_participant import traffic_of
 from bt_actions.traffic import endpoint as module
-from bt_actions.traffic.shared import lock
-from bt_actions.traffic.traffic import Traffic
+from bt_actions.traffic import handover
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import state
 from tests.support.waiting import until
@@ -47,11 +49,13 @@ class Recorder:
     def strike(self, goal_id: bytes) -> None:
         self.open.pop(goal_id, None)
 
+    def close(self) -> None: ...
+
 
 @pytest.fixture
 def ledger(monkeypatch: pytest.MonkeyPatch) -> Recorder:
     recorder = Recorder()
-    monkeypatch.setattr(module, "ledger", recorder)
+    monkeypatch.setattr(process, "record", recorder)
     return recorder
 
 
@@ -88,13 +92,13 @@ def test_it_is_on_record_before_it_is_sent(
 ) -> None:
     serve()
     seen: list[bool] = []
-    real = module.ActionClient.send
+    real = RosTransport.send
 
     def send(client: Any, goal_id: bytes, goal: Any) -> None:
         seen.append(goal_id in ledger.open)
         real(client, goal_id, goal)
 
-    monkeypatch.setattr(module.ActionClient, "send", send)
+    monkeypatch.setattr(RosTransport, "send", send)
     run(MoveRobot("m", 0.1, action_name=name))
     assert seen == [True]
 
@@ -114,7 +118,7 @@ def test_what_could_not_be_sent_is_taken_off(
     def send(*_: Any) -> None:
         raise RuntimeError("no")
 
-    monkeypatch.setattr(module.ActionClient, "send", send)
+    monkeypatch.setattr(RosTransport, "send", send)
     run(MoveRobot("m", 0.1, action_name=name))
     assert ledger.open == {}
     assert len(ledger.entered) == 1
@@ -128,8 +132,8 @@ def test_what_is_not_accounted_for_stays(
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
         goal = journal.wait_for("received").goal
-        with lock:
-            [handle] = Traffic.of(node).endpoint(leaf.action_type, name).goals.values()
+        with process.lock:
+            [handle] = traffic_of(node).endpoint(leaf.action_type, name).goals.values()
             handle.endpoint.tell(handle, Event.PROCESS_EXITING)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
 
@@ -140,8 +144,8 @@ def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
     with losing(new_host(), name, node) as leaf:
         [(*_, lost)] = ledger.open.values()
         assert lost
-        with lock:
-            [handle] = Traffic.of(node).endpoint(leaf.action_type, name).goals.values()
+        with process.lock:
+            [handle] = traffic_of(node).endpoint(leaf.action_type, name).goals.values()
             handle.endpoint.tell(handle, Event.SERVER_RETURNED)
             [(*_, lost)] = ledger.open.values()
             assert not lost
@@ -179,10 +183,11 @@ def test_when_the_node_goes_what_is_not_accounted_for_stays(
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
         goal = journal.wait_for("received").goal
-        with lock:
-            line = Traffic.of(node).endpoint(leaf.action_type, name)
+        with process.lock:
+            line = traffic_of(node).endpoint(leaf.action_type, name)
             [handle] = line.goals.values()
-            line.park(all_of_them=True)
+            domain = process.domain(node.context.get_domain_id())
+            handover.park(line, process, domain, all_of_them=True)
             handle.endpoint.tell(handle, Event.PROCESS_EXITING)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
 
@@ -202,6 +207,6 @@ def test_of_many_that_were_lost_the_newest_stay(
     ledger: Recorder,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "LOST_KEPT", -1)  # all but the newest -1: the oldest one goes
+    monkeypatch.setattr(handover, "LOST_KEPT", -1)  # all but the newest -1: the oldest one goes
     with losing(new_host(), name, node):
         until(lambda: ledger.open == {})

@@ -9,21 +9,19 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
-from bt_actions.ros import rediscovery
-from bt_actions.ros.action_client import ActionClient
+from bt_actions.ros import node_participant, rediscovery
 from bt_actions.ros.graph import enclave
+from bt_actions.ros.host import host as process
 from bt_actions.ros.log import log
+from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic import alarm
 from bt_actions.traffic import route as way
-from bt_actions.traffic.shared import lock
 from tests.support.trees import in_turn
 from tests.support.waiting import holds_for, until
 
@@ -34,17 +32,11 @@ now = time.monotonic
 @pytest.fixture
 def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
     """Make a leaf's node blind to its server, from now on, and deaf and dumb."""
-    shows = way.servers
 
     def blind(leaf: MoveRobot) -> None:
-        action = leaf._endpoint.name
-        monkeypatch.setattr(
-            way,
-            "servers",
-            lambda of, about: frozenset() if of is node and about == action else shows(of, about),
-        )
-        client = leaf._endpoint.client
-        monkeypatch.setattr(client, "server_is_ready", lambda: False)
+        client = leaf._endpoint.transport
+        monkeypatch.setattr(client, "servers", frozenset)
+        monkeypatch.setattr(client, "ready", lambda: False)
         monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
         monkeypatch.setattr(client, "take_data", lambda: None)
         monkeypatch.setattr(client, "cancel", lambda _: None)
@@ -56,8 +48,12 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
 def nothing_else_is_missed(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """What the tests before this have lost is not looked for meanwhile."""
     misses = way.Route.misses
-    monkeypatch.setattr(way.Route, "misses", lambda self: self.name == name and misses(self))
+    monkeypatch.setattr(way.Route, "misses", lambda self: is_of(self, name) and misses(self))
     until(nobody_looks, 10.0)
+
+
+def is_of(route: way.Route, name: str) -> bool:
+    return route._endpoint.name == name
 
 
 def nobody_looks() -> bool:
@@ -84,7 +80,10 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     assert journal.ends() == ["canceled", "succeeded"]
     assert journal.max_live == 1
     until(nobody_looks)
-    until(lambda: not rediscovery._participants, what="the participant goes with its last user")
+    until(
+        lambda: not rediscovery._participants,
+        what="the participant is taken away with its last line",
+    )
 
 
 @pytest.mark.parametrize("canceled", [False, True], ids=["it ends", "it is canceled"])
@@ -92,24 +91,24 @@ def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
     serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, canceled: bool
 ) -> None:
     """What the node asks gets lost, and what it is told, though the server is in sight."""
-    monkeypatch.setattr(alarm, "stalls", Stalls())  # that of the tests is none
+    monkeypatch.setattr(process, "stalls", Stalls())  # that of the tests is none
     journal = serve()
     leaf = MoveRobot("m", 60.0 if canceled else 4.0, action_name=name, timeout=Timeouts(cancel=2.0))
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
         until(lambda: leaf.progress().feedback is not None)
-        client = leaf._endpoint.client
-        with lock:
+        client = leaf._endpoint.transport
+        with process.lock:
             for request in ("cancel", "ask_result", "probe"):
                 monkeypatch.setattr(client, request, lambda *_: client.reachability.asked(now()))
             monkeypatch.setattr(client, "take_data", lambda: None)
             monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
-            monkeypatch.setattr(alarm.stalls, "_due", alarm.stalls._idle(now()) - 5.0)
+            monkeypatch.setattr(process.stalls, "_due", process.stalls._idle(now()) - 5.0)
         if canceled:
             runner.interrupt()
         runner.wait(40.0)
         assert leaf.end is (End.CANCELED if canceled else End.SUCCEEDED)
-        assert leaf._endpoint.client is not client
+        assert leaf._endpoint.transport is not client
     assert journal.ends() == ["canceled" if canceled else "succeeded"]
     until(nobody_looks)
 
@@ -162,9 +161,7 @@ def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
 
 
 def _domain(node: Any) -> Any:
-    from bt_actions.traffic.traffic import Traffic
-
-    return Traffic.of(node).domain
+    return process.domain(node.context.get_domain_id())
 
 
 class TestMoves:
@@ -178,9 +175,11 @@ class TestMoves:
         leaf.setup(node=node)
         sight = SecondParticipant(_domain(node).number, "/")
         sight.looking = False
-        with lock:
-            leaf._endpoint.route.move_to(sight, leaf._endpoint.route.client_in(sight))
-        yield leaf._endpoint.route
+        with process.lock:
+            transport = leaf._endpoint.route.try_in(sight)
+            sight.users.add(transport)
+            leaf._endpoint.route.move_to(transport)
+        yield leaf._endpoint, sight
         leaf.shutdown()
         until(lambda: sight.closed)
 
@@ -197,10 +196,10 @@ class TestMoves:
     def test_a_participant_that_is_used_again_is_not_closed(
         self, moved: Any, name: str, node: Any
     ) -> None:
-        sight = moved.second
-        with lock:  # the thread that closes it has to wait
-            sight.left_by(moved)
-            sight.users.add(moved)
+        endpoint, sight = moved
+        with process.lock:  # the thread that closes it has to wait
+            sight._left_by(endpoint.transport)
+            sight.users.add(endpoint.transport)
         until(nobody_looks)
         assert not sight.closed
         self.goes(name, node)
@@ -208,25 +207,24 @@ class TestMoves:
     def test_a_line_whose_participant_is_gone_goes_back_to_its_node(
         self, moved: Any, name: str, node: Any
     ) -> None:
-        sight = moved.second
+        endpoint, sight = moved
         sight.users.clear()
         sight.close()
         self.goes(name, node)
-        assert moved.second is None
-        assert not moved._endpoint.orphaned
+        assert not endpoint.route.elsewhere
+        assert not endpoint.orphaned
 
     def test_without_another_thread_no_resource_is_lost(
         self, moved: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        sight = moved.second
+        endpoint, sight = moved
 
         def no_more(_thread: threading.Thread) -> None:
             raise RuntimeError("can't start new thread")
 
-        with lock, monkeypatch.context() as patch:
+        with process.lock, monkeypatch.context() as patch:
             patch.setattr(threading.Thread, "start", no_more)
-            line = moved._endpoint
-            moved._go_on_with(ActionClient(node, line.action_type, name, line), None)
+            assert endpoint.route.fall_back()
         assert not sight.closed
         self.goes(name, node)
         sight.close()
@@ -239,8 +237,7 @@ def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
     from std_srvs.srv import Trigger
 
     class Seeker:
-        name = ""
-        tried = 0
+        tried, closed = 0, False
 
         def misses(self) -> bool:
             return True
@@ -248,30 +245,28 @@ def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
         def is_waited_for(self) -> bool:
             return True
 
-        def client_in(self, sight: SecondParticipant) -> Any:
+        def try_in(self, sight: SecondParticipant) -> Any:
             self.second = sight
             self.tried += 1
             return self
 
-        def server_is_ready(self) -> bool:
+        def ready(self) -> bool:
             return True
 
         def prefers(self, client: Any) -> bool:
             return True
 
-        def move_to(self, sight: SecondParticipant, client: Any) -> None:
-            sight.users.add(self)
-            sight.left_by(self)
+        def move_to(self, transport: Any) -> None:
+            self.second._left_by(transport)
 
-        def destroy(self) -> None:
+        def close(self) -> None:
             assert not self.second.closed
 
     monkeypatch.setattr(rediscovery, "LASTS", 3.0)
     service = node.create_service(Trigger, f"{name}/_action/send_goal", print)
     seeker = Seeker()
-    seeker.name = name
     looks = rediscovery.Rediscovery(_domain(node).number, "/")
-    looks._missing = {seeker}
+    looks._missing = {seeker: name}
     assert looks._look() is False
     assert seeker.tried > 1
     assert seeker.second.closed
@@ -304,14 +299,11 @@ def test_whoever_else_reads_goal_requests_moves_nobody(
 
     monkeypatch.setattr(_domain(node), "lost_sight", True)
     monkeypatch.setattr(rediscovery, "FIRST_AFTER", 0.1)
-    tried: list[Any] = []
+    tried, try_in = list[Any](), way.Route.try_in
     monkeypatch.setattr(
         way.Route,
-        "client_in",
-        lambda self, sight: (
-            tried.append(self)
-            or ActionClient(sight.node, self._endpoint.action_type, self.name, self._endpoint)
-        ),
+        "try_in",
+        lambda self, sight: tried.append(self) or try_in(self, sight),
     )
     moved: list[Any] = []
     monkeypatch.setattr(way.Route, "move_to", lambda *who: moved.append(who))
@@ -339,13 +331,13 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     from rclpy.node import Node
 
     enclaves = list[str]()
-    monkeypatch.setattr(way.Route, "misses", lambda self: self.name == name)
-    monkeypatch.setattr(way, "look_for", lambda *to, at_once: enclaves.append(to[2]))
+    monkeypatch.setattr(way.Route, "misses", lambda self: is_of(self, name))
+    monkeypatch.setattr(node_participant, "look_for", lambda *to, at_once: enclaves.append(to[3]))
     context = Context()
     context.init(args=["--ros-args", flag, "/kitchen/robot"], domain_id=domain)
     leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
     leaf.setup(node=secure)
-    with lock:
+    with process.lock:
         leaf._endpoint.route.seek(now())
     sight = SecondParticipant(domain, enclaves[0])
     sight.looking = False
@@ -357,7 +349,9 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     context.shutdown()
 
 
-def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
+def test_where_names_are_remapped_nobody_looks(
+    name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A participant without the rules would find another robot."""
     from rclpy.context import Context
     from rclpy.node import Node
@@ -368,14 +362,15 @@ def test_where_names_are_remapped_nobody_looks(name: str, domain: int) -> None:
     remapped = Node("remapped", context=context)
     leaf = MoveRobot("m", 0.1, action_name=name)
     leaf.setup(node=remapped)
-    leaf._endpoint.traffic.domain.lost_sight = True
-    leaf._endpoint.traffic.seen_since -= way.TOO_NEW
-    with lock:
-        leaf._endpoint.goals[b"waits"] = SimpleNamespace(goal=SimpleNamespace(state=None))
-        assert not leaf._endpoint.route.misses()
-        leaf._endpoint.route._remapped = False
-        assert leaf._endpoint.route.misses()
-        leaf._endpoint.goals.clear()
+    looked_for = list[Any]()
+    monkeypatch.setattr(way.Route, "misses", lambda self: is_of(self, name))
+    monkeypatch.setattr(node_participant, "look_for", lambda *to, at_once: looked_for.append(to))
+    with process.lock:
+        leaf._endpoint.route.seek(now())
+        assert not looked_for
+        monkeypatch.setattr(NodeParticipant, "_is_remapped", lambda *_: False)
+        leaf._endpoint.route.seek(now())
+        assert looked_for
     leaf.shutdown()
     remapped.destroy_node()
     context.shutdown()
@@ -393,8 +388,8 @@ def test_without_a_pause_to_break_off_a_look_begins_as_soon_as_ever() -> None:
 
     pauses, looks = list[float](), Looks(0, "/")
     looks._thread = threading.current_thread()
-    with lock:
-        looks.add(Missing(), at_once=True)  # type: ignore[arg-type]
+    with process.lock:
+        looks.add(Missing(), "/m", at_once=True)  # type: ignore[arg-type]
     with pytest.raises(StopIteration):
         looks._run()
     assert pauses == [rediscovery.FIRST_AFTER]
@@ -413,16 +408,16 @@ class Missing:
 def test_who_is_in_doubt_waits_for_no_pause_that_others_have_reached() -> None:
     looks = rediscovery.Rediscovery(0, "/")
     first, second = Missing(), Missing()
-    looks._missing = {first}  # type: ignore[arg-type]
+    looks._missing = {first: "/m"}  # type: ignore[arg-type]
     looks._thread = threading.current_thread()
 
     def wait() -> None:
-        with lock:
+        with process.lock:
             looks._wait(600.0)
 
     waits = threading.Thread(target=wait, daemon=True)
     waits.start()
-    with lock:
-        looks.add(second, at_once=True)  # type: ignore[arg-type]
+    with process.lock:
+        looks.add(second, "/m", at_once=True)  # type: ignore[arg-type]
     waits.join(30.0)
     assert not waits.is_alive()

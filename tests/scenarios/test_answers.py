@@ -24,10 +24,10 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.goals.asking import ASK_AGAIN
-from bt_actions.ros.action_client import TAKE_AT_MOST
+from bt_actions.ros.action_transport import TAKE_AT_MOST
 from bt_actions.simulation.journal import live_intervals
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.shared import FEEDBACK_KEPT
+from bt_actions.traffic.handle import FEEDBACK_KEPT
 from tests.support.accounts import Report, compare
 from tests.support.processes import HostFactory, Journal, Process
 from tests.support.reliability import Record

@@ -21,10 +21,9 @@ import pytest
 from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
+from bt_actions.ros.host import host as process
 from bt_actions.servers.presence import Server
-from bt_actions.traffic import alarm, shared
-from bt_actions.traffic.shared import lock
-from bt_actions.traffic.traffic import IN_FLIGHT
+from bt_actions.traffic.admission import IN_FLIGHT
 from tests.support.foreign import PROGRAMS
 from tests.support.processes import PATIENCE, Host, Journal, Process
 from tests.support.reliability import Record, first_paragraph
@@ -290,7 +289,7 @@ def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
     held, over = threading.Event(), threading.Event()
 
     def hold() -> None:
-        with lock:
+        with process.lock:
             held.set()
             over.wait(9.0)
 
@@ -304,12 +303,16 @@ def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
             warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
             pid = os.fork()
         if pid == 0:
-            minds = lock.acquire(timeout=5.0) and not alarm.minded() and not shared._domains
+            minds = (
+                process.lock.acquire(timeout=5.0)
+                and not process.scheduler.attended
+                and not process.domains
+            )
             os._exit(0 if minds else 1)
         assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
         over.set()
         holder.join()
-        assert alarm.minded()
+        assert process.scheduler.attended
     assert journal.ends() == ["canceled"]
     host.close_server(name)
     record.outcome = "CANCELED by the parent; its child knows no goal and gets the lock"
@@ -319,7 +322,7 @@ def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
     host: Host, name: str, node: Any, spin: Any, monkeypatch: pytest.MonkeyPatch, record: Record
 ) -> None:
     """The exit hook's wait for a goal that cannot be canceled is replaced by a KeyboardInterrupt"""
-    from bt_actions.traffic import traffic
+    from bt_actions.ros import exit as exit_hook
 
     said: list[str] = []
 
@@ -331,10 +334,10 @@ def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
     leaf.setup(node=node)
     until(lambda: state(leaf) == "EXECUTING", meanwhile=lambda: (spin(), leaf.tick_once()))
     with monkeypatch.context() as patch:
-        patch.setattr(traffic, "_closing", False)
-        patch.setattr(traffic, "drain", interrupted)
-        patch.setattr(traffic.log, "error", said.append)
-        traffic.close_process()
+        patch.setattr(exit_hook.host, "closing", False)
+        patch.setattr(exit_hook, "drain", interrupted)
+        patch.setattr(exit_hook.log, "error", said.append)
+        exit_hook.close_process()
     [line] = said
     assert "cannot account for it" in line
     host.cancel_all(name)
@@ -466,7 +469,7 @@ def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_no
     trees = [together(*leaves[:8]), together(*leaves[8:])]
 
     def sees(leaf: MoveRobot) -> bool:
-        with lock:
+        with process.lock:
             assert leaf._endpoint is not None
             return leaf._endpoint.look(time.monotonic()) is Server.READY
 

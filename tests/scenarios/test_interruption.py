@@ -11,7 +11,7 @@ import pytest
 from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
-from bt_actions.traffic import alarm
+from bt_actions.ros.host import host as process
 from tests.support.processes import Host, Journal
 from tests.support.reliability import Record, rounded
 from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, state, together
@@ -254,9 +254,9 @@ class TestABehaviourThatRaises:
         journal = serve("1:delay_accept=0.3")
         warm = MoveRobot("warm", 0.0, action_name=name)
         warm.setup(node=node)  # so that the server is known, and the first tick sends
-        until(warm._endpoint.client.server_is_ready)
+        until(warm._endpoint.transport.server_is_ready)
         way = warm._endpoint.route  # nor is it in doubt since a stall in the tests before
-        way._long_stalls = alarm.stalls.long_times
+        way._long_stalls = process.stalls.long_times
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(leaf, Raises("culprit", method), name="root")
         with TreeRunner(root, node=node) as runner:

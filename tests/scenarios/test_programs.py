@@ -350,7 +350,7 @@ A_PUBLISHER_WHILE_A_GOAL_IS_MADE = """
 A_PUBLISHER_BETWEEN_TWO_GOALS = """
     import time
     from std_msgs.msg import String
-    from bt_actions.traffic.alarm import LINGER
+    from bt_actions.ros.host import LINGER
 
     class News(py_trees.behaviour.Behaviour):
         def update(self):

@@ -21,6 +21,8 @@ from py_trees.composites import Selector
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.goals.attempts import AttemptRecord
 from bt_actions.goals.terms import State
+from bt_actions.ros.host import host as process
+from bt_actions.ros.node_participant import traffic_of
 from bt_actions.servers.presence import (
     NOT_READY_FOR,
     PROBE_EVERY,
@@ -29,9 +31,8 @@ from bt_actions.servers.presence import (
     ServerWatch,
 )
 from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.handle import Change
 from bt_actions.traffic.route import Route
-from bt_actions.traffic.shared import Change, lock
-from bt_actions.traffic.traffic import Traffic
 from tests.support.middleware import AS_IT_COMES, NOTHING_SET
 from tests.support.processes import Host, HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -68,7 +69,7 @@ def until_both_hear(leaf: MoveRobot, node: Any) -> None:
     assert line is not None
 
     def state_now() -> Server:
-        with lock:
+        with process.lock:
             return line.look(time.monotonic())
 
     until(lambda: state_now() is Server.AMBIGUOUS, 9.0, meanwhile=line.pump)
@@ -84,12 +85,12 @@ def until_heard(leaf: MoveRobot, node: Any) -> None:
 
     def is_heard() -> bool:
         nonlocal asked_at
-        with lock:
+        with process.lock:
             now = time.monotonic()
             if line.look(now) is Server.READY and now - asked_at > PROBE_EVERY:
                 asked_at = now
                 line.probe()
-            return line.client.reachability.heard
+            return line.transport.reachability.heard
 
     until(is_heard, 9.0, meanwhile=line.pump)
     as_if_nothing_was_asked(line)
@@ -97,11 +98,11 @@ def until_heard(leaf: MoveRobot, node: Any) -> None:
 
 def as_if_nothing_was_asked(line: ActionEndpoint) -> None:
     """Have the line begin anew with the servers that it sees."""
-    with lock:
+    with process.lock:
         line.pump()
         line.watch = ServerWatch()
         for probe in line._last_probes:
-            line.client.forget(probe)
+            line.transport.forget(probe)
 
 
 class TestKilled:
@@ -502,8 +503,8 @@ class TestStopped:
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         """A refused cancel; SIGKILL; one runner for each job, with another server of its arm"""
-        monkeypatch.setattr("bt_actions.traffic.endpoint.LEASE", 10.0)
-        monkeypatch.setattr("bt_actions.traffic.endpoint.TOO_NEW", 0.5)
+        monkeypatch.setattr("bt_actions.traffic.handover.LEASE", 10.0)
+        monkeypatch.setattr("bt_actions.traffic.handover.TOO_NEW", 0.5)
         victim = new_host()
         victim.open(f"{name}_0", "1:reject_cancel")
         journal = host.open(f"{name}_1")
@@ -573,12 +574,12 @@ class TestStopped:
         from rclpy.context import Context
         from rclpy.node import Node
 
-        monkeypatch.setattr("bt_actions.traffic.endpoint.SILENT_FOR", 3.0)
+        monkeypatch.setattr("bt_actions.traffic.watcher.SILENT_FOR", 3.0)
         victim, host = new_host(), new_host()
         victim.open(f"{name}_0", "1:reject_cancel")
-        Traffic.of(node)
+        traffic_of(node)
         until_shown(node, f"{name}_0", 1)
-        monkeypatch.setattr("bt_actions.traffic.endpoint.TOO_NEW", 0.0)  # it has seen the victim
+        monkeypatch.setattr("bt_actions.traffic.handover.TOO_NEW", 0.0)  # it has seen the victim
         journal = host.open(f"{name}_1")
         first = MoveRobot("first", 40.0, action_name=f"{name}_0", resources={"arm"})
         first.timeouts = Timeouts(server=20.0, cancel=0.5)
@@ -619,9 +620,9 @@ class TestStopped:
 
         victim, successor = new_host(), new_host()
         victim.open(name)
-        Traffic.of(node)
+        traffic_of(node)
         until_shown(node, name, 1)
-        monkeypatch.setattr("bt_actions.traffic.endpoint.TOO_NEW", 0.0)  # it has seen the victim
+        monkeypatch.setattr("bt_actions.traffic.handover.TOO_NEW", 0.0)  # it has seen the victim
         first = MoveRobot("first", 40.0, action_name=name, timeout=Timeouts(cancel=0.5))
         context = Context()
         context.init(domain_id=domain)
@@ -922,8 +923,8 @@ class TestTwice:
         with TreeRunner(leaf, node=node) as runner:
             runner.start()
             until(lambda: state(leaf) == "EXECUTING", 20.0)
-            with lock:
-                Traffic.of(node)._endpoints[name].client.server_is_ready = lambda: False
+            with process.lock:
+                traffic_of(node)._endpoints[name].client.server_is_ready = lambda: False
             assert holds_for(lambda: leaf.outcome is None, 2 * NOT_READY_FOR)
             assert journal.events() == ["received", "accepted"]
         assert stood(leaf) == (Outcome.CANCELED, End.CANCELED)
@@ -985,14 +986,14 @@ class TestTwice:
         runner = TreeRunner(leaf, node=node)
         assert runner.run(30.0) is Status.SUCCESS
         told = list[Change | None]()
-        Traffic.of(node).observe(told.append)
+        traffic_of(node).observe(told.append)
         other.thaw()
         until(lambda: not leaf.drained, 10.0)
         if loop == "our runner":
             runner.shutdown()
         else:
             runner.tree.shutdown()
-        Traffic.of(node).unobserve(told.append)
+        traffic_of(node).unobserve(told.append)
         assert "canceled" in of_process(journal, other.pid)
         ends = [(change.outcome, change.end) for change in told if change is not None]
         assert ends[-1] == (Outcome.SERVER_AMBIGUOUS, End.CANCELED)

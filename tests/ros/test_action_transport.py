@@ -17,10 +17,10 @@ from robot_control_interfaces.action import Gripper as GripperAction
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import Gripper, MoveRobot
-from bt_actions.ros import action_client
-from bt_actions.ros.action_client import ANSWERS_KEPT, GOALS_KEPT, TAKE_AT_MOST, ActionClient
+from bt_actions.ros import action_transport
+from bt_actions.ros.action_transport import ANSWERS_KEPT, GOALS_KEPT, TAKE_AT_MOST, RosTransport
 from bt_actions.ros.graph import servers
-from bt_actions.traffic.traffic import Traffic
+from bt_actions.ros.node_participant import traffic_of
 from tests.support.processes import Host, HostFactory
 from tests.support.waiting import holds_for, until
 
@@ -121,13 +121,13 @@ def heard() -> Heard:
 
 
 @pytest.fixture
-def client(node: Node, host: Host, name: str, heard: Heard) -> Iterator[ActionClient]:
+def client(node: Node, host: Host, name: str, heard: Heard) -> Iterator[RosTransport]:
     """A client of a server that is there."""
-    client = ActionClient(node, MoveRobotAction, name, heard)
+    client = RosTransport(node, MoveRobotAction, name, heard)
     host.open(name)
     until(client.server_is_ready)
     yield client
-    client.destroy()
+    client.close()
     host.close_server(name)
 
 
@@ -151,12 +151,12 @@ def single(node: Node) -> Any:
     return spinning(node, SingleThreadedExecutor(context=node.context))
 
 
-def filed(client: ActionClient) -> int:
+def filed(client: RosTransport) -> int:
     """Return how many requests are kept until their answers come."""
     return sum(map(len, (client._goal_requests, client._result_requests, client._cancel_requests)))
 
 
-def request(client: ActionClient, kind: str) -> bytes:
+def request(client: RosTransport, kind: str) -> bytes:
     """Send a request that is answered at once, and return the goal's id."""
     goal_id = uuid.uuid4().bytes
     if kind == "goal":
@@ -170,7 +170,7 @@ def request(client: ActionClient, kind: str) -> bytes:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_answer_that_arrives_before_its_request_is_filed_is_not_lost(
-    client: ActionClient, node: Node, heard: Heard, kind: str
+    client: RosTransport, node: Node, heard: Heard, kind: str
 ) -> None:
     client._client_handle = LateFiling(client._client_handle, kind, patience=0.02)
     with single(node):
@@ -181,7 +181,7 @@ def test_an_answer_that_arrives_before_its_request_is_filed_is_not_lost(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_the_lock_every_such_answer_is_lost(
-    client: ActionClient, node: Node, heard: Heard, kind: str
+    client: RosTransport, node: Node, heard: Heard, kind: str
 ) -> None:
     """Shows that the test above would see it: rclpy #1123, which the lock is there for."""
     client._client_handle = LateFiling(client._client_handle, kind, patience=5.0)
@@ -194,7 +194,7 @@ def test_without_the_lock_every_such_answer_is_lost(
 
 @pytest.mark.parametrize("executor", [SingleThreadedExecutor, MultiThreadedExecutor])
 def test_every_answer_reaches_its_goal_when_several_threads_send(
-    client: ActionClient, node: Node, heard: Heard, executor: Any
+    client: RosTransport, node: Node, heard: Heard, executor: Any
 ) -> None:
     asked: list[bytes] = []
 
@@ -213,7 +213,7 @@ def test_every_answer_reaches_its_goal_when_several_threads_send(
     assert sorted(result[0] for result in heard.results) == sorted(asked)
 
 
-def test_answers_are_taken_without_an_executor(client: ActionClient, heard: Heard) -> None:
+def test_answers_are_taken_without_an_executor(client: RosTransport, heard: Heard) -> None:
     goal_id = uuid.uuid4().bytes
     client.send(goal_id, MoveRobotAction.Goal(distance=0.2))
     until(lambda: heard.goals, meanwhile=client.pump)
@@ -233,7 +233,7 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
     context = Context()
     context.init(domain_id=domain)
     node = Node("dying", context=context)
-    client = ActionClient(node, MoveRobotAction, name, heard)
+    client = RosTransport(node, MoveRobotAction, name, heard)
     journal = host.open(name)
     until(client.server_is_ready)
     goal_id = uuid.uuid4().bytes
@@ -245,12 +245,12 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
     until(lambda: heard.results, meanwhile=client.pump)
     assert heard.results[0][:2] == (goal_id, 5)
     assert journal.ends() == ["canceled"]
-    client.destroy()
+    client.close()
     node.destroy_node()
     host.close_server(name)
 
 
-def test_what_is_forgotten_is_not_told_and_not_kept(client: ActionClient, heard: Heard) -> None:
+def test_what_is_forgotten_is_not_told_and_not_kept(client: RosTransport, heard: Heard) -> None:
     for kind in ("result", "cancel"):
         client.forget(request(client, kind))
     client.probe(7, uuid.uuid4().bytes)
@@ -265,7 +265,7 @@ def test_what_is_forgotten_is_not_told_and_not_kept(client: ActionClient, heard:
 
 
 def test_a_goal_that_is_forgotten_may_still_be_accepted_by_another_server(
-    client: ActionClient, heard: Heard
+    client: RosTransport, heard: Heard
 ) -> None:
     """So that is told; of the newest only."""
     for _ in range(GOALS_KEPT + 3):
@@ -279,7 +279,7 @@ def test_a_goal_that_is_forgotten_may_still_be_accepted_by_another_server(
 
 
 def test_what_each_of_two_servers_answers_is_told(
-    client: ActionClient, new_host: HostFactory, node: Node, name: str, heard: Heard
+    client: RosTransport, new_host: HostFactory, node: Node, name: str, heard: Heard
 ) -> None:
     new_host().open(name, "*:reject")
     until(lambda: len(servers(node, name)) == 2)
@@ -297,7 +297,7 @@ def test_what_each_of_two_servers_answers_is_told(
         heard.so_far = ()
 
 
-def test_of_answers_without_end_to_one_question_the_first_are_kept(client: ActionClient) -> None:
+def test_of_answers_without_end_to_one_question_the_first_are_kept(client: RosTransport) -> None:
     client.ask_result(uuid.uuid4().bytes)
     (question,) = client._result_requests.values()
     for number in range(ANSWERS_KEPT + 5):
@@ -325,7 +325,7 @@ class Endless:
 
 
 def test_of_messages_without_end_so_many_are_taken_at_a_time(
-    client: ActionClient, monkeypatch: pytest.MonkeyPatch
+    client: RosTransport, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     endless = Endless()
     with monkeypatch.context() as patch:
@@ -336,7 +336,7 @@ def test_of_messages_without_end_so_many_are_taken_at_a_time(
     assert len(endless.taken) == 5
 
 
-def test_nothing_stays_filed_for_answered_requests(client: ActionClient, heard: Heard) -> None:
+def test_nothing_stays_filed_for_answered_requests(client: RosTransport, heard: Heard) -> None:
     goal_id = request(client, "goal")
     client.ask_result(goal_id)
     unknown = request(client, "cancel")
@@ -350,7 +350,7 @@ def test_nothing_stays_filed_for_answered_requests(client: ActionClient, heard: 
     assert filed(client) == 0
 
 
-def test_a_probe_is_answered_by_a_live_server_once(client: ActionClient, heard: Heard) -> None:
+def test_a_probe_is_answered_by_a_live_server_once(client: RosTransport, heard: Heard) -> None:
     client.probe(3, uuid.uuid4().bytes)
     until(lambda: heard.probes, meanwhile=client.pump)
     request(client, "cancel")
@@ -362,7 +362,7 @@ def test_a_refused_cancel_is_told_as_refused(
     node: Node, host: Host, name: str, heard: Heard
 ) -> None:
     """rclpy's servers answer "no error" with an empty list, which is read as the refusal it is."""
-    client = ActionClient(node, MoveRobotAction, name, heard)
+    client = RosTransport(node, MoveRobotAction, name, heard)
     host.open(name, "1:reject_cancel")
     until(client.server_is_ready)
     goal_id = uuid.uuid4().bytes
@@ -371,12 +371,12 @@ def test_a_refused_cancel_is_told_as_refused(
     client.cancel(goal_id)
     until(lambda: heard.cancels, meanwhile=client.pump)
     assert heard.cancels == [(goal_id, 1)]
-    client.destroy()
+    client.close()
     host.close_server(name)
 
 
 def test_a_listener_that_raises_does_not_end_the_spin(
-    client: ActionClient, node: Node, heard: Heard, monkeypatch: pytest.MonkeyPatch
+    client: RosTransport, node: Node, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
         raise RuntimeError("on purpose")
@@ -392,11 +392,11 @@ def test_a_listener_that_raises_does_not_end_the_spin(
 
 
 def test_a_destroyed_client_is_silent_and_refuses_to_send(
-    client: ActionClient, heard: Heard
+    client: RosTransport, heard: Heard
 ) -> None:
     request(client, "result")
-    client.destroy()
-    client.destroy()
+    client.close()
+    client.close()
     client.pump()
     assert not heard.results
     with pytest.raises(Exception, match=r"(?i)destroy|invalid|pointer"):
@@ -406,23 +406,23 @@ def test_a_destroyed_client_is_silent_and_refuses_to_send(
 def test_an_rclpy_without_the_methods_that_are_needed_is_named_at_once(
     node: Node, name: str, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(action_client, "_USED_OF_HANDLE", ("send_goal_request", "send_smoke"))
+    monkeypatch.setattr(action_transport, "_USED_OF_HANDLE", ("send_goal_request", "send_smoke"))
     with pytest.raises(RuntimeError, match="no send_smoke"):
-        ActionClient(node, MoveRobotAction, name, heard)
+        RosTransport(node, MoveRobotAction, name, heard)
 
 
 @pytest.mark.parametrize("moment", ["__enter__", "get_num_entities", "add_to_wait_set", "is_ready"])
 def test_a_client_that_is_destroyed_in_the_executors_hands_does_not_end_the_spin(
-    client: ActionClient, node: Node, monkeypatch: pytest.MonkeyPatch, moment: str
+    client: RosTransport, node: Node, monkeypatch: pytest.MonkeyPatch, moment: str
 ) -> None:
     """`shutdown` of a leaf, while another thread spins the user's node."""
-    real = getattr(ActionClient, moment)
+    real = getattr(RosTransport, moment)
 
-    def destroyed_first(self: ActionClient, *arguments: Any) -> Any:
-        client.destroy()
+    def destroyed_first(self: RosTransport, *arguments: Any) -> Any:
+        client.close()
         return real(self, *arguments)
 
-    monkeypatch.setattr(ActionClient, moment, destroyed_first)
+    monkeypatch.setattr(RosTransport, moment, destroyed_first)
     alive = threading.Event()
     executor = SingleThreadedExecutor(context=node.context)
     with spinning(node, executor):
@@ -439,7 +439,7 @@ def test_clients_come_and_go_under_a_spinning_executor(
     executor = MultiThreadedExecutor(2, context=node.context)
     with spinning(node, executor):
         for number in range(times):
-            ActionClient(node, MoveRobotAction, f"{name}_{number % 5}", heard).destroy()
+            RosTransport(node, MoveRobotAction, f"{name}_{number % 5}", heard).close()
         executor.create_task(alive.set)
         assert alive.wait(5.0)
 
@@ -447,8 +447,8 @@ def test_clients_come_and_go_under_a_spinning_executor(
 # Shared per node, name and type
 
 
-def clients_of(node: Node) -> list[ActionClient]:
-    return [waitable for waitable in node.waitables if isinstance(waitable, ActionClient)]
+def clients_of(node: Node) -> list[RosTransport]:
+    return [waitable for waitable in node.waitables if isinstance(waitable, RosTransport)]
 
 
 def test_leaves_with_the_same_action_share_one_client(node: Node, name: str) -> None:
@@ -487,8 +487,8 @@ def test_two_types_under_one_name_are_an_error_that_names_both(node: Node, name:
 
 def test_each_node_has_clients_of_its_own(node: Node, context: Context, name: str) -> None:
     other = Node("other", context=context)
-    lines = [Traffic.of(each).endpoint(GripperAction, name) for each in (node, other)]
-    assert lines[0].client is not lines[1].client
+    lines = [traffic_of(each).endpoint(GripperAction, name) for each in (node, other)]
+    assert lines[0].transport is not lines[1].transport
     for line in lines:
         line.traffic.leave(line)
     other.destroy_node()

@@ -1,4 +1,4 @@
-"""An action client that loses no answer, and that can be read without an executor.
+"""The transport of an action over rclpy: loses no answer, and can be read without an executor.
 
 rclpy's client hands out a future for each request and completes it where it spins. Three things
 follow that this project cannot live with, and each has its cure here:
@@ -24,8 +24,9 @@ import contextlib
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from action_msgs.srv import CancelGoal
 from rclpy.action import ActionClient as RclpyActionClient
@@ -34,9 +35,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
+from bt_actions.ros.graph import servers
+from bt_actions.ros.host import host
 from bt_actions.ros.log import log
-from bt_actions.servers.reachability import Reachability
-from bt_actions.traffic.shared import lock
+from bt_actions.servers.reachability import NEVER, Reachability
+from bt_actions.traffic.transport import GOALS_KEPT, Listener
 from bt_actions.utilities.plain_text import raised
 
 TAKE_AT_MOST = 200
@@ -48,10 +51,6 @@ ASKED_KEPT = 10
 """Questions of one kind about one goal whose answers are waited for: the newest."""
 ANSWERS_KEPT = 10
 """Answers to one question that are told: more servers of one name answer nothing new."""
-GOALS_KEPT = 20
-"""Goal requests, of those that are forgotten, of which a further acceptance is told all the same: a
-server that wakes up has the last ten in its queue."""
-
 _USED_OF_HANDLE = (
     "send_goal_request",
     "send_result_request",
@@ -65,37 +64,6 @@ _USED_OF_HANDLE = (
 )
 
 
-class Listener(Protocol):
-    """Who is told what the servers say: under the one lock, from whichever thread delivers.
-
-    `answers` are all that one question has had by now, the newest last: one of each server. `asked`
-    is when it was asked (time.monotonic).
-    """
-
-    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        """The goal request was answered: accepted or not. Told of forgotten goals, too."""
-
-    def result_came(
-        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
-    ) -> None:
-        """Status and result came; status 0 means that the server does not know the goal."""
-
-    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
-        """A cancel request was answered, with a return code of action_msgs/srv/CancelGoal."""
-
-    def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
-        """Feedback came, of a goal that may be anybody's."""
-
-    def statuses_came(self, statuses: dict[bytes, int]) -> None:
-        """The server published the status of its goals."""
-
-    def probe_answered(self, probe: int) -> None:
-        """A server answered the probe of this number; each live server answers once."""
-
-    def all_delivered(self) -> None:
-        """Nothing that has been taken waits any more."""
-
-
 @dataclass(slots=True)
 class _Question:
     """A request that was sent, and what came back."""
@@ -106,16 +74,26 @@ class _Question:
     answers: list[Any] = field(default_factory=list)
 
 
-class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typed
-    """The one client of an action on a node, shared by all leaves that use it."""
+class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typed
+    """One action as one node sees it (transport.ActionTransport)."""
 
-    def __init__(self, node: Node, action_type: Any, action_name: str, listener: Listener) -> None:
+    def __init__(
+        self,
+        node: Node,
+        action_type: Any,
+        action_name: str,
+        listener: Listener,
+        seen_since: float = NEVER,
+        on_close: Callable[[RosTransport], None] = lambda _: None,
+    ) -> None:
         """Create the client in a callback group of its own.
 
         Raises RuntimeError when this rclpy's low-level client lacks a method that is needed.
         """
         self._lock = threading.RLock()
         self._listener = listener
+        self.seen_since = seen_since
+        self._on_close = on_close
         self._goal_requests: dict[int, _Question] = {}
         self._past_requests: dict[int, _Question] = {}
         self._result_requests: dict[int, _Question] = {}
@@ -282,7 +260,7 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         self._deliver()
 
     def _deliver(self) -> bool:
-        with lock:
+        with host.lock:
             any_came = bool(self._inbox)
             while self._inbox:
                 kind, about, detail = self._inbox.popleft()
@@ -319,18 +297,29 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         """Whether something has been taken, and not been delivered yet."""
         return bool(self._inbox)
 
+    # Discovery
+
+    def servers(self) -> frozenset[bytes]:
+        """Return the GIDs of the servers in sight; raises InvalidHandle where the node is gone."""
+        return servers(self._node, self._action_name)
+
+    def ready(self) -> bool:
+        """Whether all parts of a server are in sight; raises InvalidHandle as well."""
+        return bool(self.server_is_ready())
+
     @property
     def closed(self) -> bool:
         """Whether it takes and sends nothing any more."""
         return self._closed
 
-    def destroy(self) -> None:
+    def close(self) -> None:
         """Destroy the client. Answers that are still under way are lost."""
         with self._lock:
             if self._closed:
                 return
             self._closed = True
             super().destroy()
+        self._on_close(self)
 
 
 def _cancel_code(response: Any, goal_id: bytes | int) -> int:

@@ -1,0 +1,49 @@
+"""What is done with goals when the process ends: by itself, by a signal, or as the child of a fork.
+
+Sends nothing but what a drain does.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+
+from bt_actions.ros.host import host
+from bt_actions.ros.log import log
+from bt_actions.ros.signals import ended_by_signals
+from bt_actions.traffic.drain import drain
+
+
+def close_process() -> None:
+    """Close what a loop that crashed, or never called shutdown, has left; send nothing more.
+
+    For a process that ends: this cannot be undone. A first signal meanwhile waits, and a second one
+    ends the wait.
+    """
+    hurried = False
+
+    def hurry(again: bool, _ends_process: bool) -> None:
+        nonlocal hurried
+        hurried = hurried or again
+
+    with contextlib.suppress(KeyboardInterrupt), ended_by_signals(hurry):
+        with host.lock:
+            host.closing = True
+            endpoints = [endpoint for domain in host.domains for endpoint in domain.open]
+            handles = [handle for endpoint in endpoints for handle in endpoint.goals.values()]
+        left = [handle for handle in handles if not handle.goal.lost or handle.looked_out_for]
+        try:
+            drain(host, left, lambda: hurried)
+        finally:
+            for handle in left:
+                if not handle.is_over:
+                    log.error(f"{handle.goal!r}: the process ends and cannot account for it")
+            with host.lock:
+                host.record.close()
+            log.flush()
+
+
+def disown() -> None:
+    """In the child of a fork: the goals are the parent's, and so is what guards them."""
+    atexit.unregister(close_process)
+    host.disown()

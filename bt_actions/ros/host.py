@@ -1,0 +1,117 @@
+"""The host of this process (traffic/host.py): its clock, its one lock, the log, and the alarm.
+
+The alarm is one plain thread that runs the scheduler while goals are open, ticks or not. It ends
+when none has been open for a while, and starts again with the next. Knows of no node.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+
+from bt_actions.goals.ids import new_goal_id
+from bt_actions.recovery.ledger import Ledger
+from bt_actions.ros.log import log
+from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.host import Trace
+from bt_actions.traffic.scheduler import Scheduler
+from bt_actions.utilities.plain_text import raised
+
+LINGER = 5.0
+"""Seconds without an open goal until its thread ends; to start one for each goal costs more."""
+_SINCE_BOOT = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+
+
+class RosHost:
+    """What the goals of this process have in common."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        """Taken before a lock of rclpy's, or of a transport's, never after."""
+        self.changed = threading.Condition(self.lock)
+        self.log = log
+        self.record = Ledger(log.warning)
+        self.stalls = Stalls(_idle)
+        self.scheduler = Scheduler(
+            self.steady,
+            self.stalls,
+            self._wake,
+            lambda endpoint, error: log.error(f"{endpoint!r}: {raised(error)}"),
+        )
+        self.trace = Trace()
+        self.forks = 0
+        self.closing = False
+        self._domains: dict[int, Domain] = {}
+        self._bell = threading.Condition(self.lock)
+        self._thread: threading.Thread | None = None
+
+    @property
+    def domains(self) -> list[Domain]:
+        """All ROS domains that goals were ever begun in."""
+        return list(self._domains.values())
+
+    def domain(self, number: int) -> Domain:
+        """Return what is shared in the ROS domain of this number."""
+        with self.lock:
+            return self._domains.setdefault(number, Domain(number))
+
+    def steady(self) -> float:
+        """Return seconds that only ever go forward."""
+        return time.monotonic()
+
+    def new_goal_id(self) -> bytes:
+        """Return 16 bytes that no goal has had."""
+        return new_goal_id()
+
+    def random_id(self) -> bytes:
+        """Return 16 bytes that no server knows."""
+        return uuid.uuid4().bytes
+
+    def appears(self) -> None:
+        """Take note that this process begins to see others now; the caller holds the lock."""
+        if self._thread is None:
+            self.stalls.lives(self.steady())  # who was there before has rested until now
+            self.stalls.rests(self.steady())
+
+    def disown(self) -> None:
+        """In the child of a fork: the goals are the parent's, and so is what guards them."""
+        self.forks += 1
+        self.lock._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001 - as threading does
+        self.scheduler.clear()
+        self._thread = None
+        self.stalls.rests(self.steady())
+        self._domains.clear()
+        self.record.disown()
+
+    # The alarm
+
+    def _wake(self) -> None:
+        if self._thread is None or not self._thread.is_alive():
+            self.stalls.lives(self.steady())
+            self._thread = threading.Thread(target=self._run, name="bt_actions-alarm", daemon=True)
+            self._thread.start()
+        else:
+            self._bell.notify()
+
+    def _run(self) -> None:
+        with self.lock:
+            busy_at = self.steady()
+            while self.scheduler.attended or self.steady() - busy_at < LINGER:
+                if self.scheduler.attended:
+                    busy_at = self.steady()
+                self.scheduler.run()
+                self._bell.wait(self.scheduler.wakes_at - self.steady())
+                self.stalls.lives(self.steady())
+            self.stalls.rests(self.steady())
+            self._thread = None
+
+
+def _idle(_: float) -> float:
+    """Return the seconds without work, also those in which the machine was suspended."""
+    return time.clock_gettime(_SINCE_BOOT) - time.process_time()
+
+
+host = RosHost()
+"""The one of this process."""

@@ -1,0 +1,166 @@
+"""A node as traffic/ sees it (transport.Participant), and the one Traffic of each node.
+
+Names, clocks and the graph of rclpy; decides nothing about a goal.
+"""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import os
+import weakref
+from typing import Any
+
+from rclpy.expand_topic_name import expand_topic_name
+from rclpy.node import Node
+
+from bt_actions.goals.terms import Now
+from bt_actions.messages.interfaces import interface_name
+from bt_actions.ros.action_transport import RosTransport
+from bt_actions.ros.alive import is_valid
+from bt_actions.ros.clocks import Clocks
+from bt_actions.ros.exit import close_process, disown
+from bt_actions.ros.graph import enclave
+from bt_actions.ros.host import host
+from bt_actions.ros.in_sight import elsewhere
+from bt_actions.ros.log import log
+from bt_actions.ros.rediscovery import look_for
+from bt_actions.traffic.traffic import Traffic
+from bt_actions.traffic.transport import Listener, Seeker
+from bt_actions.utilities.suggest import did_you_mean, listing
+
+FEEDBACK = "/_action/feedback"
+_ON_NODE = "_bt_actions_participant"
+
+
+class _Sight:
+    """That of a context, as long as any of its nodes is there: the next one gets a new one.
+
+    Or the same, where the user has another node there, of which nobody tells us.
+    """
+
+    def __init__(self, before: _Sight | None) -> None:
+        self.since = host.steady()
+        """Since when it is known here; a new one is blind to nothing."""
+        now = host.stalls.long_times
+        self.long_stalls: int = now if before is None else before.long_stalls
+        """How often this process had stood still for long by then: it may be deaf where an endpoint
+        is made after more of them."""
+        self.nodes: weakref.WeakSet[Node] = weakref.WeakSet()
+
+
+_sights: weakref.WeakKeyDictionary[Any, _Sight] = weakref.WeakKeyDictionary()
+
+
+class NodeParticipant:
+    """What goals see and hear through one node."""
+
+    def __init__(self, node: Node) -> None:
+        """The caller holds the lock."""
+        self.node = node
+        self.clocks = Clocks(node)
+        self.domain: int = node.context.get_domain_id()
+        self.name: str = node.get_name()
+        self.namespace: str = node.get_namespace()
+        sight = _sights.get(node.context)
+        if sight is None or not any(is_valid(each) for each in sight.nodes):
+            host.appears()
+            sight = _sights[node.context] = _Sight(sight)
+        sight.nodes.add(node)
+        self.seen_since, self.long_stalls = sight.since, sight.long_stalls
+        self.traffic = Traffic(host, self)
+        self._warned_of: set[str] = set()
+
+    @classmethod
+    def of(cls, node: Node) -> NodeParticipant:
+        """Return the one of `node`, or a new one where its traffic was destroyed."""
+        with host.lock:
+            found: NodeParticipant | None = getattr(node, _ON_NODE, None)
+            if found is None or found.traffic.closed:
+                found = cls(node)
+                setattr(node, _ON_NODE, found)  # lives as long as the node does
+            return found
+
+    def now(self) -> Now:
+        """Return this moment, by the steady clock and by the node's own."""
+        return self.clocks.now()
+
+    def alive(self) -> bool:
+        """Whether the node is there, and its context was not shut down."""
+        return is_valid(self.node)
+
+    def full_name(self, action: str) -> str:
+        """Return the full name of an action; raises ValueError for one that ROS refuses."""
+        name: str = expand_topic_name(action, self.name, self.namespace)
+        return name
+
+    def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
+        """Become a client of an action."""
+        self._warn_of_remapping(name)
+        return RosTransport(self.node, action_type, name, listener, self.seen_since)
+
+    def _warn_of_remapping(self, name: str) -> None:
+        """Say it, once for a name, where a rule would have it another: ROS remaps no action."""
+        other, part = self.node.resolve_service_name(name), f"{name}/_action/send_goal"
+        remapped = self.node.resolve_service_name(part) != part
+        if other != name and not remapped and name not in self._warned_of:
+            self._warned_of.add(name)
+            log.warning(
+                f"a rule remaps {name} to {other}, and has no effect: ROS does not remap actions. "
+                f"Name {other} where the action is used, set the namespace of the node, or remap "
+                f"its parts: {part}, cancel_goal, get_result, feedback and status"
+            )
+
+    def seek(self, seeker: Seeker, name: str, *, at_once: bool) -> None:
+        """Have a new participant look for what is missed.
+
+        Not where remapping rules give our node another server than that would find.
+        """
+        if not self._is_remapped(name):
+            look_for(seeker, name, self.domain, self._enclave, at_once=at_once)
+
+    @functools.cached_property
+    def _enclave(self) -> str:
+        return enclave(self.node)
+
+    def _is_remapped(self, name: str) -> bool:
+        """Whether rules of this node lead any part of an action elsewhere."""
+        topics = [f"{name}/_action/{part}" for part in ("status", "feedback")]
+        services = [f"{name}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
+        resolve_topic, resolve = self.node.resolve_topic_name, self.node.resolve_service_name
+        return any(resolve_topic(topic) != topic for topic in topics) or any(
+            resolve(service) != service for service in services
+        )
+
+    def instead(self, action_type: Any, name: str) -> str:
+        """Say what is in sight where the action is not: another type, or a name like it."""
+        actions = dict[str, str]()
+        try:
+            for topic, _ in self.node.get_topic_names_and_types():
+                if topic.endswith(FEEDBACK):
+                    for info in self.node.get_publishers_info_by_topic(topic):
+                        kind = info.topic_type.removesuffix("_FeedbackMessage")
+                        actions[topic.removesuffix(FEEDBACK)] = kind
+        except Exception:  # noqa: BLE001 - our node was destroyed
+            return ""
+        ours, kind = interface_name(action_type), actions.get(name)
+        if kind == ours:
+            return ": it is in sight, but was not ready, or has requests enough to answer"
+        if kind is not None:
+            return f"; there is one of another type or version, {kind}"
+        if not actions:
+            return "; no action server at all is in sight in this ROS domain"
+        if found := elsewhere(name, ours, {name: (its,) for name, its in actions.items()}):
+            return found
+        if of_its_type := sorted(name for name in actions if actions[name] == ours):
+            return f"; of its type there is {listing(of_its_type)}"
+        return did_you_mean(name, actions)
+
+
+def traffic_of(node: Node) -> Traffic:
+    """Return the one Traffic of `node`, or a new one where that was destroyed."""
+    return NodeParticipant.of(node).traffic
+
+
+atexit.register(close_process)
+os.register_at_fork(after_in_child=disown)

@@ -1,0 +1,166 @@
+"""Whether a goal may be sent now, and what keeps it back.
+
+One verdict for each question; it sends nothing and tells no goal anything. It may look at other
+endpoints first, so that what was lost there, and is back, is canceled first. All under the host's
+lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import Enum
+from typing import Any
+
+from bt_actions.goals.policy import Busy, Outcome
+from bt_actions.goals.terms import State
+from bt_actions.servers.presence import Server
+from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.host import Host
+from bt_actions.traffic.watcher import BESIDE
+
+IN_FLIGHT = 8
+"""Goal requests of this process under way at a server; its queue holds 10, and drops what is over
+silently."""
+
+
+class Verdict(Enum):
+    """Whether to send, and else why not."""
+
+    SEND = "it may be sent"
+    NOT_ASKED = "it does not wait for its server"
+    CLOSING = "the process ends, or the node is gone"
+    UNHEARD = "the server may not hear us, or be two"
+    NO_SERVER = "no server, or more than one, or nobody knows yet"
+    OVERTAKES = "it might arrive before another goal's request"
+    CONFLICTS = "what it would use still has a goal that was given up"
+    FULL = "the server has requests enough to answer"
+
+
+class Admission:
+    """For the goals of one node."""
+
+    def __init__(
+        self,
+        host: Host,
+        domain: Domain,
+        endpoints: Mapping[str, Endpoint],
+        open_to: Callable[[Any, str], Endpoint],
+    ) -> None:
+        """`endpoints` are this node's, by name; `open_to` opens one more, to a type and a name."""
+        self._host, self._domain, self._endpoints, self._open_to = host, domain, endpoints, open_to
+
+    def verdict(self, handle: GoalHandle) -> Verdict:
+        """Say whether to send it now."""
+        endpoint, now = handle.endpoint, self._host.steady()
+        if handle.goal.state is not State.WAITING_FOR_SERVER:
+            return Verdict.NOT_ASKED
+        if self._host.closing or endpoint.orphaned or not endpoint.participant.alive():
+            return Verdict.CLOSING
+        if endpoint.holds_back(now):
+            return Verdict.UNHEARD
+        if endpoint.watch.state(now) is not Server.READY:
+            return Verdict.NO_SERVER
+        if self._may_overtake(handle):
+            return Verdict.OVERTAKES
+        if self._conflicts(handle):
+            return Verdict.CONFLICTS
+        return Verdict.FULL if self._in_flight(endpoint) >= IN_FLIGHT else Verdict.SEND
+
+    def why_not(self, handle: GoalHandle) -> str:
+        """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
+        endpoint = handle.endpoint
+        if handle.goal.outcome is Outcome.SERVER_BUSY:
+            return self._in_use(handle)
+        if any(_conflicts_with(each, handle) for each in self._domain.open):
+            return ": what it would use still has a goal that was given up, and would run both"
+        if self._may_overtake(handle):
+            return ": it has not answered another goal's request, and might run that one last"
+        return endpoint.participant.instead(endpoint.action_type, endpoint.name)
+
+    def _in_use(self, handle: GoalHandle) -> str:
+        """Say who has what the goal waited for, where that is not a goal that just runs."""
+        for other in self._domain.resources.holders(handle.goal.resources):
+            if other.paused_at is not None and not other.goal.sent:
+                return f": it is the turn of {other.name}, whose tree is paused"
+            if other.goal.outcome is not None and not other.accounted_for:
+                told = other.goal.cancel_said
+                return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
+        return ""
+
+    def _in_flight(self, endpoint: Endpoint) -> int:
+        """Count the goal requests at the server that wait for their answer, of all nodes."""
+        endpoints = self._domain.open_to((endpoint.name, endpoint.action_type))
+        return sum(handle.goal.in_flight for each in endpoints for handle in each.goals.values())
+
+    def _may_overtake(self, handle: GoalHandle) -> bool:
+        """Whether the request of a goal that it replaces, or that replaces it, is under way.
+
+        From two nodes they arrive in any order, and the server runs the last one.
+        """
+        holders = self._domain.resources.holders(handle.goal.resources)
+        at = holders.index(handle)
+        rivals = holders[:at] if handle.goal.busy is Busy.REPLACE else []
+        rivals += [other for other in holders[at + 1 :] if other.goal.busy is Busy.REPLACE]
+        return any(
+            other.goal.unanswered and _same_server(other.endpoint, handle.endpoint)
+            for other in rivals
+        )
+
+    def _conflicts(self, handle: GoalHandle) -> bool:
+        """Whether a goal that any node of this process gave up must be canceled first.
+
+        One that was lost holds nothing any more; should its server be back, it is canceled first.
+        """
+        to_see = dict.fromkeys(each for each in self._domain.open if _has_lost(each, handle))
+        left = {(each.name, each.action_type): None for each in to_see}
+        if handle.goal.busy in (Busy.WAIT, Busy.FAIL):
+            for name, action_type in self._domain.lost_with(handle.goal.resources):
+                left[name, action_type] = None
+                if name not in self._endpoints:  # another's server, which nobody speaks to any more
+                    self._open_to(action_type, name)
+        for name, action_type in left:
+            ours = self._endpoints.get(name)
+            if ours is not None and ours.action_type is action_type:
+                to_see[ours] = None
+        now = self._host.steady()
+        for endpoint in to_see:  # all of them first: one may see what another has lost
+            endpoint.look(now)
+        return any(
+            _conflicts_with(each, handle) or _may_come_back_for(each, handle, now)
+            for each in self._domain.open
+        )
+
+
+def _same_server(one: Endpoint, other: Endpoint) -> bool:
+    """Whether both, which may belong to two nodes of a domain, mean the same action."""
+    return one.name == other.name and one.action_type is other.action_type
+
+
+def _near(endpoint: Endpoint, handle: GoalHandle) -> list[GoalHandle]:
+    """Return the goals here that this one would share a server, or resources, with."""
+    same, wanted = _same_server(endpoint, handle.endpoint), handle.goal.resources
+    return [each for each in endpoint.goals.values() if same or each.goal.resources & wanted]
+
+
+def _has_lost(endpoint: Endpoint, handle: GoalHandle) -> bool:
+    """Whether goals were lost here that this one might run beside."""
+    return any(other.goal.lost for other in _near(endpoint, handle))
+
+
+def _conflicts_with(endpoint: Endpoint, handle: GoalHandle) -> bool:
+    """Whether a goal that was given up here may still run where this one wants to."""
+    same = _same_server(endpoint, handle.endpoint)
+    return any(
+        other.goal.blocks(handle.goal, same_server=same) for other in _near(endpoint, handle)
+    )
+
+
+def _may_come_back_for(endpoint: Endpoint, handle: GoalHandle, now: float) -> bool:
+    """Whether a goal was lost here whose server may only be shown later than that of this one.
+
+    It shares a resource with this one, and is canceled first where its server is seen in time.
+    """
+    if handle.goal.busy not in (Busy.WAIT, Busy.FAIL) or _same_server(endpoint, handle.endpoint):
+        return False
+    return _has_lost(endpoint, handle) and now - handle.endpoint.in_sight_since < BESIDE

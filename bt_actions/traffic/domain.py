@@ -1,0 +1,64 @@
+"""What all nodes of a process in one ROS domain share: resources, open endpoints, lost goals.
+
+A table; it decides nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from bt_actions.goals.resources import Resources
+from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic.handle import Endpoint, GoalHandle
+
+LOST_KEPT = 100
+"""Goals of one action remembered in case their server, or their request, turns up: the newest."""
+Action = tuple[str, Any]
+"""Name and type."""
+
+
+class Domain:
+    """What all nodes of this process in one ROS domain share."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.resources: Resources[GoalHandle] = Resources()
+        self.open: dict[Endpoint, None] = {}
+        """The endpoints with goals, of all nodes, in the order in which they came."""
+        self.lost_sight = False
+        """A server that was in sight is not any more: what else its process serves may not be."""
+        self.known: set[Action] = set()
+        """The actions that had a server once."""
+        self._lost: dict[Action, list[GoalHandle]] = {}
+        self._cancels: dict[Action, Cancels] = {}
+
+    def cancels_at(self, action: Action) -> Cancels:
+        """Return the cancel requests of this process to an action."""
+        return self._cancels.setdefault(action, Cancels())
+
+    def open_to(self, action: Action) -> list[Endpoint]:
+        """Return the endpoints with goals to this action."""
+        return [each for each in self.open if (each.name, each.action_type) == action]
+
+    def keep_lost(
+        self, action: Action, handle: GoalHandle, forget: Callable[[bytes], None]
+    ) -> None:
+        """Remember a lost goal whose endpoint goes: its server may be back for the next one."""
+        kept = self._lost.setdefault(action, [])
+        kept.append(handle)
+        for forgotten in kept[:-LOST_KEPT]:
+            forget(forgotten.goal.id)
+        del kept[:-LOST_KEPT]
+
+    def lost_with(self, resources: frozenset[str]) -> list[Action]:
+        """Return the actions of which goals are remembered that had some of these resources."""
+        return [
+            action
+            for action, kept in self._lost.items()
+            if any(handle.goal.resources & resources for handle in kept)
+        ]
+
+    def take_lost(self, action: Action) -> list[GoalHandle]:
+        """Give them to a new endpoint."""
+        return self._lost.pop(action, [])

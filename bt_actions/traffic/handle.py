@@ -1,0 +1,173 @@
+"""A goal on its way, with what its owner and its server need to know; and whom it belongs to.
+
+Values, and the protocols by which the parts of traffic/ know each other. Nothing is decided here.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.terms import Event, State
+from bt_actions.servers.presence import Server, ServerWatch
+from bt_actions.servers.replies import Replies, Told
+from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic.transport import ActionTransport, Participant
+
+NEVER = float("-inf")
+FEEDBACK_KEPT = 100
+"""Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
+
+
+class Reporter(Protocol):
+    """Who reports what becomes of goals (Traffic)."""
+
+    def note(self, handle: GoalHandle) -> None:
+        """Report a goal's change."""
+
+    def notify(self, change: Change | None) -> None:
+        """Tell the observers, and whoever waits; None: something may go on, or can be read."""
+
+
+class Endpoint(Protocol):
+    """One action as one node sees it (ActionEndpoint), as its parts and its neighbors know it."""
+
+    participant: Participant
+    reporter: Reporter
+    name: str
+    action_type: Any
+    users: int
+    goals: dict[bytes, GoalHandle]
+    watch: ServerWatch
+    transport: ActionTransport
+    cancels: Cancels
+    orphaned: bool
+    """Its node is gone: nobody can want its goals any more."""
+    heard_at: float
+    """When its servers were last heard of."""
+    in_sight_since: float
+    """Since when a server has been shown without a break that was seen."""
+
+    @property
+    def is_parents(self) -> bool:
+        """Whether this was made before a fork, and we are the child: the goals are not ours."""
+
+    @property
+    def is_waited_for(self) -> bool:
+        """Whether a goal is still to be sent."""
+
+    def tell(
+        self, handle: GoalHandle, event: Event, detail: Any = None, message: Any = None
+    ) -> None:
+        """Tell a goal what happened and do what it says."""
+
+    def pass_on(self, handle: GoalHandle, told: Told) -> None:
+        """Tell a goal what is believed of what was said of it, or seen."""
+
+    def poll(self, handle: GoalHandle) -> None:
+        """Let the goal's deadlines take effect."""
+
+    def mind(self, handle: GoalHandle) -> None:
+        """Poll a goal on nobody's tick."""
+
+    def take_in(self, handle: GoalHandle) -> None:
+        """See to this goal from now on."""
+
+    def retire(self, handle: GoalHandle) -> None:
+        """See to it no more."""
+
+    def pump(self) -> None:
+        """Take what has arrived."""
+
+    def look(self, now: float) -> Server:
+        """Observe the server, tell the goals what that means for them, and return its state."""
+
+    def see(self) -> None:
+        """Observe who is in sight, and conclude nothing."""
+
+    def probe(self) -> None:
+        """Ask the server just in order to be answered."""
+
+    def ask_to_cancel(self, goal_id: bytes) -> None:
+        """Ask the server to cancel a goal, as soon as its queue has room."""
+
+    def in_doubt(self, now: float) -> float:
+        """Return for how many seconds a server that is silent may not have heard us; or 0."""
+
+    def holds_back(self, now: float) -> bool:
+        """Whether nothing is sent though a server is in sight."""
+
+    def go_on_with(self, transport: ActionTransport) -> None:
+        """Use another transport, of which nothing is known yet."""
+
+
+@dataclass(eq=False, slots=True)
+class GoalHandle:
+    """A goal on its way, with what its owner and its server need to know."""
+
+    goal: Goal
+    endpoint: Endpoint
+    """Where it is sent; the endpoint that sees a lost goal's server again takes it over."""
+    reporter: Reporter
+    """Of the node that is told of its changes: where it was begun, or was adopted later."""
+    owner: Any
+    """The leaf; None where it is gone, and a second server has taken its goal, too."""
+    name: str
+    """The leaf's."""
+    begun_in: object = None
+    """What was ticking at the time (traffic/begun.py); None where nobody said it."""
+    attempt: int = 1
+    keeps_feedback: bool = False
+    feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
+    replies: Replies = field(init=False)
+    told_unknown: bool = False
+    """The log says that it is not accounted for; and later, on whatever node, that it is."""
+    told_gone: bool = False
+    look_out_left: float | None = None
+    """Seconds for which a server that went away with it is looked out for yet; None: none did."""
+    kept_since: float | None = None
+    """Since when it is not sent though a server is in sight (Route.holds_back), steady clock."""
+    paused_at: float | None = None
+    begun_at: float = NEVER
+    not_gone_before: float = NEVER
+    """Until when it is no news that its server is not shown: it may be stopped for less than its
+    lease, or not be discovered yet. Both in seconds of the steady clock."""
+
+    def __post_init__(self) -> None:
+        self.replies = Replies(self.goal)
+
+    @property
+    def accounted_for(self) -> bool:
+        """Whether the goal's end is known."""
+        goal = self.goal
+        return goal.outcome is not None and goal.end is not End.UNKNOWN and not goal.unconfirmed
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is left to wait for: nor a server that may only have stood still."""
+        return self.accounted_for and not self.looked_out_for
+
+    @property
+    def looked_out_for(self) -> bool:
+        """Whether a server is looked out for that went away with it, and has not told its end."""
+        return self.goal.lost and bool(self.look_out_left)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What an observer is told: a goal has a new state, outcome or end."""
+
+    time: float
+    handle: GoalHandle
+    state: State
+    outcome: Outcome | None
+    end: End
+    reason: str
+
+
+Observer = Callable[[Change | None], None]
+"""Called under the lock, on any thread; None means: something to read, no change of a goal."""

@@ -1,0 +1,81 @@
+"""Hands goals that were lost, or left, from one endpoint to another of the same action.
+
+Each node discovers for itself; so a goal whose server has gone for one node is seen to by whichever
+node of this process sees that server again, and is canceled first. What is believed of the server
+is servers/'s to say. All under the host's lock.
+"""
+
+from __future__ import annotations
+
+from bt_actions.goals.policy import End
+from bt_actions.goals.terms import Event
+from bt_actions.servers.presence import LEASE, Server
+from bt_actions.traffic.domain import LOST_KEPT, Domain
+from bt_actions.traffic.handle import NEVER, Endpoint
+from bt_actions.traffic.host import Host
+from bt_actions.traffic.route import TOO_NEW
+
+
+def take_over(endpoint: Endpoint, domain: Domain, now: float) -> None:
+    """Take lost goals of other nodes whose server is in sight here: it is to cancel them first."""
+    for other in domain.open_to((endpoint.name, endpoint.action_type)):
+        if other is endpoint:
+            continue
+        for handle in list(other.goals.values()):
+            servers = handle.replies.sent_to
+            if handle.goal.lost and _sees_more(endpoint, other, servers, now):
+                handle.endpoint = endpoint
+                handle.replies.taken_over()
+                endpoint.take_in(handle)
+                other.retire(handle)
+
+
+def _sees_more(endpoint: Endpoint, other: Endpoint, servers: frozenset[bytes], now: float) -> bool:
+    """Whether one of `servers` is here that has gone for `other`, or that it takes for a ghost.
+
+    What both see is left where it is: a ghost would be handed to and fro.
+    """
+    watch = endpoint.watch
+    if not servers & watch.gids or watch.state(now) is Server.ABSENT:
+        return False
+    ghost_there = watch.all_live(now) and not other.watch.all_live(now)
+    return other.orphaned or other.watch.gone(now, servers) or ghost_there
+
+
+def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
+    """Take over what was lost, or left, at this action before, to cancel it first."""
+    for handle in domain.take_lost((endpoint.name, endpoint.action_type)):
+        saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at
+        if handle.reporter is not endpoint.reporter and not saw_it:
+            first = handle.not_gone_before == NEVER  # a later node need only have discovered
+            until = host.steady() + (LEASE if first else TOO_NEW)
+            handle.not_gone_before = max(handle.not_gone_before, until)
+        handle.endpoint, handle.reporter = endpoint, endpoint.reporter
+        handle.replies.taken_over()
+        endpoint.take_in(handle)
+
+
+def park(endpoint: Endpoint, host: Host, domain: Domain, *, all_of_them: bool = False) -> None:
+    """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
+    for handle in list(endpoint.goals.values()):
+        goal = handle.goal
+        if all_of_them or (goal.outcome is not None and not goal.holding):
+            endpoint.tell(handle, Event.NODE_CLOSED)
+        if goal.lost:
+            handle.look_out_left = 0.0  # nobody does from now on
+            domain.keep_lost((endpoint.name, endpoint.action_type), handle, host.record.strike)
+            endpoint.retire(handle)
+
+
+def bound_the_lost(endpoint: Endpoint, host: Host) -> None:
+    """Give up the oldest of too many lost goals; none that its server may still decide on."""
+    settled = [
+        handle
+        for handle in endpoint.goals.values()
+        if handle.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
+        and handle.goal.outcome is not None
+        and not handle.goal.unconfirmed
+    ]
+    for handle in settled[:-LOST_KEPT]:
+        endpoint.tell(handle, Event.PROCESS_EXITING)
+        host.record.strike(handle.goal.id)

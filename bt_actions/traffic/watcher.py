@@ -1,0 +1,206 @@
+"""Watches over the server of one endpoint: looks at discovery, asks, and tells the goals.
+
+Decides when to look, and takes note of what is seen; who is alive is servers/presence.py's to say,
+and what follows for a goal servers/replies.py's. All under the host's lock.
+"""
+
+from __future__ import annotations
+
+import contextlib
+
+from bt_actions.goals.terms import Event
+from bt_actions.servers.presence import Server
+from bt_actions.traffic import handover
+from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.handle import NEVER, Endpoint, GoalHandle
+from bt_actions.traffic.host import Host
+from bt_actions.traffic.route import Route
+
+LOOK_WHILE_WAITING = 0.05
+LOOK_WHILE_RUNNING = 0.2
+LOOK_WHILE_LOST = 1.0
+PUMP_EVERY = 0.01
+"""Seconds between two looks at a server: somebody waits for it; goals run on it; only its return
+would matter. The last: between two takes of answers, where nobody spins."""
+LATE = 0.5
+"""Seconds by which a look is so late that answers may have come in between, unseen."""
+SILENT_FOR = 40.0
+"""Seconds without a word of their server until goals whose node is gone are left to whoever can see
+whether it is there: longer than a ghost is shown, or a question waits (asking.DENIED_FOR_GOOD)."""
+BESIDE = 1.0
+"""Seconds for which a server may be in sight before another one that was there all the time, or
+that came back with it; 0.5 measured."""
+
+
+class Watcher:
+    """The watch over one endpoint's server."""
+
+    def __init__(self, endpoint: Endpoint, host: Host, domain: Domain, route: Route) -> None:
+        self._endpoint, self._host, self._domain, self._route = endpoint, host, domain, route
+        self._look_at = 0.0
+        self._looked_like = Server.ABSENT  # at the last look
+        self._was_away = False  # seen between two looks
+        self._held_up = (True, True)  # by a server that has just come; by `Route.holds_back`
+        self._looked_out_at = host.steady()
+        self._warned_crowd = False
+
+    def attend(self, now: float) -> float:
+        """Do what is due; return the seconds until there is more."""
+        endpoint = self._endpoint
+        self._look_out(now)
+        if now >= self._look_at:
+            self.look(now)
+            settling = endpoint.watch.state(now) is Server.SETTLING
+            if settling or endpoint.is_waited_for:
+                self._look_at = now + LOOK_WHILE_WAITING
+            elif any(not handle.is_over for handle in endpoint.goals.values()):
+                self._look_at = now + LOOK_WHILE_RUNNING
+            else:
+                self._look_at = now + LOOK_WHILE_LOST
+        wait = self._look_at - now
+        endpoint.cancels.go_on(now)
+        if endpoint.orphaned or self._route.elsewhere:
+            endpoint.pump()
+            if not all(handle.accounted_for for handle in endpoint.goals.values()):
+                wait = min(wait, PUMP_EVERY)
+        for handle in list(endpoint.goals.values()):
+            endpoint.mind(handle)
+            due = handle.goal.due_in(endpoint.participant.now())
+            if due is not None and handle.paused_at is None:
+                wait = min(wait, due)
+        handover.bound_the_lost(endpoint, self._host)
+        return max(wait, 0.001)
+
+    def rest(self) -> None:
+        """No look is due any more, and none will be late."""
+        self._look_at = 0.0
+
+    def begin_anew(self) -> None:
+        """Nothing of what was seen counts any more."""
+        self._looked_like = Server.ABSENT
+        self._look_at = 0.0
+
+    def look(self, now: float) -> Server:
+        """Observe the server, tell the goals what that means for them, and return its state."""
+        endpoint, watch = self._endpoint, self._endpoint.watch
+        if not endpoint.participant.alive():
+            self._orphan()
+            self._look_blindly(now)
+            return Server.ABSENT
+        self._take_in(now)
+        if endpoint.transport.closed:  # by what came, and nobody used the endpoint
+            return Server.ABSENT
+        before = self._looked_like
+        try:
+            self._observe(now)
+        except Exception:  # noqa: BLE001 - the participant was destroyed since
+            if not self._route.fall_back():
+                self._orphan()
+            return Server.ABSENT
+        handover.adopt(endpoint, self._host, self._domain)
+        handover.take_over(endpoint, self._domain, now)
+        runs = any(handle.goal.sent and not handle.goal.lost for handle in endpoint.goals.values())
+        if self._route.wants_question(now) or watch.wants_probe(now, runs=runs):
+            endpoint.probe()
+        for handle in list(endpoint.goals.values()):
+            gone = watch.gone(now, handle.replies.sent_to)
+            if not gone:
+                handle.not_gone_before = NEVER  # it has been discovered
+            if (gone and now < handle.not_gone_before) or self._is_hidden(handle):
+                continue  # it has not been discovered yet, though its status may have come already
+            if handle.goal.sent:
+                if gone and not handle.goal.lost:
+                    endpoint.pump()  # its last words
+                endpoint.pass_on(handle, handle.replies.looked(watch, now))
+        state = self._looked_like = watch.state(now)
+        if before is Server.ABSENT or self._was_away:
+            endpoint.in_sight_since = now
+        self._was_away = False
+        held_up = (now - endpoint.in_sight_since < BESIDE, self._route.holds_back(now))
+        if any(was and not still for was, still in zip(self._held_up, held_up, strict=True)):
+            endpoint.reporter.notify(None)  # what was held up for it may be sent
+        self._held_up = held_up
+        if state is not before:
+            endpoint.reporter.notify(None)
+            self._domain.lost_sight |= state is Server.ABSENT
+            self._domain.known.add((endpoint.name, endpoint.action_type))
+        self._route.seek(now)
+        if state is Server.AMBIGUOUS and not self._warned_crowd:
+            self._warned_crowd = True
+            name = endpoint.name
+            self._host.log.warning(
+                f"{name}: two action servers answer to this name; no more is sent"
+            )
+        elif state is Server.READY:
+            self._warned_crowd = False
+        return state
+
+    def see(self) -> None:
+        """Observe who is in sight; what follows for the server is for the next look to say."""
+        with contextlib.suppress(Exception):
+            now = self._host.steady()
+            self._observe(now, concludes=False)
+            self._was_away |= self._endpoint.watch.state(now) is Server.ABSENT
+
+    def _observe(self, now: float, *, concludes: bool = True) -> None:
+        """Let the watch see what discovery shows; raises where our node is gone."""
+        transport = self._endpoint.transport
+        ready, servers = transport.ready(), transport.servers()
+        self._endpoint.watch.observe(now, ready, servers, concludes=concludes)
+
+    def _look_out(self, now: float) -> None:
+        """Count the time for which servers are looked out for; not that of a stall.
+
+        Nor that after one, in which a server that is there may be out of sight.
+        """
+        passed = min(now - self._looked_out_at, 2 * LOOK_WHILE_RUNNING)
+        self._looked_out_at = now
+        if self._host.stalls.servers_take(now) > 0.0:
+            return
+        for handle in self._endpoint.goals.values():
+            if handle.goal.lost and handle.look_out_left:
+                handle.look_out_left = max(0.0, handle.look_out_left - passed)
+
+    def _take_in(self, now: float) -> None:
+        """What answers of several came in time count, though nobody spun the node."""
+        if self._endpoint.watch.is_crowded:
+            late = self._look_at and now - self._look_at > LATE
+            if late or self._host.stalls.answers_take(self._host.steady()):
+                self._endpoint.watch.stood_still(now)
+            self._endpoint.pump()
+
+    def _look_blindly(self, now: float) -> None:
+        """Of the servers that were shown when the node went, find out by asking who lives."""
+        endpoint, watch = self._endpoint, self._endpoint.watch
+        self._take_in(now)
+        if not watch.is_crowded or endpoint.transport.closed:
+            return
+        watch.observe(now, True, watch.gids)
+        if watch.wants_probe(now):
+            endpoint.probe()
+        for handle in list(endpoint.goals.values()):
+            if handle.goal.sent:
+                endpoint.pass_on(handle, handle.replies.looked(watch, now))
+
+    def _is_hidden(self, handle: GoalHandle) -> bool:
+        """Whether a server of this goal may be out of sight because this process stood still."""
+        sent_to, now = handle.replies.sent_to, self._host.steady()
+        watch = self._endpoint.watch
+        in_sight = sent_to <= watch.gids and not watch.gone(now, sent_to)
+        return not in_sight and self._host.stalls.servers_take(now) > 0.0
+
+    def _orphan(self) -> None:
+        """Our node is gone, or its context: nobody can want these goals any more."""
+        endpoint, now = self._endpoint, self._host.steady()
+        if not endpoint.orphaned:
+            endpoint.orphaned, endpoint.heard_at = True, now
+            if any(not handle.accounted_for for handle in endpoint.goals.values()):
+                self._host.log.warning(f"{endpoint.name}: the node is gone; canceling what it left")
+        for handle in list(endpoint.goals.values()):  # also one that was begun since
+            handle.look_out_left = 0.0  # from here nobody sees it come back
+            if handle.goal.outcome is None:
+                endpoint.tell(handle, Event.INTERRUPTED)
+        patience = max((each.goal.drains_within for each in endpoint.goals.values()), default=0.0)
+        silent = self._host.steady() - endpoint.heard_at > max(SILENT_FOR, patience)
+        if silent and not self._host.stalls.answers_take(self._host.steady()):
+            handover.park(endpoint, self._host, self._domain, all_of_them=True)
