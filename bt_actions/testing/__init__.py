@@ -1,5 +1,33 @@
-"""Virtual time: a network on which servers stand and clients speak, without ROS."""
+"""Trees tested in virtual time, without ROS: a network, simulated servers, a runner.
 
+What a tree sends here is decided by the same code as on a robot; only time and messages are played,
+so that an hour takes milliseconds and each run is the same. The servers are those of
+`bt_actions.simulation`, with all their faults: give them a VirtualNetwork in place of a node.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+from bt_actions.testing.backend import VirtualBackend
 from bt_actions.testing.network import VirtualNetwork
+from bt_actions.testing.runner import VirtualRunner
 
-__all__ = ["VirtualNetwork"]
+if TYPE_CHECKING:
+    from bt_actions.simulation import Script, ScriptedServer, Simulation
+
+__all__ = [
+    "Script",
+    "ScriptedServer",
+    "Simulation",
+    "VirtualBackend",
+    "VirtualNetwork",
+    "VirtualRunner",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name in __all__:
+        return getattr(importlib.import_module("bt_actions.simulation"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -10,6 +10,7 @@ import pytest
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool
 
+from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
 from bt_actions.wiring import backend_of
 from tests.support.waiting import until
@@ -62,6 +63,32 @@ class Ros:
         self._node.executor = None
 
 
+class Virtual:
+    """The network in virtual time."""
+
+    namespace = "/house"
+
+    def __init__(self) -> None:
+        self._network = VirtualNetwork(self.namespace)
+        self.backend: Backend = VirtualBackend(self._network)
+
+    def serve(self, service_type: type, name: str, answer: Callable[[Any], Any]) -> None:
+        """Offer a service."""
+        self._network.provide(service_type, name, answer)
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        """Let time pass until something is so."""
+        while not condition():
+            assert self._network.now() < 60.0
+            self._network.timeline.advance(self._network.now() + 0.1)
+
+
+@pytest.fixture
+def virtual() -> World:
+    """A network of its own for each test."""
+    return Virtual()
+
+
 @pytest.fixture
 def ros(node: Any) -> Iterator[World]:
     """The node of all tests."""
@@ -70,7 +97,7 @@ def ros(node: Any) -> Iterator[World]:
     world.close()
 
 
-@pytest.fixture(params=["ros"])
+@pytest.fixture(params=[pytest.param("ros", marks=pytest.mark.ros), "virtual"])
 def world(request: pytest.FixtureRequest) -> World:
     """Each Backend there is."""
     world: World = request.getfixturevalue(request.param)

@@ -1,0 +1,198 @@
+"""What a tree is set up with in virtual time: the Backend of traffic/backend.py.
+
+Topics and services are those of the network; nothing on it is ever undiscovered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from bt_actions.goals.terms import Now
+from bt_actions.testing.host import VirtualHost
+from bt_actions.testing.network import VirtualNetwork
+from bt_actions.testing.transport import VirtualParticipant
+from bt_actions.traffic.drain import drain
+from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.traffic import Traffic
+
+
+class VirtualBackend:
+    """The virtual network as one node sees it; give it to `setup` in a node's place."""
+
+    def __init__(self, network: VirtualNetwork, *, seed: int = 0) -> None:
+        """Goal ids, and the pauses before retries, depend on `seed` alone."""
+        self.network = network
+        self.host = VirtualHost(network.timeline, network.log, seed)
+        self.participant = VirtualParticipant(network, "tree", network.namespace)
+        self.traffic = Traffic(self.host, self.participant)
+        self.clock = VirtualClock(network)
+        self.randomness = self.host.randomness
+
+    def service(self, service_type: type, name: str) -> VirtualService:
+        """Become a client of a service."""
+        return VirtualService(self.network, service_type, name, self.wake)
+
+    def subscription(
+        self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
+    ) -> VirtualSubscription:
+        """Listen to a topic."""
+        return VirtualSubscription(self.network, message_type, topic, qos, take)
+
+    def publisher(self, message_type: type, topic: str, qos: str) -> VirtualSpeaker:
+        """Become a publisher on a topic."""
+        return VirtualSpeaker(self.network, topic, qos)
+
+    def drain(
+        self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
+    ) -> list[GoalHandle]:
+        """Cancel these goals and let time pass until each is accounted for."""
+        return drain(self.host, handles, hurry)
+
+    def wake(self) -> None:
+        """Have the tree ticked soon."""
+        self.traffic.notify(None)
+
+    def log(self, level: str, text: str) -> None:
+        """Write a line of the tree's to the network's log."""
+        self.network.log.add(level, text)
+
+
+class VirtualClock:
+    """Both clocks of a node are the virtual time."""
+
+    def __init__(self, network: VirtualNetwork) -> None:
+        self._network = network
+
+    def now(self) -> Now:
+        """This moment."""
+        return Now(self._network.now(), self._network.now())
+
+    def stamp(self) -> int:
+        """This moment in nanoseconds."""
+        return int(self._network.now() * 1e9)
+
+
+class VirtualService:
+    """A client of one service, and its call under way."""
+
+    def __init__(
+        self, network: VirtualNetwork, service_type: type, name: str, wake: Callable[[], None]
+    ) -> None:
+        self.name = network.expand(name)
+        self._network = network
+        self._type = service_type
+        self._wake = wake
+        self._call: list[Any] | None = None
+        """The answer of the call under way, once it is there."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether the service is there."""
+        return self._network.service(self._type, self.name) is not None
+
+    @property
+    def calling(self) -> bool:
+        """Whether a call was begun and neither answered nor dropped since."""
+        return self._call is not None
+
+    @property
+    def answered(self) -> bool:
+        """Whether the answer of the call is here."""
+        return bool(self._call)
+
+    def why_absent(self) -> str:
+        """Say nothing more."""
+        return ""
+
+    def call(self, request: Any) -> None:
+        """Begin a call."""
+        call: list[Any] = []
+        self._call = call
+        if served := self._network.service(self._type, self.name):
+            answer, takes = served
+
+            def reply() -> None:
+                response = answer(request)
+                self._network.timeline.call_in(takes, lambda: self._network.soon(arrive, response))
+
+            def arrive(response: Any) -> None:
+                if self._call is call:
+                    call.append(response)
+                    self._wake()
+
+            self._network.soon(reply)
+
+    def answer(self) -> Any:
+        """Take the answer of a call that was answered."""
+        call, self._call = self._call, None
+        assert call
+        return call[0]
+
+    def drop(self) -> None:
+        """Take no interest in an answer any more."""
+        self._call = None
+
+    def close(self) -> None:
+        """Drop the call."""
+        self.drop()
+
+
+class VirtualSubscription:
+    """One topic, listened to."""
+
+    def __init__(
+        self,
+        network: VirtualNetwork,
+        message_type: type,
+        topic: str,
+        qos: str,
+        take: Callable[[Any], None],
+    ) -> None:
+        self.topic = network.expand(topic)
+        self._topic = network.topic(topic)
+        self._mine = network.subscribe(message_type, topic, take)
+        if qos == "latched" and isinstance(self._topic.latched, message_type):
+            network.soon(self._topic.bring, self._mine, self._topic.latched)
+
+    def first_may_come(self) -> float:
+        """Say that whoever publishes was discovered long ago."""
+        return 0.0
+
+    def why_silent(self) -> str:
+        """Say nothing more."""
+        return ""
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        if self._mine in self._topic.subscriptions:
+            self._topic.subscriptions.remove(self._mine)
+
+
+class VirtualSpeaker:
+    """One topic, spoken on by a leaf."""
+
+    def __init__(self, network: VirtualNetwork, topic: str, qos: str) -> None:
+        self.topic = network.expand(topic)
+        self._network = network
+        self._latched = qos == "latched"
+
+    @property
+    def listeners(self) -> int:
+        """How many subscriptions there are."""
+        return len(self._network.topic(self.topic).subscriptions)
+
+    def listener_may_come(self) -> float:
+        """Say that whoever listens was discovered long ago."""
+        return 0.0
+
+    def why_unheard(self) -> str:
+        """Say nothing more."""
+        return ""
+
+    def publish(self, message: Any) -> None:
+        """Publish."""
+        self._network.publish(self.topic, message, latched=self._latched)
+
+    def close(self) -> None:
+        """Have nothing to let go of."""

@@ -1,0 +1,127 @@
+"""What goals that run in virtual time have in common: the Host of traffic/host.py.
+
+One for each process that is played. All happens on one thread, so nothing has to be guarded; ids
+come from a seed, and a mistake of ours is raised where it happens.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Collection
+from contextlib import nullcontext
+
+from bt_actions.servers.stalls import Stalls
+from bt_actions.testing.network import Lines
+from bt_actions.testing.timeline import Alarm, Timeline
+from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.host import Trace
+from bt_actions.traffic.scheduler import Attended, Scheduler
+
+
+class VirtualHost:
+    """See the head of this file."""
+
+    def __init__(self, timeline: Timeline, log: Lines, seed: int = 0) -> None:
+        self.lock = nullcontext()
+        self.changed = _Changed(timeline)
+        self.log = log
+        self.record = _NoRecord()
+        self.stalls = Stalls()
+        self.scheduler = Scheduler(self.steady, self.stalls, self._wake, self._failed)
+        self.trace = Trace()
+        self.forks = 0
+        self.closing = False
+        self.randomness = random.Random(seed)
+        self._timeline = timeline
+        self._domains: dict[int, Domain] = {}
+        self._alarm: Alarm | None = None
+        self._due = 0.0
+        self._runs = False
+
+    def domain(self, number: int) -> Domain:
+        """Return what is shared in the ROS domain of this number."""
+        return self._domains.setdefault(number, Domain(number))
+
+    def steady(self) -> float:
+        """Return the virtual time."""
+        return self._timeline.now
+
+    def new_goal_id(self) -> bytes:
+        """Return the next 16 bytes of the seed."""
+        return self.randomness.randbytes(16)
+
+    def random_id(self) -> bytes:
+        """Return the next 16 bytes of the seed."""
+        return self.randomness.randbytes(16)
+
+    # The alarm
+
+    def _wake(self) -> None:
+        if self._runs:
+            return
+        due = self._timeline.now
+        if self._alarm is None:
+            self.stalls.lives(due)
+        elif self.scheduler.wakes_at < self._due:
+            due = max(due, self.scheduler.wakes_at)
+        self._set(due)
+
+    def _run(self) -> None:
+        self._runs = True
+        self.scheduler.run()
+        self._runs = False
+        if self.scheduler.attended:
+            self._set(self.scheduler.wakes_at)
+        else:
+            self._alarm = None
+            self.stalls.rests(self._timeline.now)
+
+    def _set(self, due: float) -> None:
+        if self._alarm is not None:
+            self._alarm.cancel()
+        self._due = due
+        self._alarm = self._timeline.call_at(due, self._run)
+
+    def _failed(self, endpoint: Attended, error: Exception) -> None:
+        raise error
+
+
+class _Changed:
+    """Whoever waits lets the time pass."""
+
+    def __init__(self, timeline: Timeline) -> None:
+        self._timeline = timeline
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Let the next thing happen that is due within `timeout` seconds."""
+        if timeout is None:
+            raise RuntimeError("in virtual time nobody waits without a limit")
+        return self._timeline.advance(self._timeline.now + timeout)
+
+    def notify_all(self) -> None:
+        """Wake nobody: who waits looks again after each thing that happens."""
+
+
+class _NoRecord:
+    """A process that is played leaves nothing behind."""
+
+    def __contains__(self, goal_id: bytes) -> bool:
+        return False
+
+    def enter(
+        self,
+        goal_id: bytes,
+        action: str,
+        domain: int,
+        servers: Collection[bytes],
+        *,
+        accept: float | None = None,
+        lost: bool = False,
+    ) -> None:
+        """Take no note."""
+
+    def strike(self, goal_id: bytes) -> None:
+        """Have nothing to strike."""
+
+    def close(self) -> None:
+        """Have nothing to remove."""

@@ -1,0 +1,148 @@
+"""Runs a tree in virtual time, on the loop of running/loop.py: to its end, or step by step.
+
+No thread, no wait: between two steps the time jumps to what happens next.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
+
+from bt_actions.events import GoalChanged
+from bt_actions.running.loop import TickLoop
+from bt_actions.testing.backend import VirtualBackend
+from bt_actions.testing.network import VirtualNetwork
+from bt_actions.traffic.drain import LOOK, Drain
+from bt_actions.utilities.stepping import Done, Sleep
+
+if TYPE_CHECKING:
+    from bt_actions.events import Event, Observer
+    from bt_actions.goals.policy import Outcome
+    from bt_actions.running.goals import GoalReport
+
+LONGEST = 3600.0
+"""Virtual seconds that a run may take where nothing else is said."""
+
+
+class VirtualRunner:
+    """Runs one tree on a virtual network."""
+
+    def __init__(
+        self,
+        root_or_behaviour_tree: Behaviour | BehaviourTree,
+        network: VirtualNetwork | None = None,
+        *,
+        seed: int = 0,
+        heartbeat: float = 0.1,
+    ) -> None:
+        """Set up nothing yet; `seed` chooses goal ids and the pauses before retries.
+
+        Without a `network` the tree is alone.
+        """
+        tree = root_or_behaviour_tree
+        self.tree = tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree)
+        self.network = network or VirtualNetwork()
+        self.backend = VirtualBackend(self.network, seed=seed)
+        self.events: list[Event] = []
+        """What happened in all runs; times are virtual."""
+        self._woken = False
+        self._loop = TickLoop(
+            self.tree,
+            self.backend,
+            steady=self.network.now,
+            drain=lambda handles: _Draining(Drain(self.backend.host, handles)),
+            log=self.network.log,
+            heartbeat=heartbeat,
+            wake=self._wake,
+        )
+        self._loop.observe(self.events.append)
+
+    def __repr__(self) -> str:
+        return f"<VirtualRunner of {self.tree.root.name!r} at {self.now:g} s>"
+
+    @property
+    def now(self) -> float:
+        """The virtual time in seconds."""
+        return self.network.timeline.now
+
+    @property
+    def outcomes(self) -> list[tuple[str, Outcome]]:
+        """Of each goal that its leaf has stopped waiting for, in that order: the leaf, and why."""
+        ended: dict[str, tuple[str, Outcome]] = {}
+        for event in self.events:
+            if isinstance(event, GoalChanged) and event.outcome is not None:
+                ended.setdefault(event.goal_id, (event.behaviour.name, event.outcome))
+        return list(ended.values())
+
+    @property
+    def unaccounted(self) -> list[GoalReport]:
+        """Goals that may still be running, as nobody knows their end."""
+        return self._loop.goals.unaccounted
+
+    def observe(self, callback: Observer) -> None:
+        """Call `callback` with each event from now on."""
+        self._loop.observe(callback)
+
+    def run(self, timeout: float = LONGEST) -> Status:
+        """Run the tree to its end, and drain its goals; return its status.
+
+        Raises TimeoutError when it has not ended after so many virtual seconds, and TreeError when
+        a behaviour raised.
+        """
+        self.start(timeout)
+        status = self.advance(float("inf"))
+        assert status is not None
+        return status
+
+    def start(self, timeout: float = LONGEST) -> None:
+        """Begin a run, for `advance` to go on with."""
+        self._loop.begin(self.now, timeout)
+        self._woken = True
+        self._next = self.now
+
+    def advance(self, seconds: float) -> Status | None:
+        """Let so much time pass; return the tree's status if it has ended by then.
+
+        INVALID means that it was interrupted. Raises what `run` raises.
+        """
+        until = self.now + seconds
+        while True:
+            while not self._woken and self.network.timeline.advance(min(self._next, until)):
+                pass
+            if not self._woken and self.now < self._next:
+                return None
+            self._woken = False
+            step = self._loop.step(self.now)
+            if isinstance(step, Done):
+                self._loop.rest()
+                return step.result
+            self._next = self.now + step.seconds
+
+    def interrupt(self) -> None:
+        """Have the run end at the next step: its goals are canceled and drained."""
+        self._loop.interrupt(self.now)
+
+    def shutdown(self) -> None:
+        """Let go of everything; with that the leaves are shut down."""
+        self._loop.shutdown()
+        self._loop.close(self.now)
+
+    def _wake(self) -> None:
+        self._woken = True
+
+
+class _Draining:
+    """The drain of a run's goals, as its loop wants it."""
+
+    def __init__(self, drain: Drain) -> None:
+        self._drain = drain
+
+    def step(self, now: float, *, hurry: bool) -> Sleep | Done[None]:
+        """Go on with it; with `hurry`, wait for nothing any more."""
+        if not hurry and not self._drain.step():
+            return Sleep(LOOK)
+        self._drain.finish()
+        return Done(None)

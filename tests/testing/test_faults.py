@@ -1,0 +1,78 @@
+"""What servers do wrong on the virtual network is told as on a real one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from py_trees.common import Status
+from robot_control_interfaces.action import MoveRobot as Move
+
+from bt_actions import End, MoveRobot, Outcome, Timeouts, load_tree
+from bt_actions.events import GoalChanged
+from bt_actions.simulation import Script, ScriptedServer, Simulation
+from bt_actions.testing import VirtualNetwork, VirtualRunner
+
+TIMEOUTS = Timeouts(server=2.0, accept=1.0, result=5.0, feedback=2.0, cancel=2.0)
+
+FAULTS = {
+    "reject": (Outcome.REJECTED, End.NEVER_STARTED),
+    "abort": (Outcome.ABORTED, End.ABORTED),
+    "stall": (Outcome.STALLED, End.CANCELED),
+    "slow=9": (Outcome.RESULT_TIMEOUT, End.CANCELED),
+    "no_feedback": (Outcome.STALLED, End.CANCELED),
+    "drop_accept": (Outcome.SUCCEEDED, End.SUCCEEDED),
+    "delay_accept=0.9": (Outcome.SUCCEEDED, End.SUCCEEDED),
+    "drop_result=1": (Outcome.SUCCEEDED, End.SUCCEEDED),
+    "die": (Outcome.SERVER_LOST, End.SERVER_GONE),
+    "restart=1": (Outcome.SERVER_LOST, End.SERVER_GONE),
+}
+
+
+@pytest.mark.parametrize(("fault", "told"), FAULTS.items(), ids=FAULTS)
+def test_a_fault_has_its_outcome_and_its_end(fault: str, told: tuple[Outcome, End]) -> None:
+    network = VirtualNetwork()
+    server = ScriptedServer(
+        network, Move, "move_robot", Script(duration=3.0), faults=[f"move_robot:1:{fault}"]
+    )
+    runner = VirtualRunner(MoveRobot("move", 1.0, timeout=TIMEOUTS), network)
+    runner.run()
+    last = [event for event in runner.events if isinstance(event, GoalChanged)][-1]
+    assert (last.outcome, last.end) == told
+    assert (runner.unaccounted, server.live_goals) == ([], [])
+
+
+@pytest.mark.parametrize("fault", ["reject_cancel", "drop_cancel", "drop_goal"])
+def test_a_goal_of_which_nobody_knows_the_end_is_reported(fault: str) -> None:
+    network = VirtualNetwork()
+    ScriptedServer(
+        network, Move, "move_robot", Script(duration=60.0), faults=[f"move_robot:1:{fault}"]
+    )
+    runner = VirtualRunner(MoveRobot("move", 1.0, timeout=TIMEOUTS), network)
+    assert runner.run() is Status.FAILURE
+    assert [(goal.name, goal.server) for goal in runner.unaccounted] == [("move", "/move_robot")]
+
+
+def test_two_servers_under_one_name_are_not_spoken_to() -> None:
+    network = VirtualNetwork()
+    servers = [ScriptedServer(network, Move, "move_robot") for _ in range(2)]
+    runner = VirtualRunner(MoveRobot("move", 1.0), network)
+    runner.run()
+    assert runner.outcomes == [("move", Outcome.SERVER_AMBIGUOUS)]
+    assert [server.live_goals for server in servers] == [[], []]
+
+
+def test_where_nobody_serves_it_says_who_does() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robots")
+    runner = VirtualRunner(MoveRobot("move", 1.0, timeout=replace(TIMEOUTS, server=0.5)), network)
+    assert runner.run() is Status.FAILURE
+    assert runner.outcomes == [("move", Outcome.SERVER_UNAVAILABLE)]
+    assert "move_robots" in runner.tree.root.feedback_message
+
+
+def test_a_robot_that_drops_the_part_brings_it_nowhere(tmp_path: Path) -> None:
+    network = VirtualNetwork("r1")
+    simulation = Simulation(network, faults=["move_robot:2:drop_part"], seed=1)
+    runner = VirtualRunner(load_tree("trees/pick_and_place.yaml"), network)
+    runner.run()
+    assert "at no station" in simulation.describe()
