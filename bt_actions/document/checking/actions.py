@@ -35,11 +35,12 @@ def check_actions(checker: Checker) -> None:
             continue
         checker.reader = declared
         if declared.source is checker.source:
-            _check_action(checker, declared.values, declared.node, declared)
+            cls = checker.action_class(declared)
+            checker.call(declared.values, declared.node, cls, "action")
             continue
         values = _left(declared.values, users.get(declared.name, []))
         with _within(checker, declared.source, f"the imported action {declared.name!r}"):
-            _check_action(checker, values, declared.node, declared)
+            checker.call(values, declared.node, checker.action_class(declared), "action")
 
 
 def check_defaults(checker: Checker) -> None:
@@ -62,7 +63,7 @@ def check_defaults(checker: Checker) -> None:
 
 def check_use(checker: Checker, node: TreeNode, declared: Declared) -> None:
     """Check a node that runs an action, with what it says beside the action's own words."""
-    _check_action(checker, node.values, node.node, declared)
+    checker.call(node.values, node.node, checker.action_class(declared), "action")
     _check_together(checker, node, declared)
 
 
@@ -87,18 +88,6 @@ def _within(checker: Checker, source: Source, what: str) -> Iterator[None]:
                     one.code, span_of(written), f"{what}: {one.message}",
                     hint=one.hint, related=Related(one.place, "written here"),
                 )  # fmt: skip
-
-
-def _check_action(
-    checker: Checker, values: dict[str, object], node: Mapping, declared: Declared
-) -> None:
-    cls = checker.action_class(declared)
-    checker.call(
-        values, node,
-        request=None if cls is None else Message(cls.Goal),  # type: ignore[attr-defined]
-        result=None if cls is None else Message(cls.Result),  # type: ignore[attr-defined]
-        request_key="goal",
-    )  # fmt: skip
 
 
 def _check_together(checker: Checker, node: TreeNode, declared: Declared) -> None:

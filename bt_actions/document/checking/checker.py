@@ -34,7 +34,7 @@ from bt_actions.document.yaml.inner import inner_span
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import ExpressionError
-from bt_actions.messages.fields import Either, FieldType
+from bt_actions.messages.fields import Either, FieldType, Message
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
@@ -53,6 +53,8 @@ class Read(NamedTuple):
 
 
 Types = MappingType[str, FieldType | None]
+_PARTS = {"action": ("Goal", "Result", "goal"), "srv": ("Request", "Response", "request")}
+"""What is sent and what comes back, and the key of what is sent."""
 
 
 class Checker:
@@ -131,20 +133,13 @@ class Checker:
             return None
         return self.interface(text, "action", declared.written("type"), declared.source)
 
-    def call(
-        self,
-        values: dict[str, object],
-        node: Mapping,
-        *,
-        request: FieldType | None,
-        result: FieldType | None,
-        request_key: str,
-    ) -> None:
+    def call(self, values: dict[str, object], node: Mapping, cls: type | None, kind: str) -> None:
         """Check what an action and a service have in common."""
-        written = node.get(request_key)
-        if request_key in values and written is not None:
-            self.value(request, values[request_key], written)
-        roots = {"result": result}
+        asked, answered, key = _PARTS[kind]
+        written = node.get(key)
+        if key in values and written is not None:
+            self.value(None if cls is None else Message(getattr(cls, asked)), values[key], written)
+        roots = {"result": None if cls is None else Message(getattr(cls, answered))}
         for condition in (values.get("expect"), when_of(values)):
             self.condition(condition, roots)
         self.save(values.get("save"), roots)

@@ -166,22 +166,15 @@ def _for_each(checker: Checker, node: TreeNode) -> None:
         checker.value(None, items, node.written["in"], prose=True)
 
 
-def _asks(
-    interface: str, asked: str, answer: str, request_key: str
-) -> Callable[[Checker, TreeNode], None]:
-    def check(checker: Checker, node: TreeNode) -> None:
-        name = node.values.get("type")
-        cls = None
-        if isinstance(name, str):
-            cls = checker.interface(name, interface, node.written["type"])
-        checker.call(
-            node.values, node.node,
-            request=None if cls is None else Message(getattr(cls, asked)),
-            result=None if cls is None else Message(getattr(cls, answer)),
-            request_key=request_key,
-        )  # fmt: skip
+def _interface(checker: Checker, node: TreeNode, kind: str) -> type | None:
+    name = node.values.get("type")
+    return checker.interface(name, kind, node.written["type"]) if isinstance(name, str) else None
 
-    return check
+
+def _call_of(kind: str) -> Callable[[Checker, TreeNode], None]:
+    return lambda checker, node: checker.call(
+        node.values, node.node, _interface(checker, node, kind), kind
+    )
 
 
 def _run_tree(checker: Checker, node: TreeNode) -> None:
@@ -200,8 +193,7 @@ def _run_tree(checker: Checker, node: TreeNode) -> None:
 
 
 def _publish(checker: Checker, node: TreeNode) -> None:
-    name = node.values.get("type")
-    cls = checker.interface(name, "msg", node.written["type"]) if isinstance(name, str) else None
+    cls = _interface(checker, node, "msg")
     if "message" in node.values:
         kind = None if cls is None else Message(cls)
         checker.value(kind, node.values["message"], node.written["message"])
@@ -214,8 +206,7 @@ def _publish(checker: Checker, node: TreeNode) -> None:
 
 
 def _wait_for_message(checker: Checker, node: TreeNode) -> None:
-    name = node.values.get("type")
-    cls = checker.interface(name, "msg", node.written["type"]) if isinstance(name, str) else None
+    cls = _interface(checker, node, "msg")
     roots = {"message": None if cls is None else Message(cls)}
     checker.condition(node.values.get("until"), roots)
     checker.save(node.values.get("save"), roots)
@@ -287,7 +278,7 @@ def _python(checker: Checker, node: TreeNode) -> None:
 
 CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
     {
-        "action": _asks("action", "Goal", "Result", "goal"),
+        "action": _call_of("action"),
         "check": _condition_of("check"),
         "for_each": _for_each,
         "log": _log,
@@ -297,7 +288,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "repeat": _number_of("times", INTEGER),
         "retry": _number_of("attempts", INTEGER, 1),
         "run_tree": _run_tree,
-        "service": _asks("srv", "Request", "Response", "request"),
+        "service": _call_of("srv"),
         "set": _set,
         "subtree": _subtree,
         "timeout": _number_of("after", FLOAT, zero=False),
