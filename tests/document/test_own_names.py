@@ -149,6 +149,8 @@ def test_a_name_in_an_expression_is_the_trees_own(
         "root": {"got": "Go"} if kind is None else yaml.safe_load(KINDS[kind].example),
     }  # fmt: skip
     root = document["root"]
+    if kind == "action":
+        root["goal"]["distance"] = 0.1
     if kind in graph:
         root["topic" if "topic" in root else "server"] = graph[kind]
     if kind == "wait_for_message":
