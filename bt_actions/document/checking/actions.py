@@ -14,9 +14,8 @@ from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.variables import root_type
 from bt_actions.document.findings import Related
 from bt_actions.document.language.values import BAD, Computed, Interpolated, locate
-from bt_actions.document.reading.settings import settings_of, when_of
+from bt_actions.document.reading.settings import merged, settings_of, when_of
 from bt_actions.document.reading.tree import Declared, TreeNode
-from bt_actions.document.reading.workspace import merged
 from bt_actions.document.yaml.nodes import Mapping, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.messages.fields import FieldType, Message

@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bt_actions.document.reading.tree import Document, TreeNode
-from bt_actions.document.reading.workspace import merged
 
-__all__ = ["join_names", "resources_below", "server_of", "settings_of", "text_of", "when_of"]
+__all__ = [
+    "join_names",
+    "merged",
+    "resources_below",
+    "server_of",
+    "settings_of",
+    "text_of",
+    "when_of",
+]
 
 
 def text_of(values: Mapping[str, object], key: str) -> str:
@@ -26,6 +33,16 @@ def join_names(*parts: str) -> str:
         elif trimmed:
             joined = f"{joined.rstrip('/')}/{trimmed}"
     return joined
+
+
+def merged(base: object, over: object) -> dict[str, object]:
+    """Two mappings of settings as one, key by key to any depth; `over` wins."""
+    result = dict(base) if isinstance(base, dict) else {}
+    for name, value in (over if isinstance(over, dict) else {}).items():
+        earlier = result.get(name)
+        both = isinstance(earlier, dict) and isinstance(value, dict)
+        result[name] = merged(earlier, value) if both else value
+    return result
 
 
 def settings_of(node: TreeNode, document: Document) -> dict[str, object]:

@@ -15,6 +15,7 @@ from bt_actions.document.findings.elsewhere import package_here
 from bt_actions.document.reading.find import TreeNotFoundError, find_tree
 from bt_actions.document.reading.nodes import read_root
 from bt_actions.document.reading.read import read_document
+from bt_actions.document.reading.settings import merged
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.yaml.nodes import Listing, Node, span_of
 from bt_actions.document.yaml.source import SUFFIXES, Source, read_source
@@ -250,16 +251,6 @@ class Workspace:
         if library is not None:
             self._import(library, (*chain, key))
         return library
-
-
-def merged(base: object, over: object) -> dict[str, object]:
-    """Two mappings of settings as one, key by key to any depth; `over` wins."""
-    result = dict(base) if isinstance(base, dict) else {}
-    for name, value in (over if isinstance(over, dict) else {}).items():
-        earlier = result.get(name)
-        both = isinstance(earlier, dict) and isinstance(value, dict)
-        result[name] = merged(earlier, value) if both else value
-    return result
 
 
 def _is_file(path: Path) -> bool:
