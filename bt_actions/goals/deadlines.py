@@ -14,18 +14,21 @@ class Deadlines:
     """Moments by which something must have happened, each named by the event that it is if not."""
 
     def __init__(self, now: Now) -> None:
+        self.now = now
+        """The last moment of which it was told."""
         self._due: dict[Event, float] = {}
-        self._ros_seen = now.ros
         self._not_before = float("-inf")
 
-    def arm(self, event: Event, seconds: float | None, now: Now) -> None:
+    def arm(self, event: Event, seconds: float | None) -> None:
         """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
         if seconds is not None:
-            self._due[event] = (now.ros if event in ON_ROS_CLOCK else now.steady) + seconds
+            now = self.now.ros if event in ON_ROS_CLOCK else self.now.steady
+            self._due[event] = now + seconds
 
-    def disarm(self, event: Event) -> None:
-        """Forget one."""
-        self._due.pop(event, None)
+    def disarm(self, *events: Event) -> None:
+        """Forget these."""
+        for event in events:
+            self._due.pop(event, None)
 
     def clear(self) -> None:
         """Forget all."""
@@ -57,16 +60,16 @@ class Deadlines:
         return self._not_before - now.steady
 
     def follow(self, now: Now) -> None:
-        """Where the ROS clock has jumped back, let the deadlines on it jump with it."""
-        back = self._ros_seen - now.ros
+        """It is so late; where the ROS clock has jumped back, deadlines on it jump with it."""
+        back = self.now.ros - now.ros
         if back > 0.0:
             for event in ON_ROS_CLOCK & self._due.keys():
                 self._due[event] -= back
-        self._ros_seen = now.ros
+        self.now = now
 
     def _left(self, event: Event, now: Now) -> float:
         if event in ON_ROS_CLOCK:  # where the clock has jumped back, no more than what remained
-            return self._due[event] - max(now.ros, self._ros_seen)
+            return self._due[event] - max(now.ros, self.now.ros)
         return self._due[event] - now.steady
 
 

@@ -56,7 +56,7 @@ class Facts:
         self.asking = Asking()
         self.lost_result = LostResult()
         self.deadlines = Deadlines(now)
-        self.deadlines.arm(Event.QUEUE_DUE, timeouts.queue, now)
+        self.deadlines.arm(Event.QUEUE_DUE, timeouts.queue)
         self.commands: list[Command] = []
         """Of the step that is being made."""
 
@@ -89,6 +89,11 @@ class Facts:
         """Seconds within which the server is to answer what it was asked of an unanswered goal."""
         return self.timeouts.accept or self.timeouts.cancel or PATIENCE
 
+    @property
+    def steady(self) -> float:
+        """Seconds of the steady clock, as of the last moment that was told."""
+        return self.deadlines.now.steady
+
     # For the steps
 
     def say(self, why: str, detail: Any = None) -> str:
@@ -97,8 +102,9 @@ class Facts:
         return why.format(names=names, server=self.server, limits=self.timeouts, detail=detail)
 
     def plan(self, outcome: Outcome, reason: str) -> None:
-        """Let it have this outcome when it has ended."""
-        self.planned, self.reason = outcome, reason
+        """Let it have this outcome when it has ended, unless that is decided."""
+        if self.outcome is None:
+            self.planned, self.reason = outcome, reason
 
     def settle(self, outcome: Outcome, reason: str) -> None:
         """Decide the outcome, once: the leaf may go on."""
@@ -135,9 +141,9 @@ class Facts:
             self.holding = False
             self.commands.append(Command.RELEASE)
 
-    def ask(self, now: Now) -> None:
+    def ask(self) -> None:
         """Ask to cancel and, where there will be one, for the result; again in a while."""
         self.commands.append(Command.CANCEL)
         if self.accepted:
             self.commands.append(Command.ASK_RESULT)
-        self.deadlines.arm(Event.POLL_DUE, self.asking.ask(now.steady), now)
+        self.deadlines.arm(Event.POLL_DUE, self.asking.ask(self.steady))

@@ -24,7 +24,15 @@ from bt_actions.goals.facts import PATIENCE, Facts
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.steps.canceling import NEVER_DONE, cancel_said
 from bt_actions.goals.table import TABLE
-from bt_actions.goals.terms import FROM_SERVER, Command, Event, Now, State
+from bt_actions.goals.terms import (
+    CANCEL_UNKNOWN_GOAL,
+    FROM_SERVER,
+    MAY_TURN_UP,
+    Command,
+    Event,
+    Now,
+    State,
+)
 
 
 class Goal(Facts):
@@ -41,12 +49,14 @@ class Goal(Facts):
 
     def on(self, event: Event, now: Now, detail: Any = None) -> tuple[Command, ...]:
         """Take what happened and return what to do, in order."""
+        if self._shows_acceptance(event, detail):
+            return self.on(Event.ACCEPTED, now) + self.on(event, now, detail)
         self.deadlines.follow(now)
         is_over = self.state in (State.LOST, State.DONE)
         if event in FROM_SERVER and self.asking.hear() and not is_over:
-            self.deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)  # it can be asked again
+            self.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)  # it can be asked again
         step, before = TABLE[self.state, event], self.state
-        state = step(self, now, detail)
+        state = step(self, detail)
         assert state is before or state in step.to, f"{event} took {self!r} to {state}"
         if state is State.DONE and before is not State.DONE:
             self.deadlines.clear()
@@ -56,6 +66,17 @@ class Goal(Facts):
         self.state = state
         commands, self.commands = tuple(self.commands), []
         return commands
+
+    def _shows_acceptance(self, event: Event, detail: Any) -> bool:
+        """Whether only an accepted goal has this, and its acceptance was lost, or overtaken.
+
+        Of a goal that went out of sight with its server it shows that it is back.
+        """
+        if self.state not in MAY_TURN_UP:
+            return False
+        if event is Event.CANCEL_ANSWERED:
+            return detail != CANCEL_UNKNOWN_GOAL and not self.accepted
+        return event in (Event.FEEDBACK, Event.STATUS)
 
     def due(self, now: Now) -> Iterator[Event]:
         """Take each deadline that has passed, the earliest first, to be told to `on` at once."""

@@ -57,8 +57,6 @@ _in(
     State.SENDING,
     SEND_FAILED=unsent.send_failed,
     ACCEPTED=unanswered.begin,
-    FEEDBACK=unanswered.begin_by_feedback,
-    STATUS=unanswered.begin_by_status,
     REJECTED=unanswered.rejected,
     ACCEPT_DUE=unanswered.accept_due,
     INTERRUPTED=unanswered.withdraw(
@@ -117,10 +115,8 @@ _in(
     *UNANSWERED,
     State.NOT_RECEIVED,
     ACCEPTED=unanswered.turned_up,
-    FEEDBACK=unanswered.turned_up,
-    STATUS=unanswered.turned_up_by_status,
     REJECTED=unanswered.rejected,
-    CANCEL_ANSWERED=unanswered.cancel_answered,
+    CANCEL_ANSWERED=unanswered.denied,
 )
 _in(*UNANSWERED, POLL_DUE=unanswered.ask_again)
 _in(State.UNWANTED, SEND_FAILED=unsent.send_failed, ACCEPT_DUE=unanswered.accept_due)
@@ -147,9 +143,6 @@ _in(
     SERVER_LOST=lost.server_lost,
     SERVER_RETURNED=lost.returned,
     ACCEPTED=lost.runs,
-    FEEDBACK=lost.runs,
-    STATUS=lost.runs_by_status,
-    CANCEL_ANSWERED=lost.cancel_answered,
     RESULT=canceling.finished,
     DRAINED=canceling.drained,
     PROCESS_EXITING=lost.exiting,

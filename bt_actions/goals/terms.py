@@ -52,6 +52,8 @@ UNANSWERED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RE
 """It was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
 _NOT_SHOWN = UNANSWERED | {State.NOT_RECEIVED, State.LOST}
+MAY_TURN_UP = _NOT_SHOWN | {State.SENDING}
+"""Feedback or a status is news: it was accepted, and runs, or has run."""
 
 
 class Command(Enum):

@@ -66,8 +66,8 @@ def ignore(patch: Patch, event: Event, *states: State) -> None:
 
 @mutation
 def forgets_the_cancel_before_acceptance(patch: Patch) -> None:
-    def accepted(goal: Facts, now: Any, detail: Any) -> State:
-        state = unanswered.turned_up(goal, now, detail)
+    def accepted(goal: Facts, detail: Any) -> State:
+        state = unanswered.turned_up(goal, detail)
         goal.commands.remove(Command.CANCEL)
         return state
 
@@ -117,9 +117,9 @@ def retries_beside_a_server_that_is_gone(patch: Patch) -> None:
 
 @mutation
 def waits_for_feedback_of_a_goal_that_has_ended(patch: Patch) -> None:
-    def seen(goal: Facts, now: Any, detail: Any) -> State:
-        state = running.status(goal, now, detail)
-        goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
+    def seen(goal: Facts, detail: Any) -> State:
+        state = running.status(goal, detail)
+        goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback)
         return state
 
     decide(patch, Event.STATUS, seen, State.EXECUTING)
@@ -140,18 +140,18 @@ def keeps_the_resource(patch: Patch) -> None:
 
 @mutation
 def releases_when_the_leaf_stops_waiting(patch: Patch) -> None:
-    def cancel_due(goal: Facts, now: Any, detail: Any) -> State:
+    def cancel_due(goal: Facts, detail: Any) -> State:
         goal.release()
-        return canceling.cancel_due(goal, now, detail)
+        return canceling.cancel_due(goal, detail)
 
     decide(patch, Event.CANCEL_DUE, cancel_due, State.CANCELING)
 
 
 @mutation
 def releases_when_the_cancel_is_sent(patch: Patch) -> None:
-    def interrupted(goal: Facts, now: Any, detail: Any) -> State:
+    def interrupted(goal: Facts, detail: Any) -> State:
         goal.release()
-        return interrupt(goal, now, detail)
+        return interrupt(goal, detail)
 
     interrupt = TABLE[State.EXECUTING, Event.INTERRUPTED]
     decide(patch, Event.INTERRUPTED, interrupted, State.EXECUTING)
@@ -159,7 +159,7 @@ def releases_when_the_cancel_is_sent(patch: Patch) -> None:
 
 @mutation
 def cancels_after_done(patch: Patch) -> None:
-    def again(goal: Facts, now: Any, detail: Any) -> State:
+    def again(goal: Facts, detail: Any) -> State:
         goal.commands.append(Command.CANCEL)
         return State.DONE
 
@@ -179,8 +179,8 @@ def ignores_that_the_server_was_lost(patch: Patch) -> None:
 
 @mutation
 def forgets_a_lost_goal(patch: Patch) -> None:
-    def lose(goal: Facts, now: Any, detail: Any) -> State:
-        lost.server_lost(goal, now, detail)
+    def lose(goal: Facts, detail: Any) -> State:
+        lost.server_lost(goal, detail)
         return State.DONE
 
     decide(patch, Event.SERVER_LOST, lose, State.EXECUTING)
@@ -252,8 +252,8 @@ def reports_success_though_it_was_interrupted(patch: Patch) -> None:
 
 @mutation
 def calls_a_failed_goal_succeeded(patch: Patch) -> None:
-    def finished(goal: Facts, now: Any, detail: Any) -> State:
-        return running.finished(goal, now, (4, detail[1]))
+    def finished(goal: Facts, detail: Any) -> State:
+        return running.finished(goal, (4, detail[1]))
 
     decide(patch, Event.RESULT, finished, State.EXECUTING)
 
@@ -265,7 +265,7 @@ def believes_that_an_unanswered_goal_never_started(patch: Patch) -> None:
 
 @mutation
 def asks_to_cancel_only_once(patch: Patch) -> None:
-    patch.setattr(Facts, "ask", lambda goal, now: goal.commands.append(Command.CANCEL))
+    patch.setattr(Facts, "ask", lambda goal: goal.commands.append(Command.CANCEL))
 
 
 @mutation
@@ -334,8 +334,8 @@ def forgets_who_waits(patch: Patch) -> None:
 
 @mutation
 def says_gone_for_every_end(patch: Patch) -> None:
-    def close(goal: Facts, now: Any, detail: Any) -> State:
-        state = canceling.finished(goal, now, detail)
+    def close(goal: Facts, detail: Any) -> State:
+        state = canceling.finished(goal, detail)
         goal.end = End.SERVER_GONE
         return state
 
@@ -346,9 +346,9 @@ def forget(deadline: Event) -> Callable[[Patch], None]:
     """Return the mutation that never arms this deadline."""
 
     def make(patch: Patch) -> None:
-        def arm(deadlines: Deadlines, event: Event, seconds: float | None, now: Any) -> None:
+        def arm(deadlines: Deadlines, event: Event, seconds: float | None) -> None:
             if event is not deadline:
-                original(deadlines, event, seconds, now)
+                original(deadlines, event, seconds)
 
         original = Deadlines.arm
         patch.setattr(Deadlines, "arm", arm)

@@ -17,7 +17,6 @@ from bt_actions.goals.terms import (
     CANCEL_REJECTED,
     STATUS_SUCCEEDED,
     Event,
-    Now,
     State,
 )
 
@@ -28,55 +27,54 @@ NEVER_DONE = (Outcome.CANCELED, Outcome.SERVER_AMBIGUOUS)
 def cancel(outcome: Outcome, why: str) -> Step:
     """Return the step that cancels what runs."""
 
-    def step(goal: Facts, now: Now, detail: Any) -> State:
-        return stop(goal, now, outcome, goal.say(why, detail))
+    def step(goal: Facts, detail: Any) -> State:
+        return stop(goal, outcome, goal.say(why, detail))
 
     return Step(step, frozenset({State.CANCELING}), f"Cancel: {outcome}")
 
 
-def stop(goal: Facts, now: Now, outcome: Outcome, reason: str) -> State:
+def stop(goal: Facts, outcome: Outcome, reason: str) -> State:
     """Cancel what runs."""
     goal.plan(outcome, reason)
-    for deadline in (Event.RESULT_DUE, Event.FEEDBACK_DUE, Event.CANCEL_DUE):
-        goal.deadlines.disarm(deadline)  # the last of them where it was replaced before
-    goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel, now)
-    goal.ask(now)
+    goal.deadlines.disarm(Event.RESULT_DUE, Event.FEEDBACK_DUE, Event.CANCEL_DUE)
+    goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel)
+    goal.ask()
     return State.CANCELING
 
 
 def _plan_anew(goal: Facts, outcome: Outcome, why: str) -> None:
-    if goal.outcome is None and goal.planned not in (Outcome.CANCELED, outcome):
+    if goal.planned not in (Outcome.CANCELED, outcome):
         goal.plan(outcome, f"{why} ({goal.reason})")
 
 
 @leads_to()
-def interrupted(goal: Facts, now: Now, detail: Any) -> State:
+def interrupted(goal: Facts, detail: Any) -> State:
     """Whatever it was canceled for, its outcome will be CANCELED."""
     asked_at = goal.asking.asked_at
     is_news = goal.outcome is not None or goal.planned is not Outcome.CANCELED
-    if is_news and asked_at is not None and now.steady - asked_at >= ASK_AGAIN:
-        goal.ask(now)  # now somebody waits for it
+    if is_news and asked_at is not None and goal.steady - asked_at >= ASK_AGAIN:
+        goal.ask()  # now somebody waits for it
     _plan_anew(goal, Outcome.CANCELED, "interrupted by the tree")
     return goal.state
 
 
 @leads_to()
-def replaced(goal: Facts, now: Now, detail: Any) -> State:
+def replaced(goal: Facts, detail: Any) -> State:
     """Whatever it was canceled for, it must not be tried again beside the newer one."""
     _plan_anew(goal, Outcome.CANCELED, "replaced by a newer goal")
     return goal.state
 
 
 @leads_to()
-def taken_by_two(goal: Facts, now: Now, detail: Any) -> State:
+def taken_by_two(goal: Facts, detail: Any) -> State:
     """Cancel, at both; it must not count as done, or be tried again."""
     _plan_anew(goal, Outcome.SERVER_AMBIGUOUS, "both of two servers may have it")
-    goal.ask(now)
+    goal.ask()
     return goal.state
 
 
 @leads_to(State.DONE)
-def finished(goal: Facts, now: Now, detail: Any) -> State:
+def finished(goal: Facts, detail: Any) -> State:
     """What it was canceled for; SUCCEEDED, late, if only a deadline had passed."""
     if goal.take_result(detail) == STATUS_SUCCEEDED and goal.planned not in NEVER_DONE:
         goal.settle(Outcome.SUCCEEDED, f"late: {goal.reason}")
@@ -87,38 +85,38 @@ def finished(goal: Facts, now: Now, detail: Any) -> State:
 
 
 @leads_to()
-def cancel_answered(goal: Facts, now: Now, detail: Any) -> State:
+def cancel_answered(goal: Facts, detail: Any) -> State:
     """Take note of it: what counts is how the goal ends."""
-    goal.asking.answered(detail, now.steady)
+    goal.asking.answered(detail, goal.steady)
     return State.CANCELING
 
 
 @leads_to(State.DONE)
-def cancel_due(goal: Facts, now: Now, detail: Any) -> State:
+def cancel_due(goal: Facts, detail: Any) -> State:
     """The leaf has waited long enough; the questions go on, unless the status shows the end."""
     if goal.lost_result.status is None:
         goal.settle_as_planned()
-        goal.ask(now)
+        goal.ask()
         return State.CANCELING
     if goal.lost_result.questions > 1:
         return goal.end_by_status()
     if goal.lost_result.questions == 0:
-        ask_again(goal, now, None)
-    goal.deadlines.arm(Event.CANCEL_DUE, ASK_AGAIN, now)  # the result itself tells more
+        ask_again(goal, None)
+    goal.deadlines.arm(Event.CANCEL_DUE, ASK_AGAIN)  # the result itself tells more
     return State.CANCELING
 
 
 @leads_to(State.DONE)
-def ask_again(goal: Facts, now: Now, detail: Any) -> State:
+def ask_again(goal: Facts, detail: Any) -> State:
     """Ask again, cancel and result; after several questions believe the status."""
     if goal.lost_result.asked_in_vain():
         return goal.end_by_status()
-    goal.ask(now)
+    goal.ask()
     return State.CANCELING
 
 
 @leads_to(State.DONE)
-def drained(goal: Facts, now: Now, detail: Any) -> State:
+def drained(goal: Facts, detail: Any) -> State:
     """Nobody waits any longer; what is not known by now is UNKNOWN, and may become known."""
     goal.waited_for = True
     if goal.lost_result.questions > 0:

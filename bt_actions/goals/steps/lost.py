@@ -10,13 +10,13 @@ from typing import Any
 
 from bt_actions.goals.facts import Facts
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.goals.steps import running, unanswered
+from bt_actions.goals.steps import unanswered
 from bt_actions.goals.steps.step import leads_to
-from bt_actions.goals.terms import CANCEL_UNKNOWN_GOAL, Command, Event, Now, State
+from bt_actions.goals.terms import Command, Event, State
 
 
 @leads_to(State.LOST, State.DONE)
-def server_lost(goal: Facts, now: Now, detail: Any) -> State:
+def server_lost(goal: Facts, detail: Any) -> State:
     """Free the leaf: SERVER_LOST; keep the goal, in case the server is not dead."""
     goal.settle_as_planned(Outcome.SERVER_LOST, str(detail))
     goal.asking.denied_since = None
@@ -26,7 +26,7 @@ def server_lost(goal: Facts, now: Now, detail: Any) -> State:
 
 
 @leads_to(State.LOST, State.DONE)
-def node_closed(goal: Facts, now: Now, detail: Any) -> State:
+def node_closed(goal: Facts, detail: Any) -> State:
     """Keep the goal for the next node that sees its server; what is not known stays UNKNOWN."""
     goal.settle_as_planned(Outcome.CANCELED, "its node was closed")
     if goal.unconfirmed:
@@ -43,48 +43,31 @@ def _keep(goal: Facts) -> State:
 
 
 @leads_to(State.CANCELING, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED, State.NOT_RECEIVED)
-def returned(goal: Facts, now: Now, detail: Any) -> State:
+def returned(goal: Facts, detail: Any) -> State:
     """Cancel what it may still run."""
-    goal.asking.begin_anew(now.steady)
+    goal.asking.begin_anew(goal.steady)
     if goal.phase is State.NOT_RECEIVED:  # nor will it; to ask does no harm
         goal.commands.append(Command.CANCEL)
         return State.NOT_RECEIVED
     goal.end = End.UNKNOWN
     goal.waited_for = False  # there is somebody again who can tell
-    goal.ask(now)
+    goal.ask()
     if goal.accepted:
         return State.CANCELING
     if goal.phase is State.PRESUMED_NOT_RECEIVED:  # until it is denied once more
         return State.PRESUMED_NOT_RECEIVED
-    goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience, now)
+    goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience)
     return State.UNCONFIRMED
 
 
 @leads_to(State.CANCELING)
-def runs(goal: Facts, now: Now, detail: Any) -> State:
+def runs(goal: Facts, detail: Any) -> State:
     """It runs, so its server is back: canceled at once."""
-    step = returned if goal.accepted else unanswered.turned_up
-    return step(goal, now, None)
-
-
-@leads_to(State.CANCELING)
-def runs_by_status(goal: Facts, now: Now, detail: Any) -> State:
-    """The same: a server that shows its status is back."""
-    runs(goal, now, None)
-    running.status(goal, now, detail)
-    return State.CANCELING
-
-
-@leads_to(State.CANCELING)
-def cancel_answered(goal: Facts, now: Now, detail: Any) -> State:
-    """If a server knows what was not answered, it is canceled at once."""
-    if goal.accepted or detail == CANCEL_UNKNOWN_GOAL:
-        return State.LOST
-    return unanswered.cancel_answered(goal, now, detail)
+    return (returned if goal.accepted else unanswered.turned_up)(goal)
 
 
 @leads_to()
-def ask_another(goal: Facts, now: Now, detail: Any) -> State:
+def ask_another(goal: Facts, detail: Any) -> State:
     """Ask for the result; what is to be canceled, is asked to cancel again, too."""
     if goal.state not in (State.EXECUTING, State.REPLACED):
         goal.commands.append(Command.CANCEL)
@@ -94,7 +77,7 @@ def ask_another(goal: Facts, now: Now, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def exiting(goal: Facts, now: Now, detail: Any) -> State:
+def exiting(goal: Facts, detail: Any) -> State:
     """CANCELED; what is not known by now stays UNKNOWN."""
     goal.settle_as_planned(Outcome.CANCELED, "the process ended")
     if goal.unconfirmed:

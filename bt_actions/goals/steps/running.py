@@ -19,22 +19,21 @@ from bt_actions.goals.terms import (
     STATUS_CANCELED,
     Command,
     Event,
-    Now,
     State,
 )
 
 
 @leads_to()
-def feedback(goal: Facts, now: Now, detail: Any) -> State:
+def feedback(goal: Facts, detail: Any) -> State:
     """The silence is over; timeout.feedback begins anew."""
-    goes_on(goal, now, detail)
+    goes_on(goal, detail)
     if goal.lost_result.status is None:
-        goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback, now)
+        goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback)
     return State.EXECUTING
 
 
 @leads_to()
-def goes_on(goal: Facts, now: Now, detail: Any) -> State:
+def goes_on(goal: Facts, detail: Any) -> State:
     """It runs, whoever has denied it, or, long ago, shown that it had ended."""
     goal.feedback = detail
     goal.lost_result.denials = 0
@@ -44,31 +43,31 @@ def goes_on(goal: Facts, now: Now, detail: Any) -> State:
 
 
 @leads_to()
-def status(goal: Facts, now: Now, detail: Any) -> State:
+def status(goal: Facts, detail: Any) -> State:
     """If it has ended, its result is due, and asked for again in case it was lost."""
     if detail not in ENDS:
         goal.lost_result = LostResult()
     elif goal.lost_result.status is None:
         goal.lost_result.status = detail
         goal.deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended
-        goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)
+        goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)
     return goal.state
 
 
 @leads_to(State.DONE)
-def ask_for_result(goal: Facts, now: Now, detail: Any) -> State:
+def ask_for_result(goal: Facts, detail: Any) -> State:
     """Ask again; after several questions believe the status, or go on asking."""
     if goal.lost_result.asked_in_vain():
         goal.settle_as_planned(Outcome.SERVER_LOST, f"{goal.server} finished, but gave no result")
         return goal.end_by_status()
     goal.commands.append(Command.ASK_RESULT)
     again = ASK_IN_ANY_CASE if goal.lost_result.status is None else ASK_AGAIN
-    goal.deadlines.arm(Event.POLL_DUE, again, now)
+    goal.deadlines.arm(Event.POLL_DUE, again)
     return goal.state
 
 
 @leads_to(State.DONE)
-def finished(goal: Facts, now: Now, detail: Any) -> State:
+def finished(goal: Facts, detail: Any) -> State:
     """SUCCEEDED, ABORTED or CANCELED_BY_OTHER."""
     ended = goal.take_result(detail)
     told = {
@@ -80,33 +79,26 @@ def finished(goal: Facts, now: Now, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def denied(goal: Facts, now: Now, detail: Any) -> State:
+def denied(goal: Facts, detail: Any) -> State:
     """Ask again; believed the third time: SERVER_LOST, or what it was canceled for."""
     goal.lost_result.denials += 1
     if goal.lost_result.denials < DOUBTS:
-        goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN, now)
+        goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)
         return goal.state
-    ended = goal.lost_result.status
-    if ended is None:
+    if goal.lost_result.status is None:
         goal.commands.append(Command.CANCEL)  # should it run all the same
-        why = f"{goal.server} no longer knows the goal it accepted"
-    else:
-        why = (
-            f"it ended as {ENDS[ended]}, but {goal.server} knew its result no longer when asked "
-            "for it"
-        )
-    goal.settle_as_planned(Outcome.SERVER_LOST, why)
+    if goal.planned is None:
+        goal.plan(Outcome.SERVER_LOST, f"{goal.server} no longer knows the goal it accepted")
     return goal.end_by_status()
 
 
 @leads_to(State.REPLACED, State.CANCELING)
-def replaced(goal: Facts, now: Now, detail: Any) -> State:
+def replaced(goal: Facts, detail: Any) -> State:
     """Give it timeout.cancel to end by itself; where another server has the newer, cancel."""
     if detail not in (None, goal.server):
-        return canceling.stop(goal, now, Outcome.CANCELED, f"replaced by a newer goal on {detail}")
+        return canceling.stop(goal, Outcome.CANCELED, f"replaced by a newer goal on {detail}")
     if goal.state is State.EXECUTING:  # else by a newer one still, which gives it no more time
         goal.plan(Outcome.CANCELED, "replaced by a newer goal")
-        goal.deadlines.disarm(Event.RESULT_DUE)
-        goal.deadlines.disarm(Event.FEEDBACK_DUE)
-        goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel or PATIENCE, now)
+        goal.deadlines.disarm(Event.RESULT_DUE, Event.FEEDBACK_DUE)
+        goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel or PATIENCE)
     return State.REPLACED

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from bt_actions.goals.facts import Facts
-from bt_actions.goals.terms import Now, State
+from bt_actions.goals.terms import State
 
-Does = Callable[[Facts, Now, Any], State]
-"""Takes the goal, the moment, and what came with the event; returns the next state."""
+Does = Callable[[Facts, Any], State]
+"""Takes the goal and what came with the event; returns the next state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +25,9 @@ class Step:
     """Beside the state in which it is made."""
     says: str
 
-    def __call__(self, goal: Facts, now: Now, detail: Any = None) -> State:
+    def __call__(self, goal: Facts, detail: Any = None) -> State:
         """Make it."""
-        return self.does(goal, now, detail)
+        return self.does(goal, detail)
 
 
 def leads_to(*to: State) -> Callable[[Does], Step]:
@@ -36,6 +36,6 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
 
 @leads_to()
-def drop(goal: Facts, now: Now, detail: Any) -> State:
+def drop(goal: Facts, detail: Any) -> State:
     """Nothing: it came too late, or twice, to mean anything."""
     return goal.state

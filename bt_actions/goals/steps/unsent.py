@@ -7,13 +7,13 @@ from typing import Any
 from bt_actions.goals.facts import Facts
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.steps.step import Step, leads_to
-from bt_actions.goals.terms import Command, Event, Now, State
+from bt_actions.goals.terms import Command, Event, State
 
 
 def give_up(outcome: Outcome, why: str) -> Step:
     """Return the step that ends what was not sent."""
 
-    def step(goal: Facts, now: Now, detail: Any) -> State:
+    def step(goal: Facts, detail: Any) -> State:
         goal.settle(outcome, goal.say(why, detail))
         return State.DONE
 
@@ -21,26 +21,26 @@ def give_up(outcome: Outcome, why: str) -> Step:
 
 
 @leads_to(State.WAITING_FOR_SERVER)
-def granted(goal: Facts, now: Now, detail: Any) -> State:
+def granted(goal: Facts, detail: Any) -> State:
     """Hold the resources, and wait for the server."""
     goal.deadlines.disarm(Event.QUEUE_DUE)
-    goal.deadlines.arm(Event.SERVER_DUE, goal.timeouts.server, now)
+    goal.deadlines.arm(Event.SERVER_DUE, goal.timeouts.server)
     return State.WAITING_FOR_SERVER
 
 
 @leads_to(State.SENDING)
-def send(goal: Facts, now: Now, detail: Any) -> State:
+def send(goal: Facts, detail: Any) -> State:
     """Send it; until the server says how it ended, its end is UNKNOWN."""
     goal.deadlines.disarm(Event.SERVER_DUE)
-    goal.deadlines.hold(0.0, now)  # it was for a server that is out of sight
-    goal.deadlines.arm(Event.ACCEPT_DUE, goal.timeouts.accept, now)
+    goal.deadlines.hold(0.0, goal.deadlines.now)  # it was for a server that is out of sight
+    goal.deadlines.arm(Event.ACCEPT_DUE, goal.timeouts.accept)
     goal.end = End.UNKNOWN
     goal.commands.append(Command.SEND)
     return State.SENDING
 
 
 @leads_to(State.DONE)
-def send_failed(goal: Facts, now: Now, detail: Any) -> State:
+def send_failed(goal: Facts, detail: Any) -> State:
     """Give up: SERVER_UNAVAILABLE; nothing was started."""
     goal.end = End.NEVER_STARTED
     why = f"the goal request could not be sent: {detail}"
