@@ -51,7 +51,7 @@ class RunGoals:
         self._tree, self._emit, self._wake, self._minded = tree, emit, wake, minded
         self._token = object()  # in ours, which outlive the tree
         self._changes: deque[Change] = deque()
-        self._handles: set[GoalHandle] = set()
+        self._handles: dict[GoalHandle, None] = {}  # in the order in which they began
         self.run_goes_on = False
         """Between two runs only what earlier ones have left is of interest."""
 
@@ -93,7 +93,7 @@ class RunGoals:
     def note(self, change: Change | None) -> None:
         """Take note of a change of a goal of our node; called under the lock of the traffic."""
         if change is not None and self._is_ours(change.handle):
-            self._handles.add(change.handle)
+            self._handles[change.handle] = None
             self._changes.append(change)
             self._minded()
         elif not self.run_goes_on:
@@ -126,4 +126,5 @@ class RunGoals:
                         handle.goal.id.hex(),
                     )
                 )
-            self._handles.difference_update([each for each in list(self._handles) if each.is_over])
+            for done in [each for each in list(self._handles) if each.is_over]:
+                del self._handles[done]
