@@ -183,8 +183,7 @@ class ActionBehaviour(Behaviour):
         installed.
         """
         backend = backend_in(kwargs, self)
-        if isinstance(self.action_type, str):
-            self.action_type = interface(self.action_type, "action")
+        self.action_type = interface(self.action_type, "action")
         self._check_fields()
         if backend is not self._backend:
             self._leave_endpoint()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from py_trees.behaviour import Behaviour
 
@@ -58,13 +58,24 @@ class Countdown:
         return time.monotonic() if self._clock is None else self._clock.now().ros
 
 
-class Connected(Behaviour):
-    """A leaf that cannot do without a node, and has something of its own there."""
+class Thing(Protocol):
+    """What a leaf has on a node."""
+
+    def close(self) -> None:
+        """Let go of it."""
+
+
+T = TypeVar("T", bound=Thing)
+
+
+class Connected(Behaviour, Generic[T]):
+    """A leaf that cannot do without a node, and has one thing of its own there."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self._countdown = Countdown()
         self._backend: Backend | None = None
+        self._own: T | None = None
 
     def setup(self, **kwargs: Any) -> None:
         """Connect to the node given as ``node=``; again for the same node: fine."""
@@ -72,12 +83,19 @@ class Connected(Behaviour):
         if backend is not self._backend:
             self.shutdown()
             self._countdown.setup(backend)
-            self._connect(backend)
-            self._backend = backend
+            self._own, self._backend = self._make(backend), backend
 
-    def _connect(self, backend: Backend) -> None:
-        """Make what it needs there; `shutdown` lets go of it."""
+    def _make(self, backend: Backend) -> T:
+        """Make what it needs there."""
         raise NotImplementedError
 
+    def _there(self) -> tuple[Backend, T]:
+        """Return the node, and what it has there."""
+        if self._backend is None or self._own is None:
+            raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
+        return self._backend, self._own
+
     def shutdown(self) -> None:
-        self._backend = None
+        if self._own is not None:
+            self._own.close()
+        self._own = self._backend = None

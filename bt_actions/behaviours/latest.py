@@ -6,6 +6,7 @@ import threading
 from collections import deque
 from typing import Any
 
+from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
 
 __all__ = ["Latest"]
@@ -20,8 +21,8 @@ class Latest:
     A clock that jumps back makes no message younger, and none older.
     """
 
-    def __init__(self, backend: Backend, message_type: type, topic: str, qos: str) -> None:
-        self._backend = backend
+    def __init__(self, backend: Backend, message_type: type | str, topic: str, qos: str) -> None:
+        self.backend = backend
         self._lock = threading.Lock()
         self._message: Any = None
         self._age = 0.0
@@ -29,14 +30,15 @@ class Latest:
         self._kept: deque[Any] | None = None
         self.came = 0
         """How many messages have come."""
-        self._subscription = backend.subscription(message_type, topic, qos, self._take)
+        kind = interface(message_type, "msg")
+        self._subscription = backend.subscription(kind, topic, qos, self._take)
         self.topic = self._subscription.topic
         self.why_silent = self._subscription.why_silent
         self.close = self._subscription.close
 
     def get(self) -> tuple[Any, float]:
         """The message (None before the first), and its age in seconds."""
-        now = self._backend.clock.now().ros
+        now = self.backend.clock.now().ros
         with self._lock:
             self._age += max(0.0, now - self._aged_at)
             self._aged_at = now
@@ -67,11 +69,11 @@ class Latest:
             self._kept = None
 
     def _take(self, message: Any) -> None:
-        now = self._backend.clock.now().ros
+        now = self.backend.clock.now().ros
         with self._lock:
             self._message = message
             self._age, self._aged_at = 0.0, now
             self.came += 1
             if self._kept is not None:
                 self._kept.append(message)
-        self._backend.wake()
+        self.backend.wake()

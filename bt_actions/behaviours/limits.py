@@ -8,7 +8,6 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.connected import Countdown
 from bt_actions.behaviours.gate import Gate
 from bt_actions.expressions.expression import ExpressionError
@@ -44,7 +43,7 @@ class Deadline(Gate):
         self._expired = False
         self.feedback_message = ""
         try:
-            self._limit = seconds(self._after())
+            self._limit = parse_duration(self._after())
         except ValueError as error:
             self._limit = None
             self.feedback_message = str(error)
@@ -59,12 +58,13 @@ class Deadline(Gate):
             self.decorated.stop(Status.INVALID)
         if not self._expired:
             return None
-        stopping = [node.name for node in self.decorated.iterate() if draining(node)]
+        below = list(self.decorated.iterate())
+        stopping = [node.name for node in below if getattr(node, "draining", False)]
         if stopping:
             self.feedback_message = f"{self._limit:g} s are over; waiting for {stopping[0]} to end"
             return Status.RUNNING
         self.feedback_message = f"not done within {self._limit:g} s"
-        unknown = [node.name for node in self.decorated.iterate() if not drained(node)]
+        unknown = [node.name for node in below if not getattr(node, "drained", True)]
         if unknown:
             self.feedback_message += f"; the end of {', '.join(unknown)} is not known"
         return Status.FAILURE
@@ -103,18 +103,3 @@ class While(Gate):
 
     def update(self) -> Status:
         return self.decorated.status
-
-
-def draining(node: Behaviour) -> bool:
-    """Whether something of a behaviour goes on outside of the tree, and is waited for."""
-    return isinstance(node, ActionBehaviour) and node.draining
-
-
-def drained(node: Behaviour) -> bool:
-    """Whether nothing of a behaviour goes on outside of the tree."""
-    return not isinstance(node, ActionBehaviour) or node.drained
-
-
-def seconds(value: object) -> float:
-    """A duration that was computed. Raises ValueError."""
-    return parse_duration(value)

@@ -18,7 +18,7 @@ from bt_actions.traffic.backend import Backend, Service
 __all__ = ["CallService"]
 
 
-class CallService(Connected):
+class CallService(Connected[Service]):
     """Calls a service once, and again as `retry` says.
 
     A call that was not answered in time may have been carried out all the same: it is tried again
@@ -61,36 +61,34 @@ class CallService(Connected):
         self._when = condition_of(self.retry.when, "retry.when")
         self._save = save
         self._pause = Countdown()
-        self._client: Service | None = None
 
-    def _connect(self, backend: Backend) -> None:
-        if isinstance(self.service_type, str):
-            self.service_type = interface(self.service_type, "srv")
+    def _make(self, backend: Backend) -> Service:
         self._pause.setup(backend)
-        self._client = backend.service(self.service_type, self.service_name)
+        self.service_type = interface(self.service_type, "srv")
+        return backend.service(self.service_type, self.service_name)
 
     def initialise(self) -> None:
-        assert self._client is not None, "not set up"
-        self._client.drop()
+        _, client = self._there()
+        client.drop()
         self.attempt = 1
         self.response = None
         self._pause.start(0.0)
         self._countdown.start(self._limits[0])
 
     def update(self) -> Status:
-        assert self._client is not None, "not set up"
+        backend, client = self._there()
         if self._pause.left() > 0.0:
             return Status.RUNNING
-        if not self._client.calling:
-            return self._try_to_call(self._client)
-        if not self._client.answered:
-            self.feedback_message = f"waiting for an answer of {self._client.name}"
+        if not client.calling:
+            return self._try_to_call(backend, client)
+        if not client.answered:
+            self.feedback_message = f"waiting for an answer of {client.name}"
             if self._countdown.left() <= 0.0:
-                self._client.drop()
+                client.drop()
                 return self._failed(f"no answer within {self._limits[1]:g} s")
             return Status.RUNNING
         try:
-            self.response = self._client.answer()
+            self.response = client.answer()
             if self._expect is not None and not self._expect(self.response):
                 return self._failed("the answer is not what was expected")
             if self._save is not None:
@@ -101,35 +99,27 @@ class CallService(Connected):
         return Status.SUCCESS
 
     def terminate(self, new_status: Status) -> None:
-        if self._client is not None:
-            self._client.drop()
-
-    def shutdown(self) -> None:
-        if self._client is not None:
-            self._client.close()
-        self._client = self._backend = None
+        if self._own is not None:
+            self._own.drop()
 
     def due_in(self) -> float | None:
         """Seconds until the next deadline or try."""
         if self._pause.left() > 0.0:
             return self._pause.left()
-        if self._client is None or not self._client.calling:
+        if self._own is None or not self._own.calling:
             return 0.05  # nothing announces that a service has come up
         return self._countdown.left()
 
-    def _try_to_call(self, client: Service) -> Status:
+    def _try_to_call(self, backend: Backend, client: Service) -> Status:
         if not client.ready:
             self.feedback_message = f"waiting for the service {client.name}"
             if self._countdown.left() <= 0.0:
                 why = client.why_absent()
                 return self._failed(f"no service {client.name} within {self._limits[0]:g} s{why}")
             return Status.RUNNING
-        assert self._backend is not None
         service_type: Any = self.service_type
         try:
-            request: Any = fill(
-                service_type.Request, self._request(), now=self._backend.clock.stamp
-            )
+            request: Any = fill(service_type.Request, self._request(), now=backend.clock.stamp)
         except ValueError as error:
             self.feedback_message = str(error)
             return Status.FAILURE
@@ -139,11 +129,10 @@ class CallService(Connected):
         return Status.RUNNING
 
     def _failed(self, reason: str) -> Status:
-        assert self._backend is not None
         self.feedback_message = reason
         if self.attempt >= self.retry.attempts or not self._worth_it():
             return Status.FAILURE
-        self._pause.start(self.retry.pause(self.attempt, self._backend.randomness))
+        self._pause.start(self.retry.pause(self.attempt, self._there()[0].randomness))
         self.attempt += 1
         self.response = None
         self._countdown.start(self._limits[0] + self._pause.left())

@@ -22,10 +22,6 @@ LOOKS = 0.05
 """Seconds between two looks for somebody who listens: nothing announces that."""
 
 
-def _class(message_type: type | str) -> type:
-    return message_type if isinstance(message_type, type) else interface(message_type, "msg")
-
-
 class TopicValue:
     """A topic whose latest message a tree reads as a variable."""
 
@@ -33,11 +29,8 @@ class TopicValue:
         self, name: str, message_type: type | str, topic: str, qos: str, max_age: float | None
     ) -> None:
         self.name = name
-        self._type = message_type
-        self._topic = topic
-        self._qos = qos
+        self._given = message_type, topic, qos
         self._max_age = max_age
-        self._backend: Backend | None = None
         self._latest: Latest | None = None
         self._said = ""
         self._look_again_at = 0.0
@@ -45,24 +38,27 @@ class TopicValue:
     def connect(self, node: Any) -> None:
         """Subscribe on a node; again for the same node: nothing."""
         backend = None if node is None else backend_of(node)
-        if backend is None or backend is self._backend:
-            return
-        self.close()
-        self._latest = Latest(backend, _class(self._type), self._topic, self._qos)
-        self._backend = backend
+        if backend is not None and (self._latest is None or self._latest.backend is not backend):
+            self.close()
+            self._latest = Latest(backend, *self._given)
 
     def close(self) -> None:
         """Unsubscribe."""
         if self._latest is not None:
             self._latest.close()
-        self._latest = self._backend = None
+        self._latest = None
 
     def read(self) -> object:
         """The latest message. Raises ExpressionError when there is none, or it is too old."""
-        message, age = (None, 0.0) if self._latest is None else self._latest.get()
-        topic = self._topic if self._latest is None else self._latest.topic
+        message, age, topic, why = None, 0.0, self._given[1], ""
+        if (latest := self._latest) is not None:
+            (message, age), topic = latest.get(), latest.topic
+            now = latest.backend.clock.now().steady
+            if message is None and now >= self._look_again_at:  # a tree may ask at each tick
+                self._said, self._look_again_at = latest.why_silent(), now + 1.0
+            why = self._said
         if message is None:
-            raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._why()}")
+            raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){why}")
         if self._max_age is not None and age > self._max_age:
             raise ExpressionError(f"the last message on {topic} is {age:.1f} s old (${self.name})")
         return message
@@ -70,14 +66,6 @@ class TopicValue:
     def first_may_come(self) -> float:
         """Seconds for which the first message may be on its way; 0 afterwards."""
         return 0.0 if self._latest is None else self._latest.first_may_come()
-
-    def _why(self) -> str:
-        """Why nothing has come; looked up once a second at most, as a tree may ask at each tick."""
-        if self._latest is not None and self._backend is not None:
-            now = self._backend.clock.now().steady
-            if now >= self._look_again_at:
-                self._said, self._look_again_at = self._latest.why_silent(), now + 1.0
-        return self._said
 
 
 def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
@@ -109,7 +97,7 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
     behaviour.due_in = due  # type: ignore[attr-defined]
 
 
-class WaitForMessage(Connected):
+class WaitForMessage(Connected[Latest]):
     """Succeeds with the first message, since it started, for which a condition holds.
 
     Args:
@@ -135,30 +123,28 @@ class WaitForMessage(Connected):
         save: Callable[[Any], None] | None = None,
     ) -> None:
         super().__init__(name)
-        self._type = message_type
-        self._topic = topic
-        self._qos = qos
+        self._given = message_type, topic, qos
         self._until = until
         self._timeout = limit(timeout)
         self._save = save
         self._came_before = 0
-        self._latest: Latest | None = None
 
-    def _connect(self, backend: Backend) -> None:
-        self._latest = Latest(backend, _class(self._type), self._topic, self._qos)
+    def _make(self, backend: Backend) -> Latest:
+        latest = Latest(backend, *self._given)
         if self.status is Status.RUNNING:  # shut down in its visit, and set up again
-            self._latest.keep()
+            latest.keep()
+        return latest
 
     def initialise(self) -> None:
-        if self._latest is not None:  # what a latched topic delivered before is as good as new
-            self._latest.keep(with_latest=self._qos == "latched")
-            self._came_before = self._latest.came
+        _, latest = self._there()  # what a latched topic delivered before is as good as new
+        latest.keep(with_latest=self._given[2] == "latched")
+        self._came_before = latest.came
         self._countdown.start(self._timeout)
 
     def update(self) -> Status:
-        assert self._latest is not None, "not set up"
-        self.feedback_message = f"waiting for a message on {self._latest.topic}"
-        for message in self._latest.take():
+        _, latest = self._there()
+        self.feedback_message = f"waiting for a message on {latest.topic}"
+        for message in latest.take():
             try:
                 if self._until is None or self._until(message):
                     if self._save is not None:
@@ -169,28 +155,23 @@ class WaitForMessage(Connected):
             except ValueError as error:  # ExpressionError, or what is saved does not fit
                 self.feedback_message = str(error)
         if self._countdown.left() <= 0.0:
-            topic, before = self._latest.topic, self._came_before
+            topic, before = latest.topic, self._came_before
             why = f"; {before} came before it began" if before else ""
-            why = why if self._latest.came else self._latest.why_silent()
+            why = why if latest.came else latest.why_silent()
             self.feedback_message = f"no such message on {topic} within {self._timeout:g} s{why}"
             return Status.FAILURE
         return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        if self._latest is not None:
-            self._latest.keep_no_more()
+        if self._own is not None:
+            self._own.keep_no_more()
 
     def due_in(self) -> float | None:
         """Seconds until it fails."""
         return self._countdown.left()
 
-    def shutdown(self) -> None:
-        if self._latest is not None:
-            self._latest.close()
-        self._latest = self._backend = None
 
-
-class Publish(Connected):
+class Publish(Connected[Publisher]):
     """Publishes one message and succeeds; fails when the message cannot be built.
 
     Before it publishes it waits for who listens: for `subscribers` where given; without that only
@@ -223,42 +204,41 @@ class Publish(Connected):
         super().__init__(name)
         self.warning = ""
         """What a SUCCESS does not say: that nobody listened."""
-        self._type = message_type
+        self._type: Any = message_type
         self._topic = topic
         self._data = data
         self._qos = qos
         self._subscribers = subscribers
         self._timeout = limit(timeout)
-        self._publisher: Publisher | None = None
 
-    def _connect(self, backend: Backend) -> None:
-        self._publisher = backend.publisher(_class(self._type), self._topic, self._qos)
+    def _make(self, backend: Backend) -> Publisher:
+        self._type = interface(self._type, "msg")
+        return backend.publisher(self._type, self._topic, self._qos)
 
     def initialise(self) -> None:
         self.warning = ""
         self._countdown.start(self._timeout)
 
     def update(self) -> Status:
-        assert self._publisher is not None, "not set up"
-        assert self._backend is not None
-        topic, listeners = self._publisher.topic, self._publisher.listeners
-        if listeners < (self._subscribers or self._publisher.listener_may_come() > 0.0):
-            if self._subscribers and self._is_late(self._publisher):
+        backend, publisher = self._there()
+        topic, listeners = publisher.topic, publisher.listeners
+        if listeners < (self._subscribers or publisher.listener_may_come() > 0.0):
+            if self._subscribers and self._is_late(publisher):
                 self.feedback_message = (
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
-                    f" {self._timeout:g} s{self._publisher.why_unheard()}"
+                    f" {self._timeout:g} s{publisher.why_unheard()}"
                 )
                 return Status.FAILURE
             self.feedback_message = f"waiting for who listens on {topic}"
             return Status.RUNNING
         try:
-            message: Any = fill(_class(self._type), self._data(), now=self._backend.clock.stamp)
+            message: Any = fill(self._type, self._data(), now=backend.clock.stamp)
         except ValueError as error:
             self.feedback_message = str(error)
             return Status.FAILURE
-        self._publisher.publish(message)
+        publisher.publish(message)
         if not listeners:
-            self.warning = f"nobody listens on {topic}{self._publisher.why_unheard()}"
+            self.warning = f"nobody listens on {topic}{publisher.why_unheard()}"
         self.feedback_message = self.warning
         return Status.SUCCESS
 
@@ -269,8 +249,3 @@ class Publish(Connected):
     def due_in(self) -> float | None:
         """Seconds until it looks again for who listens."""
         return LOOKS
-
-    def shutdown(self) -> None:
-        if self._publisher is not None:
-            self._publisher.close()
-        self._publisher = self._backend = None

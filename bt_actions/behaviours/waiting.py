@@ -9,8 +9,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Countdown, limit
-from bt_actions.behaviours.limits import seconds
 from bt_actions.expressions.expression import ExpressionError
+from bt_actions.utilities.units import parse_duration
 
 __all__ = ["Wait", "WaitUntil"]
 
@@ -30,7 +30,7 @@ class Wait(Behaviour):
     def initialise(self) -> None:
         self._refused = ""
         try:
-            self._countdown.start(seconds(self._duration()))
+            self._countdown.start(parse_duration(self._duration()))
         except ValueError as error:
             self._refused = str(error)
 

@@ -39,12 +39,16 @@ class UnknownInterface(LookupError):
 
 
 @lru_cache(maxsize=1024)
-def interface(name: str, kind: Kind) -> type:
+def interface(name: str | type, kind: Kind) -> type:
     """The class of ``"pkg/action/Name"``; ``"pkg/Name"`` will do, since the kind is known.
+
+    A class stands for itself.
 
     Raises UnknownInterface, which names the package, or what it holds instead. A class that was
     found is looked for no more.
     """
+    if isinstance(name, type):
+        return name
     package, short = _split(name, kind)
     folder = _folder(package, kind)
     if folder is None:

@@ -329,7 +329,7 @@ def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_ti
         publisher.publish(Int32(data=number))
         until(
             lambda: all(
-                getattr(topic.get()[0], "data", None) == number for topic in (seen, waits._latest)
+                getattr(topic.get()[0], "data", None) == number for topic in (seen, waits._own)
             ),
             meanwhile=lambda: executor.spin_once(timeout_sec=0.01),
         )
@@ -342,8 +342,8 @@ def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_ti
     waits.tick_once()
     assert waits.status is Status.SUCCESS
     publish(4)
-    assert waits._latest is not None
-    assert waits._latest.take() == [], "nobody waits any longer"
+    assert waits._own is not None
+    assert waits._own.take() == [], "nobody waits any longer"
     seen.keep()
     for number in range(KEPT + 2):
         publish(number)
@@ -368,7 +368,7 @@ def test_messages_that_came_before_it_began_are_told(node: Any, name: str) -> No
     executor.add_node(node)
     publisher.publish(Bool())
     until(
-        lambda: waits._latest is not None and waits._latest.came,
+        lambda: waits._own is not None and waits._own.came,
         meanwhile=lambda: executor.spin_once(timeout_sec=0.01),
     )
     until(lambda: waits.status is Status.FAILURE, meanwhile=waits.tick_once)
