@@ -12,27 +12,20 @@ record, and it is awaited (unanswered.py): its server is asked again and again t
 
 from __future__ import annotations
 
-import contextlib
 import time
 import uuid
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from typing import Any
-
-from rclpy.context import Context
-from rclpy.exceptions import NameValidationException, NotInitializedException
-from rclpy.expand_topic_name import expand_topic_name
-from rclpy.node import Node
-from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.ids import Author, author_of
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
-from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, Denial, RollCall
+from bt_actions.recovery.left_behind import LeftBehind
+from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, RollCall
 from bt_actions.recovery.unanswered import Unanswered
-from bt_actions.ros.action_view import STATUS, ActionView
-from bt_actions.ros.workarounds import participant
+from bt_actions.ros.onlooker import ActionView, CannotStart, Onlooker, onlooker
 from bt_actions.servers.stalls import Stalls
 
 TURN = 0.05
@@ -47,50 +40,6 @@ LOOK_AGAIN = 10.0
 """Seconds after which, at the latest, a participant that is not answered gives way to another."""
 CANCELS_A_TURN = 5
 """So many goals of an action at once: a server keeps its last ten requests only."""
-
-
-@dataclass(slots=True)
-class LeftBehind:
-    """A goal whose orchestrator is dead. `end` is UNKNOWN until the server tells.
-
-    Where `servers` of one name were in sight, and not one, it stays UNKNOWN: either may run it, and
-    a status does not tell whose it is.
-    """
-
-    action: str
-    goal_id: bytes
-    pid: int
-    shown: End = End.UNKNOWN
-    servers: int = 1
-    asked_at: float = float("-inf")
-    takes: float = DENIED_FOR_GOOD
-    """Seconds for which it has to be denied until it will not turn up any more."""
-    awaited: bool = False
-    """It was sent, and no server has shown it yet; one may."""
-    nothing_left: str = ""
-    """Why none will, or its end is not told: it need not be awaited."""
-    server_is_gone: bool = False
-    """That is why."""
-    denial: Denial = field(default_factory=Denial)
-
-    @property
-    def end(self) -> End:
-        """How it ended, as far as is known."""
-        return self.shown if self.servers <= 1 else End.UNKNOWN
-
-    @property
-    def is_over(self) -> bool:
-        """Whether nobody runs it, nor will."""
-        return self.end is not End.UNKNOWN or bool(self.nothing_left)
-
-    def is_nowhere(self, why: str) -> None:
-        """No server has it, nor will."""
-        self.awaited, self.nothing_left = False, why
-
-    def is_awaited_again(self) -> None:
-        """A server that may have it is in sight after all."""
-        self.awaited, self.nothing_left, self.server_is_gone = True, "", False
-        self.denial.begin()
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +57,6 @@ class Swept:
     """Why nobody can read what was sent and is not answered."""
 
 
-class CannotStart(RuntimeError):
-    """ROS 2 cannot start: the domain id is none, say."""
-
-
 def cleanup(
     *,
     look: float = 5.0,
@@ -124,7 +69,7 @@ def cleanup(
     namespace: str = "",
     missing: Callable[[list[str], bool], None] = lambda actions, in_vain: None,
     stopped: Callable[[], bool] = lambda: False,
-    context: Context | None = None,
+    context: Any = None,
 ) -> Swept:
     """Cancel what dead orchestrators of this machine left; return it with its ends.
 
@@ -158,8 +103,8 @@ def cleanup(
         still = Stalls()
         still.lives(time.monotonic())  # it counts from when the participant is made
         try:
-            with _participant(context, namespace) as node:
-                sweep.begin(node, wanted)
+            with onlooker(context, namespace) as sight:
+                sweep.begin(sight, wanted)
                 if sweep.goes_through(still, breaks_off=tries_left > 0):
                     break
         except CannotStart:
@@ -167,39 +112,6 @@ def cleanup(
                 raise
             break
     return sweep.ends()
-
-
-@contextlib.contextmanager
-def _participant(context: Context | None, namespace: str) -> Iterator[Node]:
-    """A node that nobody spins: what comes in is taken from it by hand."""
-    own = Context() if context is None else context
-    try:
-        if context is None:
-            own.init()
-        node = Node(
-            "bt_actions_cleanup", context=own, namespace=namespace, start_parameter_services=False
-        )
-    except (RuntimeError, OSError, NameValidationException, NotInitializedException) as error:
-        if context is None:
-            own.try_shutdown()
-        raise CannotStart(str(error).splitlines()[0]) from error
-    try:
-        yield node
-    finally:
-        if context is None:
-            participant.close(node, own)
-        else:
-            node.destroy_node()
-
-
-def _full_name(name: str, node: Node) -> str:
-    """Return the name as a run means it, remapped. Raises ValueError where it is none."""
-    full = str(expand_topic_name(name, node.get_name(), node.get_namespace()))
-    try:
-        validate_full_topic_name(full)
-    except NameValidationException as error:
-        raise ValueError(str(error)) from error
-    return full
 
 
 class _Sweep:
@@ -237,15 +149,15 @@ class _Sweep:
         self._domain = 0
         self._looked_out = False  # for as long as for what is wanted
 
-    def begin(self, node: Node, wanted: Collection[str] | None) -> None:
-        """Go on with what this node sees. Raises ValueError for a name that is none."""
-        names = [_full_name(name, node) for name in wanted or ()]
+    def begin(self, sight: Onlooker, wanted: Collection[str] | None) -> None:
+        """Go on with what is seen here. Raises ValueError for a name that is none."""
+        names = [sight.full_name(name) for name in wanted or ()]
         now = time.monotonic()
         if not self.has_begun:
             self._deadline = now + max(self._look, LOOK_LONGEST)
         self.has_begun = True
-        self._node = node
-        self._domain = int(node.context.get_domain_id())
+        self._sight = sight
+        self._domain = sight.domain
         self._wanted = None if wanted is None else frozenset(names)
         self._views: dict[str, ActionView] = {}
         self._glanced_at = float("-inf")
@@ -379,10 +291,9 @@ class _Sweep:
 
     def _glance(self, now: float) -> None:
         """See which actions are in sight, and how many servers each has."""
-        for topic, _types in self._node.get_topic_names_and_types():
-            action = topic.removesuffix(STATUS)
-            if topic.endswith(STATUS) and action not in self._views:
-                self._views[action] = ActionView(self._node, action)
+        for action in self._sight.actions():
+            if action not in self._views:
+                self._views[action] = self._sight.view(action)
                 self._calls.setdefault(action, RollCall(now))
         for action, view in self._views.items():
             call = self._calls[action]

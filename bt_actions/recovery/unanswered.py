@@ -1,19 +1,16 @@
 """What dead processes sent and nobody answered (ledger.py), as a cleanup awaits it.
 
-Each is awaited until a server shows it, or it is sure that none will. Asks nobody: cleanup.py does.
+Each is awaited until a server shows it, or it is sure that none will. Asks nobody: sweep.py does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from bt_actions.recovery.ledger import Sent, left_behind, mark_lost, strike_left
+from bt_actions.recovery.left_behind import LeftBehind
 from bt_actions.recovery.roll_call import RollCall
-
-if TYPE_CHECKING:
-    from bt_actions.recovery.sweep import LeftBehind
 
 
 class Unanswered:

@@ -16,7 +16,8 @@ from bt_actions.cli.driving.signals import SAME_WISH
 from bt_actions.cli.driving.sweep import _Stop, sweep
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
-from bt_actions.recovery.sweep import LeftBehind, Swept
+from bt_actions.recovery.left_behind import LeftBehind
+from bt_actions.recovery.sweep import Swept
 from tests.cli.conftest import Start
 from tests.support.processes import Journal, Process
 from tests.support.waiting import holds_for, until

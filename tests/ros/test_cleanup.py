@@ -16,9 +16,11 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
+from bt_actions.recovery.left_behind import LeftBehind
 from bt_actions.recovery.roll_call import RollCall
-from bt_actions.recovery.sweep import CannotStart, LeftBehind, Swept, cleanup
-from bt_actions.ros import action_view
+from bt_actions.recovery.sweep import Swept, cleanup
+from bt_actions.ros import onlooker as sight
+from bt_actions.ros.onlooker import CannotStart
 from bt_actions.servers.stalls import OUT_OF_SIGHT, Stalls
 from tests.support.processes import HostFactory, Journal, Process
 
@@ -76,7 +78,7 @@ def test_of_two_servers_each_has_to_answer(
     hosts = [new_host(short_lease=False) for _ in range(2)]
     for host in hosts:
         host.open(name)
-    real = action_view.servers
+    real = sight.servers
 
     def stopping(node: Any, action: str) -> frozenset[bytes]:
         shown = real(node, action)
@@ -84,7 +86,7 @@ def test_of_two_servers_each_has_to_answer(
             hosts[0].send(signal.SIGSTOP)
         return shown
 
-    monkeypatch.setattr(action_view, "servers", stopping)
+    monkeypatch.setattr(sight, "servers", stopping)
     swept, told = sweep([name])
     hosts[0].send(signal.SIGCONT)
     assert told == [name]
@@ -115,13 +117,13 @@ def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
     left: str, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It went away meanwhile, frozen perhaps, and may run the goal."""
-    real, found = action_view.servers, list[LeftBehind]()
+    real, found = sight.servers, list[LeftBehind]()
 
     def one_goes(node: Any, action: str) -> frozenset[bytes]:
         shown = real(node, action)
         return shown | {b"another"} if action == name and shown and not found else shown
 
-    monkeypatch.setattr(action_view, "servers", one_goes)
+    monkeypatch.setattr(sight, "servers", one_goes)
     swept, _told = sweep(
         [name],
         found=found.append,
@@ -153,7 +155,7 @@ def test_it_ends_though_new_actions_come_in_sight(
     monkeypatch.setattr(module, "LOOK_LONGEST", 1.0)
     numbers = itertools.count()
 
-    class Crowded(module.Node):  # type: ignore[misc]  # rclpy is not typed
+    class Crowded(sight.Node):  # type: ignore[misc]  # rclpy is not typed
         def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
             number = next(numbers)
             assert number < 200, "it does not end"
@@ -162,7 +164,7 @@ def test_it_ends_though_new_actions_come_in_sight(
         def count_publishers(self, topic: str) -> int:
             return int(topic.startswith("/crowd_"))
 
-    monkeypatch.setattr(module, "Node", Crowded)
+    monkeypatch.setattr(sight, "Node", Crowded)
     told: list[str] = []
     swept = cleanup(look=0.2, missing=lambda names, in_vain: told.extend(names if in_vain else ()))
     assert {"/crowd_0", "/crowd_1"} <= set(swept.unknown) == set(told)
@@ -210,7 +212,7 @@ def test_a_context_that_is_shut_down_meanwhile_hides_no_interrupt(
         contexts[0].shutdown()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(module, "Context", Kept)
+    monkeypatch.setattr(sight, "Context", Kept)
     with pytest.raises(KeyboardInterrupt):
         cleanup(stopped=interrupted)
 
@@ -318,15 +320,15 @@ def test_cleanup_that_cannot_look_again_says_who_has_not_answered(
 ) -> None:
     """What it has found by then is told."""
 
-    class Once(module.Node):  # type: ignore[misc]  # rclpy is not typed
+    class Once(sight.Node):  # type: ignore[misc]  # rclpy is not typed
         def __init__(self, name: str, **how: Any) -> None:
-            monkeypatch.setattr(module, "Node", no_more)
+            monkeypatch.setattr(sight, "Node", no_more)
             super().__init__(name, **how)
 
     def no_more(*_: object, **__: object) -> None:
         raise RuntimeError("no descriptors")
 
-    monkeypatch.setattr(module, "Node", Once)
+    monkeypatch.setattr(sight, "Node", Once)
     host, told = new_host(short_lease=False), list[tuple[list[str], bool]]()
     host.open(name)
     swept = cleanup(
@@ -350,13 +352,13 @@ def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(
     """What announces itself just before is what may be dropped by a server for good."""
     made = list[str]()
 
-    class Slow(module.Node):  # type: ignore[misc]  # rclpy is not typed
+    class Slow(sight.Node):  # type: ignore[misc]  # rclpy is not typed
         def __init__(self, name: str, **how: Any) -> None:
             super().__init__(name, **how)
             if not made:
                 time.sleep(OUT_OF_SIGHT + 0.1)
             made.append(name)
 
-    monkeypatch.setattr(module, "Node", Slow)
+    monkeypatch.setattr(sight, "Node", Slow)
     assert cleanup(look=0.1, patience=0.1).left == []
     assert len(made) == 2

@@ -14,9 +14,11 @@ from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery import unanswered as module_of_unanswered
 from bt_actions.recovery.ledger import Sent
+from bt_actions.recovery.left_behind import LeftBehind
 from bt_actions.recovery.roll_call import RollCall
-from bt_actions.recovery.sweep import CannotStart, LeftBehind, Swept, cleanup
+from bt_actions.recovery.sweep import Swept, cleanup
 from bt_actions.recovery.unanswered import Unanswered
+from bt_actions.ros.onlooker import CannotStart
 from tests.support.processes import Journal, Process
 
 SEND = """
@@ -225,7 +227,7 @@ def test_one_that_was_not_looked_for_to_the_end_stays_on_record(
 
         def once(self: Any, *given: Any) -> None:
             begin(self, *given)
-            monkeypatch.setattr(module, "_participant", no_more)
+            monkeypatch.setattr(module, "onlooker", no_more)
 
         monkeypatch.setattr(module._Sweep, "begin", once)
         sweep()

@@ -708,7 +708,8 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     """SIGKILL to the orchestrator while cleanup looks, and has seen its goal"""
     from rclpy.context import Context
 
-    from bt_actions.recovery.sweep import LeftBehind, cleanup
+    from bt_actions.recovery.left_behind import LeftBehind
+    from bt_actions.recovery.sweep import cleanup
 
     journal = serve("1:slow=10")
     run = launch("run", str(tree(name, distance=9.0)))

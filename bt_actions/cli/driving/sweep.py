@@ -16,7 +16,8 @@ from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note, wri
 from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
-    from bt_actions.recovery.sweep import LeftBehind, Swept
+    from bt_actions.recovery.left_behind import LeftBehind
+    from bt_actions.recovery.sweep import Swept
 
 
 def sweep(
@@ -71,7 +72,8 @@ def _sweep(
 ) -> tuple[Swept, list[str], list[str]]:
     """Look, and cancel; return what was seen, goals of others, and actions that are missing."""
     with importing_ros():
-        from bt_actions.recovery.sweep import CannotStart, cleanup
+        from bt_actions.recovery.sweep import cleanup
+        from bt_actions.ros.onlooker import CannotStart
 
     refuse_domain()
     foreign: list[str] = []

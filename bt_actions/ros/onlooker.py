@@ -1,20 +1,29 @@
-"""One action as a cleanup sees it: who serves it, what it says it runs, and requests to cancel.
+"""What a cleanup sees of a ROS domain: the actions in sight, what each runs, requests to cancel.
 
-Needs no action type, and knows of nobody's goals. Decides nothing: cleanup.py does.
+Needs no action type, and knows of nobody's goals. Nobody spins the node: what comes in is taken
+from it by hand. Decides nothing (recovery/sweep.py).
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from typing import Any
 
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
+from rclpy.context import Context
+from rclpy.exceptions import NameValidationException, NotInitializedException
+from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.validate_full_topic_name import validate_full_topic_name
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.ros.graph import servers
+from bt_actions.ros.workarounds import participant
+
+__all__ = ["ActionView", "CannotStart", "Onlooker", "onlooker"]
 
 STATUS = "/_action/status"
 """What the name of an action's status topic ends with."""
@@ -85,3 +94,57 @@ class ActionView:
         handle = self._client.handle
         with handle:
             return int(handle.send_request(request))
+
+
+class CannotStart(RuntimeError):
+    """ROS 2 cannot start: the domain id is none, say."""
+
+
+class Onlooker:
+    """What one participant has in sight."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.domain = int(node.context.get_domain_id())
+
+    def full_name(self, name: str) -> str:
+        """Return the name as a run means it, remapped. Raises ValueError where it is none."""
+        node = self._node
+        full = str(expand_topic_name(name, node.get_name(), node.get_namespace()))
+        try:
+            validate_full_topic_name(full)
+        except NameValidationException as error:
+            raise ValueError(str(error)) from error
+        return full
+
+    def actions(self) -> list[str]:
+        """Return the names of the actions that anybody serves, or is a client of."""
+        topics = [topic for topic, _types in self._node.get_topic_names_and_types()]
+        return [topic.removesuffix(STATUS) for topic in topics if topic.endswith(STATUS)]
+
+    def view(self, action: str) -> ActionView:
+        """Look at one of them from now on."""
+        return ActionView(self._node, action)
+
+
+@contextlib.contextmanager
+def onlooker(context: Context | None, namespace: str) -> Iterator[Onlooker]:
+    """Look from a node in `context`, or in one of its own. Raises CannotStart."""
+    own = Context() if context is None else context
+    try:
+        if context is None:
+            own.init()
+        node = Node(
+            "bt_actions_cleanup", context=own, namespace=namespace, start_parameter_services=False
+        )
+    except (RuntimeError, OSError, NameValidationException, NotInitializedException) as error:
+        if context is None:
+            own.try_shutdown()
+        raise CannotStart(str(error).splitlines()[0]) from error
+    try:
+        yield Onlooker(node)
+    finally:
+        if context is None:
+            participant.close(node, own)
+        else:
+            node.destroy_node()
