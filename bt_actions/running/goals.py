@@ -10,17 +10,14 @@ import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from py_trees.trees import BehaviourTree
 
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.traffic.begun import begun_in
+from bt_actions.traffic.handle import Change, GoalHandle
 from bt_actions.utilities.places import root_of
-
-if TYPE_CHECKING:
-    from bt_actions.traffic.handle import Change, GoalHandle
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,10 @@ thread, no wait, no ROS: a thread steps it, or a test in virtual time.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Duration, Status
@@ -21,13 +22,11 @@ from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeSt
 from bt_actions.running.goals import RunGoals
 from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, SetUp, tick_once
 from bt_actions.running.watchdog import Watchdog
+from bt_actions.traffic.drain import Drain
 from bt_actions.utilities.places import culprit_of, path_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
 from bt_actions.wiring import backend_of
-
-if TYPE_CHECKING:
-    from bt_actions.traffic.handle import GoalHandle
 
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
@@ -37,26 +36,6 @@ LONGEST_WAIT = 3600.0
 
 class TreeError(Exception):
     """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
-
-
-class Draining(Protocol):
-    """Goals that are seen to their ends."""
-
-    def step(self, now: float, *, hurry: bool) -> Sleep | Done[Any]:
-        """Go on with it; with `hurry`, wait for nothing any more."""
-
-
-class Log(Protocol):
-    """Takes lines from any thread, and never waits."""
-
-    def warning(self, text: str) -> None:
-        """Of what should not be."""
-
-    def error(self, text: str) -> None:
-        """Of what must not be."""
-
-    def flush(self) -> None:
-        """Have what was said written, before more is told by other ways."""
 
 
 class _Abandoned(BaseException):
@@ -75,9 +54,6 @@ class TickLoop:
         tree: BehaviourTree,
         node: Any,
         *,
-        steady: Callable[[], float],
-        drain: Callable[[list[GoalHandle]], Draining],
-        log: Log,
         heartbeat: float = 0.1,
         wake: Callable[[], None] = lambda: None,
         ready: Callable[[], None] = lambda: None,
@@ -89,9 +65,6 @@ class TickLoop:
         Args:
             tree: what is ticked.
             node: what each behaviour is set up with; a Backend may stand for it.
-            steady: the steady clock that the times given to it are of.
-            drain: begins to see goals to their ends.
-            log: where lines go.
             heartbeat: seconds after which it ticks though nothing has happened.
             wake: is called on any thread, and in signal handlers, where a step is wanted now.
             ready: is called in each run when the tree is set up, before the first tick.
@@ -99,12 +72,12 @@ class TickLoop:
             misbehaved: is asked after each behaviour's tick what that did wrong.
         """
         self.tree, self.heartbeat = tree, heartbeat
-        self._traffic, self._node, self._log = backend_of(node).traffic, node, log
-        self._drain_of, self._wake = drain, wake
+        self._traffic, self._node, self._wake = backend_of(node).traffic, node, wake
+        self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
         self._observers: list[Observer] = []
         self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.mind())
-        self.watchdog = Watchdog(self._traffic, self.goals, steady, log.warning)
+        self.watchdog = Watchdog(self._traffic, self.goals)
         self._visitor = ChangeVisitor(self._set_up_rest, self._after_each)
         self._set_up = SetUp()
         self._doing = "setup"
@@ -118,7 +91,7 @@ class TickLoop:
         self._burst = 0
         self._status = Status.INVALID
         self._error: BaseException | None = None
-        self._drain: Draining | None = None
+        self._drain: Drain | None = None
         self._traffic.observe(self.goals.note)
 
     def observe(self, callback: Observer) -> None:
@@ -297,7 +270,7 @@ class TickLoop:
                 self._leave_with(error)
                 self._let_go(culprit_of(error))
         self.watchdog.end()
-        self._drain = self._drain_of(self.goals.not_over)
+        self._drain = Drain(self._traffic.host, self.goals.not_over)
 
     def _let_go(self, culprit: Behaviour | None) -> None:
         """Stop what a terminate() that raised has kept from it, and interrupt every action."""
@@ -348,10 +321,8 @@ class TickLoop:
             self._log.error(f"shutdown of a behaviour raised: {raised(error)}")
             for behaviour in self.tree.root.iterate():  # ours must let go all the same
                 if isinstance(behaviour, ActionBehaviour):
-                    try:
+                    with contextlib.suppress(Exception):
                         behaviour.shutdown()
-                    except Exception as again:  # noqa: BLE001 - the user's: any
-                        self._log.error(f"shutdown of {behaviour.name} raised: {raised(again)}")
 
     def close(self, now: float) -> None:
         """Listen to goals no more, and tell what has only now become known of them."""

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent import futures
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -27,11 +27,7 @@ from bt_actions.running.started import StartedRun
 from bt_actions.running.wakeup import WakeUp
 from bt_actions.utilities.places import path_of, root_of
 from bt_actions.utilities.plain_text import raised
-from bt_actions.utilities.stepping import Done, Sleep
-
-if TYPE_CHECKING:
-    from bt_actions.traffic.backend import Backend
-    from bt_actions.traffic.handle import GoalHandle
+from bt_actions.utilities.stepping import Done
 
 PATIENCE_AT_EXIT = 30.0
 """Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
@@ -91,9 +87,6 @@ class TreeRunner:
         self._loop = TickLoop(
             self.tree,
             self._spinner.node,
-            steady=time.monotonic,
-            drain=self._drain,
-            log=self._log,
             heartbeat=heartbeat,
             wake=self._wake_up.set,
             ready=self._spin,
@@ -394,24 +387,6 @@ class TreeRunner:
     def _spin_died(self, error: BaseException) -> None:
         self._spin_error = error
         self._wake_up.set()
-
-    def _drain(self, handles: list[GoalHandle]) -> _Drain:
-        return _Drain(handles, self._loop, wiring.backend_of(self.node))
-
-
-class _Drain:
-    """Waits for goals within its one step."""
-
-    def __init__(self, handles: list[GoalHandle], loop: TickLoop, backend: Backend) -> None:
-        self._handles, self._loop, self._backend = handles, loop, backend
-
-    def step(self, now: float, *, hurry: bool) -> Sleep | Done[None]:
-        self._backend.drain(self._handles, self._hurry)
-        return Done(None)
-
-    def _hurry(self) -> bool:
-        self._loop.goals.tell(time.monotonic())
-        return self._loop.abandoned
 
 
 def _waits_for_itself(call: str, instead: str) -> RuntimeError:

@@ -9,42 +9,26 @@ from __future__ import annotations
 import math
 import sys
 import threading
-from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from py_trees.behaviour import Behaviour
 
 from bt_actions.running.goals import RunGoals
+from bt_actions.traffic.traffic import Traffic
 from bt_actions.utilities.places import path_of
-
-if TYPE_CHECKING:
-    from bt_actions.traffic.traffic import Traffic
 
 GRACE = 1.0
 """Seconds for a tick to return when the tree is to end."""
 LOOK = 0.2
 """Seconds between two looks."""
-LATE = 0.3
-"""Seconds by which a look is late where this process stood still: the tick has had no time, too."""
-SPARED = 3
-"""How often that makes the grace begin anew."""
 
 
 class Watchdog:
     """Guards one tree's runs, one after another."""
 
-    def __init__(
-        self,
-        traffic: Traffic,
-        goals: RunGoals,
-        steady: Callable[[], float],
-        warn: Callable[[str], None],
-    ) -> None:
-        """`steady` is the steady clock; `warn` is told, once a run, what does not return."""
-        self._traffic, self._goals, self._steady, self._warn = traffic, goals, steady, warn
-        self._ends_at = self._grace_from = math.inf
-        self._looked_at = -math.inf
-        self._spared = 0
+    def __init__(self, traffic: Traffic, goals: RunGoals) -> None:
+        self._traffic, self._host, self._goals = traffic, traffic.host, goals
+        self._ends_at = math.inf
+        self._minds = False
         self._ticks_on: int | None = None
         self.gave_up = False
         """Whether it was so in this run: what the tree says since is of no account."""
@@ -52,12 +36,10 @@ class Watchdog:
     def begin(self, ends_at: float) -> None:
         """A run begins on this thread, which is to end at `ends_at` (seconds, steady clock)."""
         self._ticks_on, self._ends_at, self.gave_up = threading.get_ident(), ends_at, False
-        self._grace_from, self._spared = ends_at, 0
 
     def end_by(self, moment: float) -> None:
         """The run is to end by then; safe in a signal handler."""
         self._ends_at = min(self._ends_at, moment)
-        self._grace_from = min(self._grace_from, self._ends_at)
 
     def end(self) -> None:
         """The last tick is over, and so is all that a behaviour does when it is stopped."""
@@ -65,33 +47,35 @@ class Watchdog:
 
     def is_overdue(self, now: float) -> bool:
         """Whether the last tick should have been over for long; safe in a signal handler."""
-        return self._ticks_on is not None and now - self._grace_from >= GRACE
+        return self._ticks_on is not None and now - self._ends_at >= GRACE
 
     def gives_up(self) -> bool:
         """Whether nobody waits for the rest of this thread's tick any more."""
-        endless = self._grace_from == math.inf  # as it mostly is, and a clock takes time
-        if not endless and self.is_overdue(self._steady()) and not self._goals.wanted:
-            self._give_up()  # else it is looked at, and whether this process stood still
+        endless = self._ends_at == math.inf  # as it mostly is, and a clock takes time
+        if not endless and self.is_overdue(self._host.steady()) and not self._goals.wanted:
+            self._give_up()  # else it is for `attend`, which bears with stalls
         return self.gave_up
 
     def _give_up(self) -> None:
         if not self.gave_up:
             self.gave_up = True
-            self._warn(f"{self._stuck_in()} does not return from its tick: canceling all goals")
+            self._host.log.warning(
+                f"{self._stuck_in()} does not return from its tick: canceling all goals"
+            )
 
     def mind(self) -> None:
         """Look at the goals until none is wanted; the caller holds the lock."""
-        self._traffic.host.scheduler.add(self)
+        if not self._minds:  # each time it would be looked at, at once
+            self._minds = True
+            self._host.scheduler.add(self)
 
     def attend(self, now: float) -> float:
         """Cancel what is wanted where the last tick is overdue; return the seconds until a look."""
         wanted = self._goals.wanted
         if not wanted:
-            self._traffic.host.scheduler.remove(self)
-        if now - self._looked_at > LOOK + LATE and now >= self._ends_at and self._spared < SPARED:
-            self._spared, self._grace_from = self._spared + 1, now
-        self._looked_at = now
-        if wanted and self.is_overdue(now):
+            self._minds = False
+            self._host.scheduler.remove(self)
+        if wanted and self.is_overdue(now) and not self._host.stalls.answers_take(now):
             self._give_up()
             for handle in wanted:
                 self._traffic.interrupt(handle)

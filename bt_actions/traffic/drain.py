@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterable
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.terms import Event, State
-from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.handle import GoalHandle
 from bt_actions.traffic.host import Host
+from bt_actions.utilities.stepping import Done, Sleep
 
 JUST_PAST = 0.1
 """Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
@@ -34,21 +35,14 @@ def drain(
     ends the wait early when it says so. Returns the goals whose end is UNKNOWN, or may be.
     """
     drains = Drain(host, handles)
-    while not hurry():
+    while isinstance(step := drains.step(host.steady(), hurry=hurry()), Sleep):
         with host.lock:
-            if drains.step():
-                break
-            host.changed.wait(LOOK)
-    until = host.steady() + LAST_REQUESTS
-    with host.lock:
-        while drains.has_requests and host.steady() < until:
-            drains.pump()
-            host.changed.wait(LOOK)
-        return drains.finish()
+            host.changed.wait(step.seconds)
+    return step.result
 
 
 class Drain:
-    """The drain of some goals; each step is for who holds the lock.
+    """The drain of some goals, step by step.
 
     Its deadline is the largest `timeout.cancel` among them, plus `timeout.accept` (twice, if that
     is more) where the acceptance is open. Where this process stood still, it leaves time for what
@@ -71,60 +65,67 @@ class Drain:
                 each for each in self._wanted if not each.is_over and not each.goal.waited_for
             ]
             self._deadline = 0.0
-            self._began = host.steady()
+            self._began = now = host.steady()
+            self._gives_up_at: float | None = None
             self._lost: set[GoalHandle] = set()
             self._were_back: set[GoalHandle] = set()
-            self._allow({handle for handle in self._waits if not handle.looked_out_for})
+            self._allow({handle for handle in self._waits if not handle.looked_out_for}, now)
 
-    def step(self) -> bool:
-        """Take what has come and do what is due; return whether to wait no longer."""
-        if self._is_over():
-            return True
-        self.pump()
-        for handle in self._waits:
-            handle.endpoint.mind(handle)
-        self._waits = [handle for handle in self._waits if not handle.is_over]
-        return not self._waits
+    def step(self, now: float, *, hurry: bool = False) -> Sleep | Done[list[GoalHandle]]:
+        """Take what has come and do what is due (`now`: seconds, steady clock).
 
-    def pump(self) -> None:
-        """Take what has come."""
-        for endpoint in self._endpoints:
+        With `hurry`, wait no longer for ends; cancel requests that wait for room still go out,
+        because whoever drains may end the process now. In the end returns the goals whose end is
+        UNKNOWN, or may be.
+        """
+        with self._host.lock:
+            if self._gives_up_at is None:
+                if not hurry and not self._is_over(now):
+                    self._pump()
+                    for handle in self._waits:
+                        handle.endpoint.mind(handle)
+                    self._waits = [handle for handle in self._waits if not handle.is_over]
+                    if self._waits:
+                        return Sleep(LOOK)
+                self._gives_up_at = now + LAST_REQUESTS
+            if self._has_requests and now < self._gives_up_at:
+                self._pump()
+                return Sleep(LOOK)
+            return Done(self._finish())
+
+    def _pump(self) -> None:
+        for endpoint in dict.fromkeys(handle.endpoint for handle in self._waits):
             endpoint.pump()
 
     @property
-    def has_requests(self) -> bool:
-        """Whether cancel requests still wait for room: whoever drains may end the process now."""
+    def _has_requests(self) -> bool:
         return any(each.endpoint.cancels.has_request(each.goal.id) for each in self._waits)
 
-    def finish(self) -> list[GoalHandle]:
-        """Wait no longer; return the goals whose end is UNKNOWN, or may be."""
+    def _finish(self) -> list[GoalHandle]:
         for handle in self._waits:  # all at once, though a server's queue drops what is too much
             handle.endpoint.cancels.send_now(handle.goal.id)
         for handle in self._waits:
             handle.endpoint.tell(handle, Event.DRAINED)
         return [handle for handle in self._wanted if not handle.is_over]
 
-    @property
-    def _endpoints(self) -> list[Endpoint]:
-        return list(dict.fromkeys(handle.endpoint for handle in self._waits))
-
-    def _is_over(self) -> bool:
+    def _is_over(self, now: float) -> bool:
         """Whether nobody waits any longer."""
-        now = self._host.steady()
+        if not self._waits:
+            return True
         doubts = (handle.endpoint.in_doubt(now) for handle in self._waits)
         if max(self._host.stalls.answers_take(now), *doubts, 0.0) > 0.0:
             self._deadline = max(self._deadline, now + ASK_AGAIN)
         self._lost.update(handle for handle in self._waits if handle.goal.lost)
         back = {each for each in self._lost if each.goal.state not in (State.LOST, State.DONE)}
-        self._allow(back - self._were_back)  # once: else one that comes and goes had no end
+        self._allow(back - self._were_back, now)  # once: else one that comes and goes had no end
         self._lost, self._were_back = self._lost - back, self._were_back | back
         looks_out = any(handle.looked_out_for for handle in self._waits)
         if looks_out and now < self._began + LOOKS_OUT_AT_MOST:
             return False
-        return not self._waits or now >= self._deadline
+        return now >= self._deadline
 
-    def _allow(self, handles: set[GoalHandle]) -> None:
+    def _allow(self, handles: set[GoalHandle], now: float) -> None:
         """Give these goals the time that their cancel may take."""
         if handles:
             within = max(handle.goal.drains_within for handle in handles)
-            self._deadline = max(self._deadline, self._host.steady() + within + JUST_PAST)
+            self._deadline = max(self._deadline, now + within + JUST_PAST)

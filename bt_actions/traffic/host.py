@@ -29,6 +29,9 @@ class Log(Protocol):
     def error(self, text: str) -> None:
         """Of what must not."""
 
+    def flush(self) -> None:
+        """Have what was said written, before more is told by other ways; waits a moment at most."""
+
 
 class Record(Protocol):
     """What was sent and is not answered yet, on record should the process be killed."""

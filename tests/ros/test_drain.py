@@ -14,6 +14,7 @@ from bt_actions.goals.terms import Event, Now, State
 from bt_actions.traffic.cancel_queue import Cancels
 from bt_actions.traffic.drain import JUST_PAST, LOOKS_OUT_AT_MOST, Drain
 from bt_actions.traffic.handle import GoalHandle
+from bt_actions.utilities.stepping import Done, Sleep
 
 LIMITS = Timeouts(accept=1.0, cancel=2.0)
 
@@ -76,12 +77,13 @@ def test_who_is_looked_out_for_is_waited_for_but_not_without_end() -> None:
     lost = handle(End.SERVER_GONE, 2.0)
     drain = Drain(host, [lost])
     host.now += 10.0
-    assert not drain.step(), "looks count, not time: the process may stand still"
+    assert isinstance(drain.step(host.now), Sleep), (
+        "looks count, not time: the process may stand still"
+    )
     host.now += LOOKS_OUT_AT_MOST
-    assert drain.step()
-    assert drain.finish() == [lost]
+    assert drain.step(host.now) == Done([lost])
     assert lost.goal.waited_for
-    assert Drain(host, [lost]).step(), "once"
+    assert Drain(host, [lost]).step(host.now) == Done([lost]), "once"
 
 
 def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal() -> None:
@@ -89,20 +91,27 @@ def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal() -> None
     left = handle(End.UNKNOWN, 0.0)
     drain = Drain(host, [left])
     host.now += left.goal.drains_within
-    assert not drain.step()
+    assert isinstance(drain.step(host.now), Sleep)
     host.now += 2 * JUST_PAST
-    assert drain.step()
+    assert drain.step(host.now) == Done([left])
 
 
 def test_who_is_back_has_the_time_of_a_cancel_but_only_once() -> None:
     host: Any = Host()
     handles = [handle(End.SERVER_GONE, 2.0), handle(End.UNKNOWN, 0.0)]
     drain, goal = Drain(host, handles), handles[0].goal
-    host.now += 50.0
     for back_again in (False, True):
-        goal.state = State.LOST
-        drain.step()
-        goal.state, goal.end = State.CANCELING, End.UNKNOWN
-        assert drain.step() is back_again
+        goal.state, goal.end = State.LOST, End.SERVER_GONE
+        drain.step(host.now)
         host.now += goal.drains_within + 2 * JUST_PAST
-        goal.end = End.SERVER_GONE
+        assert isinstance(drain.step(host.now), Sleep), "it is looked out for"
+        goal.state, goal.end = State.CANCELING, End.UNKNOWN
+        assert isinstance(drain.step(host.now), Done) is back_again
+
+
+def test_who_is_in_a_hurry_waits_for_no_end() -> None:
+    host: Any = Host()
+    left = handle(End.UNKNOWN, 0.0)
+    drain = Drain(host, [left])
+    assert isinstance(drain.step(host.now), Sleep)
+    assert drain.step(host.now, hurry=True) == Done([left])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import MagicMock
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -22,16 +22,12 @@ class Stepped:
         self.now = 0.0
         self.slept: list[float] = []
         self.told: list[Event] = []
-        self.backend, self.log = Mock(spec=Backend), Mock()
+        self.backend = MagicMock(spec=Backend)
         self.traffic = self.backend.traffic
-        self.drained = Mock()
-        self.drained.step.return_value = Done(None)
+        self.traffic.host.steady = lambda: self.now
         self.loop = TickLoop(
             tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree),
             self.backend,
-            steady=lambda: self.now,
-            drain=lambda handles: self.drained,
-            log=self.log,
             **given,
         )
         self.loop.observe(self.told.append)
