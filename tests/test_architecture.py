@@ -50,7 +50,6 @@ FILES = sorted(ROOT.rglob("*.py"))
 LONGEST, MOST_FILES = 400, 20
 LONG = {
     "traffic/endpoint.py",
-    "running/runner.py",
 }
 """Files of more lines than LONGEST."""
 CROWDED: set[str] = set()

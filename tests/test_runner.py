@@ -24,8 +24,8 @@ from rclpy.executors import SingleThreadedExecutor
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
+from bt_actions.ros import log as log_module
 from bt_actions.ros import spinning
-from bt_actions.ros.log import log
 from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
 from tests.support.trees import Gate, Raises, in_sequence, state, together
@@ -498,7 +498,7 @@ class TestStart:
         capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        monkeypatch.setattr(log, "_room", lambda _: not time.sleep(0.2))  # a slow reader
+        monkeypatch.setattr(log_module, "_has_room", lambda _: not time.sleep(0.2))  # a slow reader
         leaf = MoveRobot("m", 9.0, action_name=name)
         runner = TreeRunner(in_sequence(Raises("culprit", "shutdown"), leaf), node=node)
         runner.interrupt()

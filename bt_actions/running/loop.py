@@ -149,11 +149,11 @@ class TickLoop:
         Raises it at once where that has begun.
         """
         if self._drain is not None:
+            self._rest()
             raise error
         self._error, self._status = error, Status.INVALID
 
-    def rest(self) -> None:
-        """Take note that the run is over."""
+    def _rest(self) -> None:
         with self._traffic.host.lock:
             self._stop_wanted = self.abandoned = self._pause_wanted = False
             self.goals.run_goes_on = False
@@ -297,8 +297,10 @@ class TickLoop:
         self._tell(self._visitor.stopped())
         self._log.flush()  # who tells of the end tells it last
         self._emit(TreeFinished(self._now, self._status))
+        timed_out = self._status is Status.INVALID and not self._stop_wanted
+        self._rest()
         self.raise_what_ended_it()
-        if self._status is Status.INVALID and self._timeout is not None and not self._stop_wanted:
+        if timed_out:
             raise TimeoutError(f"{self.tree.root.name} did not finish within {self._timeout:g} s")
         return Done(self._status)
 

@@ -234,11 +234,8 @@ class TreeRunner:
 
     def _release(self) -> None:
         self._runs_on = None
-        try:
-            self._loop.rest()
-        finally:
-            _runs.discard(self)
-            self._running.release()
+        _runs.discard(self)
+        self._running.release()
 
     def wait(self, timeout: float | None = None) -> Status:
         """Wait for a tree that was started, and return or raise what `run` would.

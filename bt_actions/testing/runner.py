@@ -15,8 +15,7 @@ from bt_actions.events import GoalChanged
 from bt_actions.running.loop import TickLoop
 from bt_actions.testing.backend import VirtualBackend
 from bt_actions.testing.network import VirtualNetwork
-from bt_actions.traffic.drain import LOOK, Drain
-from bt_actions.utilities.stepping import Done, Sleep
+from bt_actions.utilities.stepping import Done
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, Observer
@@ -52,9 +51,6 @@ class VirtualRunner:
         self._loop = TickLoop(
             self.tree,
             self.backend,
-            steady=self.network.now,
-            drain=lambda handles: _Draining(Drain(self.backend.host, handles)),
-            log=self.network.log,
             heartbeat=heartbeat,
             wake=self._wake,
         )
@@ -117,7 +113,6 @@ class VirtualRunner:
             self._woken = False
             step = self._loop.step(self.now)
             if isinstance(step, Done):
-                self._loop.rest()
                 return step.result
             self._next = self.now + step.seconds
 
@@ -132,17 +127,3 @@ class VirtualRunner:
 
     def _wake(self) -> None:
         self._woken = True
-
-
-class _Draining:
-    """The drain of a run's goals, as its loop wants it."""
-
-    def __init__(self, drain: Drain) -> None:
-        self._drain = drain
-
-    def step(self, now: float, *, hurry: bool) -> Sleep | Done[None]:
-        """Go on with it; with `hurry`, wait for nothing any more."""
-        if not hurry and not self._drain.step():
-            return Sleep(LOOK)
-        self._drain.finish()
-        return Done(None)

@@ -45,10 +45,7 @@ class Stepped:
         return None
 
     def run(self, timeout: float | None = None) -> Status:
-        try:
-            self.begin(timeout)
-            while (status := self.step()) is None:
-                pass
-            return status
-        finally:
-            self.loop.rest()
+        self.begin(timeout)
+        while (status := self.step()) is None:
+            pass
+        return status
