@@ -6,20 +6,25 @@ import re
 import runpy
 import textwrap
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from bt_actions_interfaces.action import RunTree
+from geometry_msgs.msg import Polygon, PoseStamped
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from sensor_msgs.msg import BatteryState
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+from trajectory_msgs.msg import JointTrajectory
 
-from bt_actions import TreeRunner
 from bt_actions.document import check_file, load_tree, tree_outputs
 from bt_actions.document.formatting.format import format_source
 from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.yaml.source import read_source
-from tests.support.waiting import until
+from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted(ROOT.glob("examples/*.yaml"))
@@ -44,77 +49,50 @@ ENDS = {
 class Surroundings:
     """What the examples meet: three robots, a light, a door that tells it is open, other trees."""
 
-    def __init__(self, context: Any) -> None:
-        from bt_actions_interfaces.action import RunTree
-        from geometry_msgs.msg import Polygon, PoseStamped
-        from rclpy.node import Node
-        from sensor_msgs.msg import BatteryState
-        from std_msgs.msg import Bool
-        from std_srvs.srv import SetBool
-        from trajectory_msgs.msg import JointTrajectory
-
-        from bt_actions.ros.topics import qos_profile
-        from bt_actions.simulation import Script, ScriptedServer, Simulation
-
-        self.node = Node("examples", context=context, namespace=f"/examples{id(self)}")
-        robots = ("", "cell/left", "cell/right")
-        self.robots = Simulation(self.node, namespaces=robots, speed=30.0)
+    def __init__(self) -> None:
+        self.network = VirtualNetwork("/examples")
+        self.runs = 0
+        self.robots = Simulation(self.network, namespaces=("", "cell/left", "cell/right"))
         answer = RunTree.Result(settled=True, outputs='{"at": 2.0}')
-        self.trees = ScriptedServer(
-            self.node, RunTree, "/r1/run_tree", Script(result=lambda _: answer)
-        )
+        ScriptedServer(self.network, RunTree, "/r1/run_tree", Script(result=lambda _: answer))
         self.heard: dict[str, list[Any]] = defaultdict(list)
-        self.node.create_service(SetBool, "light", self._switch)
-        for name, kind, qos in (
-            ("lamp", Bool, "default"),
-            ("target", PoseStamped, "latched"),
-            ("route", JointTrajectory, "latched"),
-            ("supply", BatteryState, "latched"),
-            ("area", Polygon, "latched"),
+        self.network.provide(SetBool, "light", self._switch)
+        for name, kind in (
+            ("lamp", Bool),
+            ("target", PoseStamped),
+            ("route", JointTrajectory),
+            ("supply", BatteryState),
+            ("area", Polygon),
         ):
-            hear = self.heard[name].append
-            self.node.create_subscription(kind, name, hear, qos_profile(qos))
-        door = self.node.create_publisher(Bool, "door", 10)
-        self.node.create_timer(0.1, lambda: door.publish(Bool(data=True)))
+            self.network.subscribe(kind, name, self.heard[name].append)
+        self._open()
 
-    def _switch(self, request: Any, response: Any) -> Any:
+    def _open(self) -> None:
+        """Say so ten times a second."""
+        self.network.publish("door", Bool(data=True))
+        self.network.timeline.call_in(0.1, self._open)
+
+    def _switch(self, request: Any) -> SetBool.Response:
         self.heard["light"].append(request.data)
-        response.success = True
-        return response
+        return SetBool.Response(success=True)
 
     def pose(self, robot: str = "") -> float:
         return self.robots.world(robot).robot.current_pose
 
-    def run(self, root: Behaviour, *, hears: Sequence[str] = (), timeout: float = 30.0) -> Status:
-        """Run a tree whose publishers have found their subscribers, until they all were heard."""
-        for heard in self.heard.values():
-            heard.clear()
-        for behaviour in root.iterate():
-            behaviour.setup(node=self.node)
-        for publisher in self.node.publishers:
-            if publisher.topic_name.removeprefix(f"{self.node.get_namespace()}/") in self.heard:
-                until(publisher.get_subscription_count, what=f"{publisher.topic_name} is heard")
-        with TreeRunner(root, node=self.node) as runner:
-            status = runner.run(timeout=timeout)
-            until(lambda: all(self.heard[name] for name in hears), what=f"{hears} are heard")
+    def run(self, root: Behaviour, timeout: float = 60.0) -> Status:
+        """Run a tree, and let arrive what it has sent."""
+        self.runs += 1
+        runner = VirtualRunner(root, self.network, seed=self.runs)  # else goals have the same ids
+        status = runner.run(timeout)
+        until = runner.now + 0.1
+        while self.network.timeline.advance(until):
+            pass
         return status
-
-    def close(self) -> None:
-        self.trees.close()
-        self.robots.close()
-        self.node.destroy_node()
-
-
-@pytest.fixture(scope="module")
-def shared(context: Any) -> Iterator[Surroundings]:
-    surroundings = Surroundings(context)
-    yield surroundings
-    surroundings.close()
 
 
 @pytest.fixture
-def around(shared: Surroundings, no_leaks: None) -> Surroundings:
-    return shared
+def around() -> Surroundings:
+    return Surroundings()
 
 
 Node = Callable[[str], Behaviour]
@@ -189,7 +167,7 @@ def test_the_light_is_switched_by_the_example_of_a_service(
 
 
 def test_the_lamp_hears_the_example_of_publish(around: Surroundings, node: Node) -> None:
-    around.run(node(KINDS["publish"].example), hears=["lamp"])
+    around.run(node(KINDS["publish"].example))
     assert [message.data for message in around.heard["lamp"]] == [True]
 
 
@@ -203,11 +181,12 @@ def test_the_first_example_fetches(around: Surroundings) -> None:
 
 
 def test_messages_arrive_with_what_their_conveniences_stand_for(around: Surroundings) -> None:
-    before = around.node.get_clock().now().nanoseconds
+    while around.network.now() < 5.0:
+        around.network.timeline.advance(5.0)
     names = ("target", "route", "supply", "area")
-    assert around.run(example("messages"), hears=names) is Status.SUCCESS
+    assert around.run(example("messages")) is Status.SUCCESS
     target, route, supply, area = (around.heard[name][-1] for name in names)
-    assert target.header.stamp.sec >= before // 10**9
+    assert target.header.stamp.sec == 5
     assert (target.header.frame_id, target.pose.position.x) == ("map", 1.5)
     turned = target.pose.orientation
     assert (turned.z, turned.w) == (pytest.approx(0.5**0.5), pytest.approx(0.5**0.5))
