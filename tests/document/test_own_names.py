@@ -11,9 +11,13 @@ from typing import Any
 
 import pytest
 import yaml
+from bt_actions_interfaces.action import RunTree
 from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
+from robot_control_interfaces.action import MoveRobot
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
 
 from bt_actions.document import DocumentError
 from bt_actions.document.language.keys import NODE, NODES, TOP_KEYS
@@ -24,6 +28,7 @@ from bt_actions.document.language.shapes import Key, ListOf, ListValue, OneOf, R
 from bt_actions.document.language.values import computed_in
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.source import Source
+from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 
 Load = Callable[..., Behaviour]
 Where = tuple[str | int, ...]
@@ -100,34 +105,15 @@ def blackboard(monkeypatch: pytest.MonkeyPatch) -> Watched:
 
 
 @pytest.fixture
-def graph(node: Any, name: str, serve: Callable[..., Any]) -> Iterator[dict[str, str]]:
-    """Actions, a service and a topic with something on it: which name a key wants."""
-    from bt_actions_interfaces.action import RunTree
-    from std_msgs.msg import Bool
-    from std_srvs.srv import SetBool
-
-    from bt_actions.ros.topics import qos_profile
-    from bt_actions.simulation import Script, ScriptedServer
-
-    serve()
-    service = node.create_service(
-        SetBool, f"{name}/switch", lambda _, __: SetBool.Response(success=True)
-    )
-    publisher = node.create_publisher(Bool, f"{name}/door", qos_profile("latched"))
-    publisher.publish(Bool(data=True))
+def network() -> VirtualNetwork:
+    """With what the examples need, and something on the topic."""
+    network = VirtualNetwork()
     answer = RunTree.Result(settled=True, outputs='{"at": 2}')
-    trees = ScriptedServer(
-        node, RunTree, f"{name}/run_tree", Script(duration=0.0, result=lambda _: answer)
-    )
-    yield {
-        "action": name,
-        "run_tree": f"{name}/run_tree",
-        "service": f"{name}/switch",
-        "wait_for_message": f"{name}/door",
-    }
-    trees.close()
-    node.destroy_service(service)
-    node.destroy_publisher(publisher)
+    ScriptedServer(network, MoveRobot, "move_robot")
+    ScriptedServer(network, RunTree, "/r1/run_tree", Script(result=lambda _: answer))
+    network.provide(SetBool, "light", lambda _: SetBool.Response(success=True))
+    network.publish("door", Bool(data=True), latched=True)
+    return network
 
 
 @pytest.mark.parametrize(
@@ -138,21 +124,17 @@ def graph(node: Any, name: str, serve: Callable[..., Any]) -> Iterator[dict[str,
     ],
 )
 def test_a_name_in_an_expression_is_the_trees_own(
-    load: Load, run: Any, blackboard: Watched, graph: dict[str, str],
+    load: Load, blackboard: Watched, network: VirtualNetwork,
     kind: str | None, where: Where, shape: Shape,
 ) -> None:  # fmt: skip
     document: dict[str, Any] = {
         "tree": "t",
         "inputs": {name: {"type": "int32", "default": 5} for name in ("order", "count", "level")},
         "actions": {"got": {"type": "robot_control_interfaces/action/MoveRobot",
-                            "server": graph["action"], "goal": {"distance": 0.1}}},
+                            "server": "move_robot", "goal": {"distance": 0.1}}},
         "root": {"got": "Go"} if kind is None else yaml.safe_load(KINDS[kind].example),
     }  # fmt: skip
     root = document["root"]
-    if kind == "action":
-        root["goal"]["distance"] = 0.1
-    if kind in graph:
-        root["topic" if "topic" in root else "server"] = graph[kind]
     if kind == "wait_for_message":
         root["qos"] = "latched"
     place = document if kind is None else root
@@ -169,7 +151,7 @@ def test_a_name_in_an_expression_is_the_trees_own(
             load(json.dumps(document), recover=inner)
         return
 
-    tree = run(load(json.dumps(document), recover=inner))
-    assert tree.status is (Status.FAILURE if where[-1] == "when" else Status.SUCCESS)
+    status = VirtualRunner(load(json.dumps(document), recover=inner), network).run()
+    assert status is (Status.FAILURE if where[-1] == "when" else Status.SUCCESS)
     assert "/order" not in blackboard.read
     assert any(key.startswith("/bt/t/") and key.endswith("/order") for key in blackboard.read)
