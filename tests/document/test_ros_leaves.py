@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -61,67 +60,6 @@ def test_a_service_is_called_and_its_answer_saved(
     root = run(load(CALL.format(server=server, more="")), executor=executor)
     assert (root.status, asked) == (Status.SUCCESS, [True])
     assert tree_outputs(root) == {"said": "set to True"}
-
-
-def test_a_message_that_does_not_fit_into_its_variable_is_not_the_one_waited_for(
-    load: Load, run: Run, name: str
-) -> None:
-    """Anybody may send 300 where an int8 is kept; that ends no run."""
-    root = run(
-        load(
-            f"""
-            tree: t
-            outputs: {{n: int8}}
-            root:
-              parallel: P
-              children:
-                - wait_for_message: Small
-                  topic: {name}/count
-                  type: std_msgs/msg/Int32
-                  save: {{n: message.data}}
-                  timeout: 500 ms
-                  qos: latched
-                - publish: {name}/count
-                  type: std_msgs/msg/Int32
-                  message: {{data: 300}}
-                  qos: latched
-            """
-        )
-    )
-    assert root.status is Status.FAILURE
-    assert root.children[0].feedback_message.startswith("no such message")
-
-
-def test_an_answer_that_is_not_expected_fails_and_is_tried_again(
-    load: Load, run: Run, switch: Any
-) -> None:
-    server, asked, answers = switch
-    answers += [False, False]
-    root = run(load(CALL.format(server=server, more="retry: 2")))
-    assert (root.status, len(asked)) == (Status.FAILURE, 2)
-    assert root.feedback_message == "the answer is not what was expected"
-    answers += [False]
-    root = run(load(CALL.format(server=server, more="retry: {attempts: 2, backoff: 10 ms}")))
-    assert (root.status, len(asked)) == (Status.SUCCESS, 4)
-
-
-def test_a_service_that_does_not_answer_fails_in_time(
-    load: Load, node: Any, name: str, run: Run
-) -> None:
-    from std_srvs.srv import SetBool
-
-    over = threading.Event()
-
-    def never(_request: Any, _response: Any) -> Any:
-        over.wait(10.0)  # a server that hangs, until the test is over
-        return _response
-
-    service = node.create_service(SetBool, f"{name}/slow", never)
-    threading.Timer(0.5, over.set).start()  # the executor waits for the callback to return
-    root = run(load(CALL.format(server=f"{name}/slow", more="timeout: 100 ms")))
-    assert root.status is Status.FAILURE
-    assert root.feedback_message == "no answer within 0.1 s"
-    node.destroy_service(service)
 
 
 TOPICS = """
@@ -203,33 +141,6 @@ root:
     assert root.status is Status.SUCCESS, root.feedback_message
 
 
-def test_a_visit_begins_when_no_topic_is_waited_for_any_more(
-    load: Load, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from bt_actions.behaviours.topics import TopicValue
-
-    left = [0.3]
-    monkeypatch.setattr(TopicValue, "first_may_come", lambda _self: left[0])
-    root: Any = load(
-        """
-        tree: t
-        topics: {limit: {topic: limit, type: std_msgs/msg/Float64}}
-        root: {timeout: T, after: $limit.data, child: {running: R}}
-        """
-    )
-    begun: list[Status] = []
-    root.initialise = lambda: begun.append(root.status)
-    for _ in range(2):
-        root.tick_once()
-        assert (root.status, root.due_in()) == (Status.RUNNING, 0.3)
-    root.stop(Status.INVALID)
-    root.tick_once()
-    assert (root.status, begun) == (Status.RUNNING, [])
-    left[0] = 0.0
-    root.tick_once()
-    assert begun == [Status.INVALID], "as the first tick of any visit"
-
-
 @pytest.fixture
 def paced(context: Any, no_leaks: None) -> Iterator[tuple[SimulatedTime, Any]]:
     """Simulated time, and a node that goes by it as soon as somebody spins it."""
@@ -271,40 +182,6 @@ def test_the_age_of_a_message_is_that_of_the_node_s_clock(
         clock.jump(20.0)
         assert runner.wait(10.0) is Status.FAILURE
     assert "s old ($door)" in guard.feedback_message
-
-
-def test_a_message_is_waited_for_and_kept(load: Load, run: Run, name: str) -> None:
-    topic = f"{name}/count"
-    root = run(
-        load(
-            f"""
-            tree: t
-            outputs: {{n: int32}}
-            root:
-              parallel: P
-              children:
-                - wait_for_message: Two
-                  topic: {topic}
-                  type: std_msgs/msg/Int32
-                  until: message.data > 1
-                  timeout: 10 s
-                  save: {{n: message.data}}
-                - repeat: R
-                  times: 30
-                  child:
-                    sequence: S
-                    children:
-                      - publish: {topic}
-                        type: std_msgs/msg/Int32
-                        message: {{data: 1}}
-                      - publish: {topic}
-                        type: std_msgs/msg/Int32
-                        message: {{data: 2}}
-                      - wait: 20 ms
-            """
-        )
-    )
-    assert (root.status, tree_outputs(root)) == (Status.SUCCESS, {"n": 2})
 
 
 def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_tick(
@@ -476,26 +353,6 @@ def test_a_service_of_another_type_or_in_another_namespace_is_told(
 LAMP = "tree: t\nroot: {{publish: {topic}, type: std_msgs/msg/Bool, message: {{data: true}}{more}}}"
 
 
-def test_a_message_is_published_when_so_many_listen(load: Load, node: Any, name: str) -> None:
-    from std_msgs.msg import Bool
-
-    root = load(LAMP.format(topic=name, more=", subscribers: 2, timeout: 20 s"))
-    heard: list[bool] = []
-    with TreeRunner(root, node=node) as runner:
-        runner.start()
-        listeners = []
-        for _ in range(2):
-            until(lambda: root.status is Status.RUNNING)
-            listeners.append(
-                node.create_subscription(Bool, name, lambda message: heard.append(message.data), 10)
-            )
-        assert runner.wait(10.0) is Status.SUCCESS
-        until(lambda: heard == [True, True])
-        for listener in listeners:
-            node.destroy_subscription(listener)
-    assert root.feedback_message == ""
-
-
 @pytest.mark.parametrize(
     ("kind", "needed", "said"),
     [
@@ -566,66 +423,3 @@ def test_a_message_that_nobody_listens_to_is_published_with_a_warning_when_the_n
     hasty.shutdown()
     assert (root.status, root.warning) == (Status.SUCCESS, f"nobody listens on {name}")
     assert root.feedback_message == root.warning
-
-
-def test_timeout_waits_until_the_goal_it_stopped_has_ended(
-    load: Load, node: Any, host: Any, name: str
-) -> None:
-    journal = host.open(name, "2:ignore_cancel")
-    action = f"type: robot_control_interfaces/action/MoveRobot, server: {name}"
-    root = load(
-        f"""
-        tree: t
-        root:
-          sequence: S
-          children:
-            - {{action: Find the server, {action}, goal: {{distance: 0.01}}, timeout: 30 s}}
-            - timeout: T
-              after: 500 ms
-              child: {{action: A, {action}, goal: {{distance: 2.0}}}}
-        """
-    )
-    stopped = root.children[1]
-    drained: list[bool] = []
-
-    def look(event: Any) -> None:
-        if getattr(event, "node", None) is stopped and event.status is Status.FAILURE:
-            drained.append(stopped.children[0].drained)  # type: ignore[attr-defined]
-
-    with TreeRunner(root, node=node) as runner:
-        runner.observe(look)
-        runner.run(timeout=60)
-    assert drained == [True]
-    assert journal.events()[-1] == "succeeded"
-    assert stopped.feedback_message == "not done within 0.5 s"
-    host.close_server(name)
-
-
-def test_timeout_does_not_wait_for_ever_for_a_goal_that_does_not_end(
-    load: Load, node: Any, host: Any, name: str
-) -> None:
-    journal = host.open(name, "2:ignore_cancel", "2:stall")
-    action = f"type: robot_control_interfaces/action/MoveRobot, server: {name}"
-    root = load(
-        f"""
-        tree: t
-        root:
-          sequence: S
-          children:
-            - {{action: Find the server, {action}, goal: {{distance: 0.01}}, timeout: 30 s}}
-            - fallback: F
-              children:
-                - timeout: T
-                  after: 500 ms
-                  child:
-                    {{action: A, {action}, goal: {{distance: 10.0}}, timeout: {{cancel: 500 ms}}}}
-                - log: Ring the alarm
-        """
-    )
-    stopped = root.children[1].children[0]
-    with TreeRunner(root, node=node) as runner:
-        assert runner.run(timeout=60) is Status.SUCCESS
-        assert [report.server for report in runner.unaccounted] == [name]
-    assert stopped.feedback_message == "not done within 0.5 s; the end of A is not known"
-    assert journal.ends()[-1] is None, "it still runs, as far as the server is concerned"
-    host.close_server(name)

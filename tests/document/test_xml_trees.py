@@ -5,14 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 
-from bt_actions import Outcome, TreeRunner
+from bt_actions import Outcome
+from bt_actions.testing import Simulation, VirtualNetwork, VirtualRunner
 
 XML = """\
 <root main_tree_to_execute="Fetch">
@@ -58,36 +58,19 @@ def test_importing_the_package_is_enough(tmp_path: Path) -> None:
     assert said == f"{['GripperWithPorts', 'MoveRobotWithPorts'] * 2}\n"
 
 
-def test_an_xml_tree_runs_and_passes_results_from_port_to_port(
-    tmp_path: Path, context: Any, no_leaks: None
-) -> None:
-    from rclpy.node import Node
-
-    from bt_actions.simulation.simulation import Simulation
-
+def test_an_xml_tree_runs_and_passes_results_from_port_to_port(tmp_path: Path) -> None:
     root = parse(tmp_path)
-    node = Node("xml_trees", context=context, namespace=f"/x{id(root)}")
-    with Simulation(node, speed=30.0) as simulation, TreeRunner(root, node=node) as runner:
-        runner.run(timeout=30)
-        assert root.status is Status.SUCCESS
-        assert simulation.world().part.held_by is not None
+    network = VirtualNetwork()
+    simulation = Simulation(network)
+    assert VirtualRunner(root, network).run() is Status.SUCCESS
+    assert simulation.world().part.held_by is not None
     again = root.children[3]
     assert again.result.final_pose == pytest.approx(2.0, abs=0.02)  # type: ignore[attr-defined]
-    node.destroy_node()
 
 
-def test_a_port_without_data_makes_the_goal_invalid(
-    tmp_path: Path, context: Any, no_leaks: None
-) -> None:
-    from rclpy.node import Node
-
-    from bt_actions.simulation.simulation import Simulation
-
-    text = XML.replace('distance="2.0"', 'distance="{nowhere}"')
-    root = parse(tmp_path, text)
-    node = Node("xml_trees", context=context, namespace=f"/x{id(root)}")
-    with Simulation(node, speed=30.0), TreeRunner(root, node=node) as runner:
-        runner.run(timeout=30)
-    there = root.children[1]
-    assert there.outcome is Outcome.INVALID_GOAL  # type: ignore[attr-defined]
-    node.destroy_node()
+def test_a_port_without_data_makes_the_goal_invalid(tmp_path: Path) -> None:
+    root = parse(tmp_path, XML.replace('distance="2.0"', 'distance="{nowhere}"'))
+    network = VirtualNetwork()
+    Simulation(network)
+    VirtualRunner(root, network).run()
+    assert root.children[1].outcome is Outcome.INVALID_GOAL  # type: ignore[attr-defined]
