@@ -8,6 +8,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.connected import Countdown
 from bt_actions.behaviours.gate import Gate
 from bt_actions.expressions.expression import ExpressionError
@@ -58,13 +59,13 @@ class Deadline(Gate):
             self.decorated.stop(Status.INVALID)
         if not self._expired:
             return None
-        below = list(self.decorated.iterate())
-        stopping = [node.name for node in below if getattr(node, "draining", False)]
+        below = [node for node in self.decorated.iterate() if isinstance(node, ActionBehaviour)]
+        stopping = [node.name for node in below if node.draining]
         if stopping:
             self.feedback_message = f"{self._limit:g} s are over; waiting for {stopping[0]} to end"
             return Status.RUNNING
         self.feedback_message = f"not done within {self._limit:g} s"
-        unknown = [node.name for node in below if not getattr(node, "drained", True)]
+        unknown = [node.name for node in below if not node.drained]
         if unknown:
             self.feedback_message += f"; the end of {', '.join(unknown)} is not known"
         return Status.FAILURE
