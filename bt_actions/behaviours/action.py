@@ -258,7 +258,8 @@ class ActionBehaviour(Behaviour):
         if not self._tree_closed:
             tree = root_of(self).iterate()
             leaves = [leaf for leaf in tree if isinstance(leaf, ActionBehaviour)]
-            self._backend.drain([handle for leaf in leaves for handle in leaf.open_handles()])
+            live = [handle for leaf in leaves for handle in leaf.open_handles()]
+            self._backend.traffic.drain(live)
             for leaf in leaves:
                 leaf.file_interrupted()
                 leaf._tree_closed = True  # noqa: SLF001 - of our own kind

@@ -6,7 +6,7 @@ Only puts together what the rest of ros/ has.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
@@ -16,12 +16,10 @@ from bt_actions.ros.log import log
 from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.service_client import ServiceClient
 from bt_actions.ros.topics import Publisher, Subscription
-from bt_actions.traffic.handle import GoalHandle
 
 __all__ = ["RosBackend"]
 
 RANDOMNESS = random.Random()
-_ON_NODE = "_bt_actions_backend"
 
 
 class RosBackend:
@@ -39,10 +37,9 @@ class RosBackend:
         """Return the one of `node`, or a new one where its traffic was destroyed."""
         participant = NodeParticipant.of(node)
         with host.lock:
-            backend: RosBackend | None = getattr(node, _ON_NODE, None)
-            if backend is None or backend.traffic is not participant.traffic:
-                backend = cls(participant)
-                setattr(node, _ON_NODE, backend)
+            if participant.backend is None:
+                participant.backend = cls(participant)
+            backend: RosBackend = participant.backend
             return backend
 
     def service(self, service_type: type, name: str) -> ServiceClient:
@@ -58,12 +55,6 @@ class RosBackend:
     def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
         """Become a publisher on a topic."""
         return Publisher(self.node, self._seen_since, message_type, topic, qos)
-
-    def drain(
-        self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
-    ) -> list[GoalHandle]:
-        """Cancel these goals and wait for their ends; it does not matter whether anybody spins."""
-        return self.traffic.drain(handles, hurry)
 
     def wake(self) -> None:
         """Have whoever runs a tree on this node tick it soon; callable from any thread."""

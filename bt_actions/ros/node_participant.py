@@ -69,6 +69,8 @@ class NodeParticipant:
         sight.nodes.add(node)
         self.seen_since, self.long_stalls = sight.since, sight.long_stalls
         self.traffic = Traffic(host, self)
+        self.backend: Any = None
+        """What leaves have by this node, once one has asked (ros/backend.py)."""
         self._warned_of: set[str] = set()
 
     @classmethod

@@ -5,15 +5,13 @@ Topics and services are those of the network; nothing on it is ever undiscovered
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from bt_actions.goals.terms import Now
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic.drain import drain
-from bt_actions.traffic.handle import GoalHandle
 from bt_actions.traffic.traffic import Traffic
 
 
@@ -42,12 +40,6 @@ class VirtualBackend:
     def publisher(self, message_type: type, topic: str, qos: str) -> VirtualSpeaker:
         """Become a publisher on a topic."""
         return VirtualSpeaker(self.network, topic, qos)
-
-    def drain(
-        self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
-    ) -> list[GoalHandle]:
-        """Cancel these goals and let time pass until each is accounted for."""
-        return drain(self.host, handles, hurry)
 
     def wake(self) -> None:
         """Have the tree ticked soon."""

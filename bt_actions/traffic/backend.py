@@ -7,13 +7,12 @@ ros/backend.py keeps them over rclpy, for one node. One that stands for no node 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from bt_actions.goals.terms import Now
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.handle import GoalHandle
     from bt_actions.traffic.traffic import Traffic
 
 __all__ = ["Backend", "Clock", "Publisher", "Service", "Subscription"]
@@ -134,15 +133,6 @@ class Backend(Protocol):
 
     def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
         """Become a publisher."""
-
-    def drain(
-        self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
-    ) -> list[GoalHandle]:
-        """Cancel these goals and wait until each is accounted for, under one deadline.
-
-        `hurry` is asked now and then, and ends the wait early. Returns the goals whose end is
-        UNKNOWN, or may be.
-        """
 
     def wake(self) -> None:
         """Have whoever runs a tree here tick it soon; callable from any thread."""

@@ -71,8 +71,7 @@ def test_the_first_leaf_that_is_shut_down_closes_for_the_whole_tree(
         if not hurry:  # else it is the run's
             by_leaves.append(handles)
 
-    backend = backend_of(node)
-    monkeypatch.setattr(backend, "drain", drain)
+    monkeypatch.setattr(backend_of(node).traffic, "drain", drain)
     leaves = [MoveRobot(f"m{n}", 1.0, action_name=name) for n in range(20)]
     root = py_trees.composites.Sequence("all", memory=True, children=list(leaves))
     with TreeRunner(root, node=node) as runner:

@@ -141,10 +141,6 @@ def test_who_runs_a_tree_is_woken(world: World, told: list[Any]) -> None:
     assert told == [None]
 
 
-def test_there_is_nothing_to_wait_for_without_goals(world: World) -> None:
-    assert world.backend.drain([]) == []
-
-
 def test_a_line_of_each_level_can_be_logged(world: World) -> None:
     for level in ("debug", "info", "warn", "error", "fatal"):
         world.backend.log(level, "a line")
