@@ -32,12 +32,13 @@ def watch() -> ServerWatch:
 
 
 def sent(watch: ServerWatch) -> replies.Replies:
-    """Return what is believed of a goal that is sent to who is in sight."""
+    """Return what is believed of a goal that was sent to who is in sight."""
     goal = Goal(b"1", "move", Timeouts(), Now(0.0, 0.0))
     for event in (Event.GRANTED, Event.SERVER_READY):
         goal.on(event, Now(0.0, 0.0))
     said = replies.Replies(goal)
     said.sent(watch)
+    said.looked(watch, 0.0)  # which completes who may have got it
     return said
 
 

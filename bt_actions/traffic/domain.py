@@ -10,6 +10,7 @@ from typing import Any
 
 from bt_actions.goals.resources import Resources
 from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic.effects import Effects
 from bt_actions.traffic.handle import Endpoint, GoalHandle
 
 LOST_KEPT = 100
@@ -24,6 +25,7 @@ class Domain:
     def __init__(self, number: int) -> None:
         self.number = number
         self.resources: Resources[GoalHandle] = Resources()
+        self.effects = Effects()
         self.open: dict[Endpoint, None] = {}
         """The endpoints with goals, of all nodes, in the order in which they came."""
         self.lost_sight = False

@@ -9,17 +9,18 @@ one lock.
 
 from __future__ import annotations
 
-import dataclasses
 import weakref
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, Event
 from bt_actions.servers.duplicates import DuplicateReplies
-from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.servers.presence import GID
+from bt_actions.servers.replies import Replies
+from bt_actions.traffic.handle import Endpoint, GoalHandle, Reporter
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.transport import GOALS_KEPT
 
@@ -31,14 +32,18 @@ QUESTIONS = 5
 
 @dataclass(slots=True)
 class Ended:
-    """A goal that is DONE, and the duplicate that it has should a second server run it."""
+    """A goal that is DONE, with what its duplicate would need to know should there be one."""
 
+    goal: Goal
+    replies: Replies
     owner: Callable[[], Any]
     """A weak reference to the leaf."""
+    name: str
+    begun_in: object
+    attempt: int
+    reporter: Reporter
     accepted: bool
     since: float
-    duplicate: GoalHandle
-    said: DuplicateReplies
     questions: int = 0
     """Asked in doubt."""
 
@@ -55,31 +60,36 @@ class Past:
 
         But not where it is lost, and is given up with many others.
         """
-        endpoint = self._endpoint
-        duplicate = dataclasses.replace(
-            handle,
-            goal=handle.goal.duplicate(endpoint.participant.now()),
-            keeps_feedback=False,
-            feedback=deque(maxlen=1),
-        )
-        endpoint.see()
-        elsewhere = handle.replies.may_run_at(endpoint.watch)
-        given_up = handle.goal.end is End.SERVER_GONE
-        if elsewhere and not given_up:
-            duplicate.replies = DuplicateReplies(duplicate.goal, handle.replies, elsewhere)
-            duplicate.replies.taken_over()
-            endpoint.take_in(duplicate)
-            return
-        duplicate.owner = None
-        said = DuplicateReplies(duplicate.goal, handle.replies, handle.replies.sent_to)
-        duplicate.replies = said
+        endpoint, goal = self._endpoint, handle.goal
         owner = (lambda: None) if handle.owner is None else weakref.ref(handle.owner)
-        accepted, now = handle.goal.accepted, self._host.steady()
-        self._ended[duplicate.goal.id] = Ended(owner, accepted, now, duplicate, said)
+        ended = Ended(
+            goal, handle.replies, owner, handle.name, handle.begun_in, handle.attempt,
+            handle.reporter, goal.accepted, self._host.steady(),
+        )  # fmt: skip
+        if len(handle.replies.servers) > 1 and goal.end is not End.SERVER_GONE:
+            endpoint.see()
+            if elsewhere := handle.replies.may_run_at(endpoint.watch):
+                duplicate, _ = self._duplicate(ended, elsewhere)
+                duplicate.replies.taken_over()
+                endpoint.take_in(duplicate)
+                return
+        self._ended[goal.id] = ended
         if len(self._ended) > GOALS_KEPT:
             oldest = next(iter(self._ended))
             del self._ended[oldest]
             endpoint.transport.forget(oldest)
+
+    def _duplicate(
+        self, ended: Ended, sent_to: frozenset[GID]
+    ) -> tuple[GoalHandle, DuplicateReplies]:
+        """Return the same goal as one of these servers may run it."""
+        goal = ended.goal.duplicate(self._endpoint.participant.now())
+        duplicate = GoalHandle(
+            goal, self._endpoint, ended.reporter, ended.owner(), ended.name, ended.begun_in,
+            ended.attempt,
+        )  # fmt: skip
+        duplicate.replies = said = DuplicateReplies(goal, ended.replies, sent_to)
+        return duplicate, said
 
     def accepted(self, goal_id: bytes, answers: Sequence[bool] = (True,)) -> None:
         """Take an acceptance: it may have been overtaken by the result, or have come twice."""
@@ -116,7 +126,7 @@ class Past:
         """Ask whoever has it to cancel: whoever has ended it will deny it."""
         if ended.questions < QUESTIONS:
             ended.questions += 1
-            self._endpoint.ask_to_cancel(ended.duplicate.goal.id)
+            self._endpoint.ask_to_cancel(ended.goal.id)
 
     def _get(self, goal_id: bytes) -> Ended | None:
         """Return what has ended; in the child of a fork nothing has, it is the parent's."""
@@ -124,13 +134,13 @@ class Past:
 
     def _may_be_several(self, ended: Ended) -> bool:
         self._endpoint.see()
-        return len(ended.said.servers | self._endpoint.watch.gids) > 1
+        return len(ended.replies.servers | self._endpoint.watch.gids) > 1
 
     def _hand_over(self, ended: Ended) -> None:
-        endpoint, duplicate = self._endpoint, ended.duplicate
-        del self._ended[duplicate.goal.id]
-        duplicate.owner = ended.owner()
+        endpoint = self._endpoint
+        del self._ended[ended.goal.id]
+        duplicate, said = self._duplicate(ended, ended.replies.sent_to)
         endpoint.watch.two_answered()
-        ended.said.is_at_another(endpoint.watch, self._host.steady())
+        said.is_at_another(endpoint.watch, self._host.steady())
         endpoint.take_in(duplicate)
         endpoint.tell(duplicate, Event.SERVER_RETURNED)

@@ -19,14 +19,15 @@ from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
     STATUS_SUCCEEDED,
-    Command,
     Event,
     Now,
     State,
 )
 from bt_actions.servers.presence import PROBES_KEPT, Server, ServerWatch
 from bt_actions.servers.replies import Told
+from bt_actions.traffic.carrier import Carrier
 from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.effects import Before, Effect, what_follows
 from bt_actions.traffic.ended import Past
 from bt_actions.traffic.handle import GoalHandle, Reporter
 from bt_actions.traffic.host import Host
@@ -59,7 +60,7 @@ class ActionEndpoint:
         why_not: Callable[[GoalHandle], str],
     ) -> None:
         """`unused` is called where no goal is open; `why_not` tells what has kept a goal back."""
-        self._host, self._log = host, host.log
+        self._host = host
         self.participant, self.domain, self.reporter = participant, domain, reporter
         self.action_type = action_type
         self.name = name
@@ -74,6 +75,7 @@ class ActionEndpoint:
         self._last_probes: deque[int] = deque()
         self._warned_of: set[str] = set()
         self._past = Past(self, host)
+        self._carrier = Carrier(self, host, domain, self._warn_once)
         self._predecessors = Predecessors(name, host.log)
         self.transport = participant.open_transport(action_type, name, self)
         self.route = Route(self, self, host, domain)
@@ -89,8 +91,8 @@ class ActionEndpoint:
         with self._host.lock:
             handle = self._heard_of(goal_id)
             if handle is not None:
-                now, said = self._host.steady(), handle.replies
-                self.pass_on(handle, said.answered(self.watch, now, answers))
+                told = handle.replies.answered(self.watch, self._host.steady(), answers)
+                self.pass_on(handle, told)
             elif answers[-1]:
                 self._past.accepted(goal_id, answers)
 
@@ -117,8 +119,8 @@ class ActionEndpoint:
             self.cancels.answered(goal_id, self._host.steady())
             handle = self._heard_of(goal_id, denies=answers[-1] == CANCEL_UNKNOWN_GOAL)
             if handle is not None:
-                now, said = self._host.steady(), handle.replies
-                self.pass_on(handle, said.canceled(self.watch, now, asked, answers))
+                told = handle.replies.canceled(self.watch, self._host.steady(), asked, answers)
+                self.pass_on(handle, told)
             else:
                 self._past.cancel_answered(goal_id, asked, answers[-1])
 
@@ -129,8 +131,8 @@ class ActionEndpoint:
         with self._host.lock:
             handle = self._heard_of(goal_id, denies=answers[-1][0] == 0)
             if handle is not None:
-                now, said = self._host.steady(), handle.replies
-                self.pass_on(handle, said.finished(self.watch, now, asked, answers))
+                told = handle.replies.finished(self.watch, self._host.steady(), asked, answers)
+                self.pass_on(handle, told)
 
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
@@ -144,8 +146,8 @@ class ActionEndpoint:
                 status = statuses[goal_id]
                 handle = self._heard_of(goal_id) if status > 0 else None
                 if handle is not None:
-                    now, said = self._host.steady(), handle.replies
-                    self.pass_on(handle, said.shown(self.watch, now, status))
+                    told = handle.replies.shown(self.watch, self._host.steady(), status)
+                    self.pass_on(handle, told)
 
     def probe_answered(self, probe: int) -> None:
         """Pass on the answer to a probe."""
@@ -204,9 +206,10 @@ class ActionEndpoint:
         with self._host.lock:
             if self.is_parents:
                 return
+            now = self.participant.now()
             if event is Event.GRANTED and handle.paused_at is not None:
-                handle.paused_at = self._host.steady()  # its next deadline begins in the pause
-            self._apply(handle, event, self.participant.now(), detail, message)
+                handle.paused_at = now.steady  # its next deadline begins in the pause
+            self._apply(handle, event, now, detail, message)
 
     def poll(self, handle: GoalHandle) -> None:
         """Let the goal's deadlines take effect, unless its tree is paused before sending.
@@ -258,91 +261,29 @@ class ActionEndpoint:
         self, handle: GoalHandle, event: Event, now: Now, detail: Any = None, message: Any = None
     ) -> None:
         goal, trace = handle.goal, self._host.trace
-        before, shown = goal.state, (goal.state.shown, goal.outcome, goal.end)
-        was_accepted, was_in_the_way, was_lost = goal.accepted, _in_the_way(goal), goal.lost
+        before, was_lost = Before.of(handle), goal.lost
+        waited = goal.state in (State.QUEUED, State.WAITING_FOR_SERVER)
         trace.tells(handle, event)
         commands = goal.on(event, now, detail)
         trace.told(handle, event, detail, commands)
-        waited = before in (State.QUEUED, State.WAITING_FOR_SERVER)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
             goal.reason += self._why_not(handle)
         newly_gone = goal.lost and not was_lost and goal.end is End.SERVER_GONE
         if newly_gone and handle.look_out_left is None:
             handle.look_out_left = LOOKED_OUT_FOR
-        if shown != (goal.state.shown, goal.outcome, goal.end):
-            handle.reporter.note(handle)
-        if _in_the_way(goal) != was_in_the_way:
-            self._tell_who_waits()
-        for command in commands:
-            self._carry_out(handle, command, message)
-        if _is_answered(handle):
-            self._host.record.strike(goal.id)
-        elif (
-            goal.lost != was_lost and goal.state is not State.DONE and goal.id in self._host.record
-        ):
-            self._put_on_record(handle)
-        if goal.state is State.DONE:
-            self.retire(handle)
-        due = goal.due_in(now)
-        if due is not None:
+        for do in what_follows(handle, before, commands):
+            self.domain.effects.put(self._carrier.carry_out, Effect(do, handle, message))
+        if (due := goal.due_in(now)) is not None:
             self._host.scheduler.wake_by(now.steady + due)
-        newly = goal.accepted and not was_accepted and goal.state is State.EXECUTING
-        if newly and goal.busy is Busy.REPLACE:
-            for older in self.domain.resources.holders(goal.resources):
-                if older is handle:
-                    break
-                older.endpoint.tell(older, Event.REPLACED, goal.server)
-
-    def _carry_out(self, handle: GoalHandle, command: Command, message: Any) -> None:
-        goal = handle.goal
-        if command is Command.RELEASE:
-            for next_one in self.domain.resources.release(handle):
-                next_one.endpoint.tell(next_one, Event.GRANTED)
-            return
-        try:
-            if command is Command.SEND:
-                handle.replies.sent(self.watch)
-                self._put_on_record(handle)
-                self.transport.send(goal.id, message)
-                known = handle.replies.sent_to
-                self.see()
-                handle.replies.sent(self.watch)  # who opened since got it, too
-                if handle.replies.sent_to != known:
-                    self._put_on_record(handle)
-            elif command is Command.ASK_RESULT:
-                self.transport.ask_result(goal.id)
-            elif goal.state is State.DONE:  # and nothing is sent after that
-                self._send_cancel(goal.id)
-            else:
-                self.ask_to_cancel(goal.id)
-        except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
-            if command is Command.SEND:
-                self.tell(handle, Event.SEND_FAILED, error)
-            else:
-                self._warn_once(f"{command.name} could not be sent", error)
-
-    def _put_on_record(self, handle: GoalHandle) -> None:
-        goal, sent_to = handle.goal, handle.replies.sent_to
-        number, accept = self.domain.number, goal.timeouts.accept
-        self._host.record.enter(goal.id, self.name, number, sent_to, accept=accept, lost=goal.lost)
-
-    def _tell_who_waits(self) -> None:
-        """Wake those of all nodes whose goals a change here may have let go on."""
-        waiting = [each.reporter for each in self.domain.open if each.is_waited_for]
-        for reporter in dict.fromkeys(waiting):
-            reporter.notify(None)
+        self.domain.effects.drain()
 
     def ask_to_cancel(self, goal_id: bytes) -> None:
         """Ask the server to cancel a goal, as soon as its queue has room."""
-        self.cancels.ask(goal_id, self._send_cancel, self._host.steady())
+        self._carrier.ask_to_cancel(goal_id)
 
-    def _send_cancel(self, goal_id: bytes) -> bool:
-        try:
-            self.transport.cancel(goal_id)
-        except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
-            self._warn_once("CANCEL could not be sent", error)
-            return False
-        return True
+    def put_on_record(self, handle: GoalHandle) -> None:
+        """Have on record where it may be."""
+        self._carrier.put_on_record(handle)
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
@@ -367,7 +308,7 @@ class ActionEndpoint:
     def _warn_once(self, what: str, error: Exception) -> None:
         if what not in self._warned_of:
             self._warned_of.add(what)
-            self._log.error(f"{self.name}: {what}: {raised(error)}")
+            self._host.log.error(f"{self.name}: {what}: {raised(error)}")
 
     # Which goals are here, and how the server is reached
 
@@ -396,7 +337,7 @@ class ActionEndpoint:
         self._host.trace.retired(handle)
 
     def goals_of(self, owner: Any) -> list[GoalHandle]:
-        """Return the goals of a leaf that are open here, also what a second server took."""
+        """Return a leaf's goals that are open here, also what a second server took."""
         with self._host.lock:
             return [handle for handle in self.goals.values() if handle.owner is owner]
 
@@ -427,19 +368,3 @@ class ActionEndpoint:
         self.transport, self.watch = transport, ServerWatch()
         self.watcher.begin_anew()
         self._host.scheduler.wake_by(self._host.steady())
-
-
-def _is_answered(handle: GoalHandle) -> bool:
-    """Whether it need not be on record any more: whoever got it shows it, or will not run it.
-
-    One that two servers got is accepted by one of them first. And a server that has gone may only
-    stand still, for longer than this process is there.
-    """
-    goal = handle.goal
-    shown = goal.accepted and len(handle.replies.sent_to) <= 1
-    return shown or (handle.accounted_for and goal.end is not End.SERVER_GONE)
-
-
-def _in_the_way(goal: Goal) -> tuple[bool, ...]:
-    """What of a goal others may wait for: room at its server, or its end."""
-    return goal.in_flight, goal.unanswered, goal.outstanding, goal.lost, goal.holding

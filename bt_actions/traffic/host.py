@@ -13,6 +13,7 @@ from typing import Any, Protocol
 from bt_actions.goals.terms import Command, Event
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.effects import Effect
 from bt_actions.traffic.handle import GoalHandle
 from bt_actions.traffic.scheduler import Scheduler
 
@@ -81,6 +82,9 @@ class Trace:
         self, handle: GoalHandle, event: Event, detail: Any, commands: tuple[Command, ...]
     ) -> None:
         """and was told, and this is what it says."""
+
+    def does(self, effect: Effect) -> None:
+        """What a goal has decided is about to be done."""
 
     def polls(self, handle: GoalHandle) -> None:
         """A goal is about to be shown the time."""

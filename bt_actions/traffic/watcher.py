@@ -111,7 +111,11 @@ class Watcher:
             if handle.goal.sent:
                 if gone and not handle.goal.lost:
                     endpoint.pump()  # its last words
-                endpoint.pass_on(handle, handle.replies.looked(watch, now))
+                known = handle.replies.sent_to
+                told = handle.replies.looked(watch, now)
+                if handle.replies.sent_to != known:
+                    endpoint.put_on_record(handle)
+                endpoint.pass_on(handle, told)
         state = self._looked_like = watch.state(now)
         if before is Server.ABSENT or self._was_away:
             endpoint.in_sight_since = now

@@ -52,6 +52,7 @@ class ModelTransport:
         return self._caller.world.ready(self._name, self._node)
 
     def servers(self) -> frozenset[bytes]:
+        self._caller.looks += 1
         return self._caller.world.shown(self._name, self._node)
 
     def send(self, goal_id: bytes, goal: Any) -> None:
@@ -273,6 +274,8 @@ class Caller:
         self.misfortunes: set[str] = set()
         self._transports: list[ModelTransport] = []
         self._moments, self._passed = 0, 0.0
+        self.looks = 0
+        """How often the graph was asked who serves an action."""
         self._next_name = ""
         self._chance = random.Random(0)
         self.host = ModelHost(self)

@@ -487,8 +487,9 @@ def test_two_types_under_one_name_are_an_error_that_names_both(node: Node, name:
 
 def test_each_node_has_clients_of_its_own(node: Node, context: Context, name: str) -> None:
     other = Node("other", context=context)
-    lines = [traffic_of(each).endpoint(GripperAction, name) for each in (node, other)]
-    assert lines[0].transport is not lines[1].transport
-    for line in lines:
-        line.traffic.leave(line)
+    both = [traffic_of(each) for each in (node, other)]
+    endpoints = [traffic.endpoint(GripperAction, name) for traffic in both]
+    assert endpoints[0].transport is not endpoints[1].transport
+    for traffic, endpoint in zip(both, endpoints, strict=True):
+        traffic.leave(endpoint)
     other.destroy_node()

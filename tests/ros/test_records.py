@@ -15,7 +15,7 @@ from bt_actions.goals.terms import Event
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.host import host as process
 from bt_actions.ros.node_participant import traffic_of
-from bt_actions.traffic import endpoint as module
+from bt_actions.traffic import effects as module
 from bt_actions.traffic import handover
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import state

@@ -1,0 +1,109 @@
+"""Carries out what the goals of one endpoint have decided: records, sends, asks, cancels, reports.
+
+What was true at the decision is looked at again here. Decides nothing about a goal; what fails is
+told to it. All under the host's lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bt_actions.goals.terms import Command, Event, State
+from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.effects import Do, Effect
+from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.host import Host
+
+
+class Carrier:
+    """For the goals of one endpoint."""
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        host: Host,
+        domain: Domain,
+        failed: Callable[[str, Exception], None],
+    ) -> None:
+        """`failed` is told what could not be done, which is asked for again later."""
+        self._endpoint, self._host, self._domain, self._failed = endpoint, host, domain, failed
+        self._does: dict[Do | Command, Callable[[GoalHandle], None]] = {
+            Do.NOTE: lambda handle: handle.reporter.note(handle),
+            Do.GO_ON: self._let_go_on,
+            Do.RECORD: self._record_again,
+            Do.STRIKE: lambda handle: host.record.strike(handle.goal.id),
+            Do.RETIRE: endpoint.retire,
+            Do.REPLACE: self._replace,
+            Command.RELEASE: self._release,
+            Command.ASK_RESULT: self._ask_result,
+            Command.CANCEL: self._cancel,
+        }
+
+    def carry_out(self, effect: Effect) -> None:
+        """Do it."""
+        self._host.trace.does(effect)
+        if effect.do is Command.SEND:
+            self._send(effect)
+        else:
+            self._does[effect.do](effect.handle)
+
+    def _send(self, effect: Effect) -> None:
+        """Count who gets it, have it on record, and send the request."""
+        handle, endpoint = effect.handle, self._endpoint
+        try:
+            handle.replies.sent(endpoint.watch)
+            self.put_on_record(handle)
+            endpoint.transport.send(handle.goal.id, effect.message)
+        except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
+            endpoint.tell(handle, Event.SEND_FAILED, error)
+
+    def _ask_result(self, handle: GoalHandle) -> None:
+        try:
+            self._endpoint.transport.ask_result(handle.goal.id)
+        except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
+            self._failed("ASK_RESULT could not be sent", error)
+
+    def _cancel(self, handle: GoalHandle) -> None:
+        if handle.goal.state is State.DONE:  # and nothing is sent after that
+            self.send_cancel(handle.goal.id)
+        else:
+            self.ask_to_cancel(handle.goal.id)
+
+    def ask_to_cancel(self, goal_id: bytes) -> None:
+        """Ask the server to cancel a goal, as soon as its queue has room."""
+        self._endpoint.cancels.ask(goal_id, self.send_cancel, self._host.steady())
+
+    def send_cancel(self, goal_id: bytes) -> bool:
+        """Ask now; return whether the request has left."""
+        try:
+            self._endpoint.transport.cancel(goal_id)
+        except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
+            self._failed("CANCEL could not be sent", error)
+            return False
+        return True
+
+    def _release(self, handle: GoalHandle) -> None:
+        for next_one in self._domain.resources.release(handle):
+            next_one.endpoint.tell(next_one, Event.GRANTED)
+
+    def _replace(self, handle: GoalHandle) -> None:
+        for older in self._domain.resources.holders(handle.goal.resources):
+            if older is handle:
+                break
+            older.endpoint.tell(older, Event.REPLACED, handle.goal.server)
+
+    def put_on_record(self, handle: GoalHandle) -> None:
+        """Have on record where it may be."""
+        goal, sent_to = handle.goal, handle.replies.sent_to
+        name, number, accept = self._endpoint.name, self._domain.number, goal.timeouts.accept
+        self._host.record.enter(goal.id, name, number, sent_to, accept=accept, lost=goal.lost)
+
+    def _record_again(self, handle: GoalHandle) -> None:
+        if handle.goal.id in self._host.record:
+            self.put_on_record(handle)
+
+    def _let_go_on(self, _: GoalHandle) -> None:
+        """Wake those of all nodes whose goals wait: there may be room, or nothing in the way."""
+        waiting = [each.reporter for each in self._domain.open if each.is_waited_for]
+        for reporter in dict.fromkeys(waiting):
+            reporter.notify(None)

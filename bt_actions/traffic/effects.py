@@ -1,0 +1,114 @@
+"""What is to be done for goals, as values, in the order in which it was decided.
+
+A goal decides at once, whoever tells it something. What follows waits in one queue of its domain;
+whoever drains it first carries out all, also what is decided meanwhile, which comes behind. So
+nothing is done by recursion, and no effect overtakes an older one. Carries out nothing itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, NamedTuple
+
+from bt_actions.goals.policy import Busy, End, Outcome
+from bt_actions.goals.terms import Command, State
+from bt_actions.traffic.handle import GoalHandle
+
+
+class Do(Enum):
+    """What is done beside the goal's commands."""
+
+    NOTE = "report that it has changed"
+    GO_ON = "wake those whose goals it may have let go on"
+    RECORD = "put what more is known of it on record, if it is there"
+    STRIKE = "take it off the record"
+    RETIRE = "see to it no more"
+    REPLACE = "tell older goals on its resources that it has taken their place"
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One thing to be done."""
+
+    do: Do | Command
+    handle: GoalHandle
+    message: Any = None
+    """The goal to be sent."""
+
+
+class Before(NamedTuple):
+    """What of a goal matters for what follows from a step, before it."""
+
+    shown: tuple[str, Outcome | None, End]
+    in_the_way: tuple[bool, ...]
+    """What others may wait for: room at its server, or its end."""
+    accepted: bool
+    lost: bool
+    answered: bool
+
+    @classmethod
+    def of(cls, handle: GoalHandle) -> Before:
+        """Return it as it is now."""
+        goal = handle.goal
+        in_the_way = goal.in_flight, goal.unanswered, goal.outstanding, goal.lost, goal.holding
+        shown = goal.state.shown, goal.outcome, goal.end
+        return cls(shown, in_the_way, goal.accepted, goal.lost, _is_answered(handle))
+
+
+def what_follows(
+    handle: GoalHandle, before: Before, commands: Iterable[Command]
+) -> Iterator[Do | Command]:
+    """Return what is to be done after a step of a goal, in order."""
+    goal, now = handle.goal, Before.of(handle)
+    if now.shown != before.shown:
+        yield Do.NOTE
+    if now.in_the_way != before.in_the_way:
+        yield Do.GO_ON
+    yield from commands
+    if now.answered and not before.answered:
+        yield Do.STRIKE
+    elif not now.answered and now.lost != before.lost and goal.state is not State.DONE:
+        yield Do.RECORD
+    if goal.state is State.DONE:
+        yield Do.RETIRE
+    newly = now.accepted and not before.accepted and goal.state is State.EXECUTING
+    if newly and goal.busy is Busy.REPLACE:
+        yield Do.REPLACE
+
+
+def _is_answered(handle: GoalHandle) -> bool:
+    """Whether it need not be on record any more: whoever got it shows it, or will not run it.
+
+    One that two servers got is accepted by one of them first. And a server that has gone may only
+    stand still, for longer than this process is there.
+    """
+    goal = handle.goal
+    shown = goal.accepted and len(handle.replies.sent_to) <= 1
+    return shown or (handle.accounted_for and goal.end is not End.SERVER_GONE)
+
+
+class Effects:
+    """The queue; the caller holds the host's lock."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[Callable[[Effect], None], Effect]] = deque()
+        self._drains = False
+
+    def put(self, carry_out: Callable[[Effect], None], effect: Effect) -> None:
+        """Have this carried out behind what was decided before."""
+        self._waiting.append((carry_out, effect))
+
+    def drain(self) -> None:
+        """Carry out all, unless somebody does so already."""
+        if self._drains:
+            return
+        self._drains = True
+        try:
+            while self._waiting:
+                carry_out, effect = self._waiting.popleft()
+                carry_out(effect)
+        finally:
+            self._drains = False
