@@ -47,7 +47,8 @@ class VirtualRunner:
         self.backend = VirtualBackend(self.network, seed=seed)
         self.events: list[Event] = []
         """What happened in all runs; times are virtual."""
-        self._woken = False
+        self._woken = self._goes_on = False
+        self._status: Status | None = None
         self._loop = TickLoop(
             self.tree,
             self.backend,
@@ -96,25 +97,30 @@ class VirtualRunner:
     def start(self, timeout: float = LONGEST) -> None:
         """Begin a run, for `advance` to go on with."""
         self._loop.begin(self.now, timeout)
-        self._woken = True
-        self._next = self.now
+        self._woken = self._goes_on = True
+        self._status, self._next = None, self.now
 
     def advance(self, seconds: float) -> Status | None:
         """Let so much time pass; return the tree's status if it has ended by then.
 
-        INVALID means that it was interrupted. Raises what `run` raises.
+        It returns when the tree ends; after that, time passes without it. INVALID means that it
+        was interrupted. Raises what `run` raises.
         """
         until = self.now + seconds
-        while True:
+        while self._goes_on:
             while not self._woken and self.network.timeline.advance(min(self._next, until)):
                 pass
             if not self._woken and self.now < self._next:
                 return None
-            self._woken = False
+            self._woken = self._goes_on = False
             step = self._loop.step(self.now)
             if isinstance(step, Done):
-                return step.result
-            self._next = self.now + step.seconds
+                self._status = step.result
+                return self._status
+            self._next, self._goes_on = self.now + step.seconds, True
+        while self.network.timeline.advance(until):
+            pass
+        return self._status
 
     def interrupt(self) -> None:
         """Have the run end at the next step: its goals are canceled and drained."""
