@@ -127,8 +127,9 @@ class VirtualRunner:
         self._loop.interrupt(self.now)
 
     def shutdown(self) -> None:
-        """Let go of everything; with that the leaves are shut down."""
+        """Shut the leaves down, and see to what they left, as a program that ends does."""
         self._loop.shutdown()
+        self.backend.traffic.destroy()
         self._loop.close(self.now)
 
     def _wake(self) -> None:
