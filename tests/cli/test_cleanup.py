@@ -131,7 +131,7 @@ def test_an_action_that_is_named_is_wanted(
     assert "'g h' cannot be the name of an action server: " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_it_and_it_says_so(start: Start, node: Any, number: signal.Signals) -> None:
     cleanup = start("cleanup", "--look", "60")
     until(lambda: "bt_actions_cleanup" in node.get_node_names(), within=20.0)

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -48,8 +48,7 @@ def moving(
     return begin
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("how", ["", "--json"])
+@pytest.mark.parametrize(("number", "how"), [(signal.SIGHUP, ""), (signal.SIGINT, "--json")])
 def test_what_was_told_holds_though_a_signal_comes_late(
     number: signal.Signals, how: str, moving: Callable[..., tuple[Process, Journal]]
 ) -> None:
@@ -66,7 +65,6 @@ def test_what_was_told_holds_though_a_signal_comes_late(
 @pytest.mark.parametrize(
     ("number", "code", "how"),
     [
-        (signal.SIGINT, 130, ""),
         (signal.SIGINT, 130, "--json"),
         (signal.SIGINT, 130, "--executor=single"),
         (signal.SIGTERM, 143, ""),
@@ -135,51 +133,28 @@ def test_a_goal_whose_end_stays_unknown_makes_the_code_3(
     assert f"not accounted for: To the part on {namespace}/move_robot" in run.lines[-1]
 
 
-@pytest.fixture
-def piped(
+def test_a_closed_standard_output_ends_the_run_as_sigterm_does_though_nothing_more_is_written(
     robot: Robot, namespace: str, tree: Tree, mark: str, no_leaks: None
-) -> Iterator[tuple[subprocess.Popen[bytes], Journal]]:
-    """A run whose standard output is a pipe that the test may close."""
+) -> None:
     journal = robot("1:slow=200", speed=1.0)
     arguments = ["run", str(tree()), "--namespace", namespace]
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-m", "bt_actions.cli", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         cwd=ROOT,
-    )
-    yield process, journal
-    if process.poll() is None:
-        process.kill()
-    process.communicate()
-
-
-def test_a_closed_standard_output_ends_the_run_as_sigterm_does(
-    piped: tuple[subprocess.Popen[bytes], Journal], mark: str
-) -> None:
-    process, journal = piped
-    assert process.stdout is not None
-    assert process.stderr is not None
-    assert process.stdout.readline()
-    journal.wait_for("accepted")
-    process.stdout.close()
-    assert process.wait(PATIENCE) == 141
-    assert process.stderr.read() == b""
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        for line in process.stdout:
+            if b"executing on" in line:
+                break
+        process.stdout.close()
+        journal.wait_for("canceled", within=2.0)
+        assert process.wait(PATIENCE) == 141
+        assert process.stderr.read() == b""
     assert journal.ends() == ["canceled"]
     assert marked(mark) == []
-
-
-def test_it_is_noticed_though_nothing_more_is_written(
-    piped: tuple[subprocess.Popen[bytes], Journal],
-) -> None:
-    process, journal = piped
-    assert process.stdout is not None
-    for line in process.stdout:
-        if b"executing on" in line:
-            break
-    process.stdout.close()
-    journal.wait_for("canceled", within=2.0)
-    assert process.wait(PATIENCE) == 141
 
 
 def test_under_nohup_a_hangup_changes_nothing(

@@ -174,9 +174,7 @@ def test_a_closed_terminal_is_a_hangup(terminal: Callable[..., Terminal], mark: 
     assert marked(mark) == []
 
 
-@pytest.mark.parametrize(
-    ("option", "name"), [((), "dumb"), ((), "unknown"), (("--plain",), "xterm-256color")]
-)
+@pytest.mark.parametrize(("option", "name"), [((), "dumb"), (("--plain",), "xterm-256color")])
 def test_a_dumb_terminal_gets_lines_and_so_does_who_wants_it_plain(
     option: tuple[str, ...], name: str, terminal: Callable[..., Terminal]
 ) -> None:
@@ -186,17 +184,12 @@ def test_a_dumb_terminal_gets_lines_and_so_does_who_wants_it_plain(
     assert any("RUNNING  Deliver the part" in line for line in demo.lines)
 
 
-def test_no_color_is_respected(terminal: Callable[..., Terminal]) -> None:
-    demo = terminal(*DEMO, NO_COLOR="1")
+def test_a_latin_1_terminal_gets_no_character_that_it_does_not_have_and_no_color_is_respected(
+    terminal: Callable[..., Terminal],
+) -> None:
+    demo = terminal(*DEMO, PYTHONIOENCODING="latin-1", PYTHONUTF8="0", NO_COLOR="1")
     assert demo.wait() == 0
     colours = [f"\x1b[{code}m".encode() for code in (31, 32, 33, 36)]
     assert not any(colour in demo.raw for colour in colours)
-
-
-def test_a_latin_1_terminal_gets_no_character_that_it_does_not_have(
-    terminal: Callable[..., Terminal],
-) -> None:
-    demo = terminal(*DEMO, PYTHONIOENCODING="latin-1", PYTHONUTF8="0")
-    assert demo.wait() == 0
     assert demo.raw.isascii()
     assert any(line.startswith("+ To the part") for line in demo.lines)
