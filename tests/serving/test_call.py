@@ -47,8 +47,7 @@ def test_a_call_is_told_as_a_run_is(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["mov"], "UNKNOWN_TREE: there is no tree 'mov' here; did you mean 'move'?"),
-        (["move", "--json"], "INPUTS: "),
+        (["mov", "--json"], "UNKNOWN_TREE: there is no tree 'mov' here; did you mean 'move'?"),
         (["move", "--ros-args", "-p", "distnce:=1.0"], "did you mean 'distance'?"),
     ],
 )

@@ -45,7 +45,6 @@ def other_client(domain: int, space: str) -> Iterator[TreeClient]:
     context.shutdown()
 
 
-@pytest.mark.parametrize(("policy", "live"), [("queue", 1), ("parallel", 2)])
 def test_two_clients_get_their_own_results_and_feedback(
     serve: Callable[..., Journal],
     serve_trees: Serve,
@@ -53,13 +52,11 @@ def test_two_clients_get_their_own_results_and_feedback(
     other_client: TreeClient,
     folder: Path,
     name: str,
-    policy: str,
-    live: int,
 ) -> None:
     both = [serve(), serve(name=f"{name}_2")]
     second = MOVE.format(server=f"{name}_2", cancel="5 s").replace("action: Go", "action: Other")
     (folder / "other.yaml").write_text(second.replace("tree: move", "tree: other"))
-    serve_trees("--policy", policy)
+    serve_trees("--policy", "parallel")
     clients = [(client, "move", "Move / Go", 0.4), (other_client, "other", "Move / Other", 0.5)]
     sent = [
         (each, each.send(tree, f"{{distance: {distance}}}"), path, distance)
@@ -72,7 +69,7 @@ def test_two_clients_get_their_own_results_and_feedback(
         paths = {leaf.path for message in goal.feedback for leaf in message.running}
         assert path in paths
         assert paths <= {path, "Move / Done"}
-    assert journals.max_live([entry for each in both for entry in each.entries()]) == live
+    assert journals.max_live([entry for each in both for entry in each.entries()]) == 2
 
 
 def test_each_goal_runs_one_version_of_a_file_that_changes_all_the_time(

@@ -31,6 +31,7 @@ bt_actions_serve:
         (["--max", "3"], "--max is for the policies queue and parallel, and this is reject"),
         (["--policy", "replace", "--ros-args", "-p", "max:=3"],
          "--max is for the policies queue and parallel, and this is replace"),
+        (["--trees", "/no/such/folder"], "--trees: /no/such/folder is no folder of trees"),
         (["--ros-args", "-p", "policy:=que"],
          "the parameter 'policy' is 'que', and not reject, queue, replace, parallel"),
         (["--ros-args", "-p", "max:=0"],

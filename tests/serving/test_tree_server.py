@@ -88,15 +88,10 @@ def test_feedback_names_what_runs_and_counts_what_has_ended(
     ("tree", "inputs", "code"),
     [
         ("nothing", "", "UNKNOWN_TREE"),
-        ("../trees/move", "", "UNKNOWN_TREE"),
         ("broken", "", "BT201"),
-        ("move", "", "INPUTS"),
-        ("move", "{distance: far}", "INPUTS"),
-        ("move", "{distance: 1.0, speed: 2.0}", "INPUTS"),
-        ("move", "{distance: [", "BT102"),
         ("move", "{distance: 1.0} #" + "x" * 1_000_000, "INPUTS"),
     ],
-    ids=["unknown", "path", "broken tree", "missing", "type", "extra", "broken inputs", "1 MB"],
+    ids=["unknown", "broken tree", "1 MB"],
 )
 def test_a_goal_that_cannot_be_run_is_rejected_and_the_reason_is_told_to_all(
     serve_trees: Serve, client: TreeClient, tree: str, inputs: str, code: str
@@ -113,18 +108,6 @@ def test_a_goal_that_cannot_be_run_is_rejected_and_the_reason_is_told_to_all(
     assert [(each.code, each.message) for each in answer.findings] == [
         (code, told.message.removesuffix(f" ({answer.findings[0].place})"))
     ]
-
-
-def test_whoever_comes_late_still_hears_of_the_rejections(
-    serve_trees: Serve, client: TreeClient, fresh_context: object, space: str
-) -> None:
-    serve_trees()
-    client.send("nothing")
-    late = TreeClient(fresh_context, space)
-    try:
-        late.until(lambda: late.rejections, "the rejection is there")
-    finally:
-        late.close()
 
 
 def test_reject_runs_one_tree_at_a_time(
@@ -334,15 +317,14 @@ def test_a_run_is_paused_resumed_and_halted_by_its_goals_id(
     assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.HALTED)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_drains_all_goals_and_answers_before_the_process_ends(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, number: signal.Signals
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:
     journal = serve("1:delay_cancel=0.5")
     server = serve_trees("--policy", "queue")
     running, waiting = client.send("move", LONG), client.send("move", LONG)
     journal.wait_for("accepted")
-    server.send(number)
+    server.send(signal.SIGTERM)
     for sent in (running, waiting):
         status, result = client.result(sent)
         assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.DEACTIVATED)
@@ -439,11 +421,3 @@ def test_where_the_context_is_shut_down_first_all_goals_are_drained_and_nobody_c
     assert journal.ends() == ["canceled"]
     assert any("its client could not be answered" in line for line in server.errors)
     assert "Traceback" not in "\n".join(server.errors)
-
-
-def test_a_folder_that_is_none_is_bad_input(start_program: Callable[..., object]) -> None:
-    from tests.serving.conftest import MAIN
-
-    program = start_program("-c", MAIN, "serve", "--trees", "/no/such/folder")
-    assert program.wait() == 2  # type: ignore[attr-defined]
-    assert "/no/such/folder is no folder of trees" in program.errors[-1]  # type: ignore[attr-defined]
