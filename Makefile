@@ -2,6 +2,7 @@
 
 PYTHON ?=
 SLACK ?= 1.0
+WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 COLCON := .colcon
@@ -26,10 +27,10 @@ demo: setup ## pick and place against simulated servers, ten times as fast as re
 	$(BIN)/bt-actions run trees/pick_and_place.yaml --sim --speed 10 --check-part 5.0
 
 test: lint types ## check the code and run every test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 quick: lint types ## check the code, and run the tests that need no ROS; a minute
-	CI= $(BIN)/python -m pytest --without-ros -m "not chaos and not slow"
+	CI= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --without-ros -m "not chaos and not slow"
 
 docs: dev ## remake the pages and pictures that come from the code; `make test` fails when one is stale
 	$(BIN)/python scripts/goal_doc.py
