@@ -29,7 +29,8 @@ HEAD = """\
 
 `import bt_actions` gives the names on this page, but for the two parts at its end. How a tree of
 your own is made of them and run stands in the [README](../README.md#in-your-own-py_trees-tree), and
-how they live in a program of yours in [embedding.md](embedding.md). Times are seconds.
+how they live in a program of yours in [embedding.md](embedding.md). `bt_actions.testing` runs them
+in virtual time ([testing.md](testing.md)). Times are seconds.
 
 What holds everywhere:
 

@@ -24,6 +24,7 @@ from bt_actions import (
     Var,
     load_tree,
 )
+from bt_actions.testing import VirtualNetwork, VirtualRunner
 
 leaf = ActionBehaviour(
     "any",
@@ -60,3 +61,8 @@ with TreeRunner(root, executor="single", heartbeat=0.05) as runner:
     runner.interrupt()
     assert_type(runner.wait(1.0), Status)
     assert_type(runner.unaccounted, list[GoalReport])
+
+virtual = VirtualRunner(root, VirtualNetwork(), seed=1)
+assert_type(virtual.run(timeout=60.0), Status)
+assert_type(virtual.advance(1.0), Status | None)
+assert_type(virtual.outcomes, list[tuple[str, Outcome]])
