@@ -6,8 +6,9 @@ executor, and nothing is answered during a change.
 
 from __future__ import annotations
 
+import functools
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
@@ -36,14 +37,27 @@ class Lifecycle:
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
         self._events = endpoints.publisher(TransitionEvent, "~/transition_event", 10)
-        for kind, name, callback in (
-            (ChangeState, "change_state", self._on_change),
-            (GetState, "get_state", self._on_state),
-            (GetAvailableStates, "get_available_states", self._on_states),
-            (GetAvailableTransitions, "get_available_transitions", self._on_transitions),
-            (GetAvailableTransitions, "get_transition_graph", self._on_graph),
+        endpoints.service(ChangeState, "~/change_state", self._on_change)
+        machine, transitions = self._machine, (GetAvailableTransitions, "available_transitions")
+        for name, (kind, field), read in (
+            ("get_state", (GetState, "current_state"), lambda: _state(*machine.current_state)),
+            (
+                "get_available_states",
+                (GetAvailableStates, "available_states"),
+                lambda: [_state(*each) for each in machine.available_states],
+            ),
+            (
+                "get_available_transitions",
+                transitions,
+                lambda: [_described(*each) for each in machine.available_transitions],
+            ),
+            (
+                "get_transition_graph",
+                transitions,
+                lambda: [_described(*each) for each in machine.transition_graph],
+            ),
         ):
-            endpoints.service(kind, f"~/{name}", callback)
+            endpoints.service(kind, f"~/{name}", functools.partial(_answer, field, read))
 
     @property
     def state(self) -> str:
@@ -82,7 +96,7 @@ class Lifecycle:
         self._machine.destroy_when_not_in_use()
 
     def _trigger(self, trigger: Callable[[Any, bool], None], transition: Any) -> None:
-        start = State(**_state(self._machine.current_state))
+        start = _state(*self._machine.current_state)
         possible = self._machine.available_transitions
         trigger(transition, False)  # raises RCLError for one that is not possible
         number, label = next(each[:2] for each in possible if transition in each[:2])
@@ -91,11 +105,9 @@ class Lifecycle:
                 timestamp=self._node.get_clock().now().nanoseconds,
                 transition=Transition(id=number, label=label),
                 start_state=start,
-                goal_state=State(**_state(self._machine.current_state)),
+                goal_state=_state(*self._machine.current_state),
             )
         )
-
-    # Requests; on the executor's threads
 
     async def _on_change(
         self, request: ChangeState.Request, response: ChangeState.Response
@@ -107,41 +119,21 @@ class Lifecycle:
         )
         return response
 
-    def _on_state(self, _: Any, response: GetState.Response) -> GetState.Response:
-        response.current_state = State(**_state(self._machine.current_state))
-        return response
 
-    def _on_states(
-        self, _: Any, response: GetAvailableStates.Response
-    ) -> GetAvailableStates.Response:
-        response.available_states = [
-            State(**_state(each)) for each in self._machine.available_states
-        ]
-        return response
-
-    def _on_transitions(
-        self, _: Any, response: GetAvailableTransitions.Response
-    ) -> GetAvailableTransitions.Response:
-        response.available_transitions = _described(self._machine.available_transitions)
-        return response
-
-    def _on_graph(
-        self, _: Any, response: GetAvailableTransitions.Response
-    ) -> GetAvailableTransitions.Response:
-        response.available_transitions = _described(self._machine.transition_graph)
-        return response
+def _answer(field: str, read: Callable[[], Any], _request: Any, response: Any) -> Any:
+    setattr(response, field, read())
+    return response
 
 
-def _state(pair: tuple[int, str]) -> dict[str, Any]:
-    return {"id": pair[0], "label": pair[1]}
+def _state(number: int, label: str) -> State:
+    return State(id=number, label=label)
 
 
-def _described(transitions: Iterable[tuple[Any, ...]]) -> list[TransitionDescription]:
-    return [
-        TransitionDescription(
-            transition=Transition(id=each[0], label=each[1]),
-            start_state=State(**_state((each[2], each[3]))),
-            goal_state=State(**_state((each[4], each[5]))),
-        )
-        for each in transitions
-    ]
+def _described(
+    number: int, label: str, start: int, start_label: str, goal: int, goal_label: str
+) -> TransitionDescription:
+    return TransitionDescription(
+        transition=Transition(id=number, label=label),
+        start_state=_state(start, start_label),
+        goal_state=_state(goal, goal_label),
+    )
