@@ -95,13 +95,11 @@ class TestRun:
         assert ticks
         assert tree.visitors == []
 
-    def test_after_a_timeout_it_may_run_again(self, journal: Journal, name: str, node: Any) -> None:
-        leaf = MoveRobot("m", 0.8, action_name=name)
-        with TreeRunner(leaf, node=node) as runner:
-            with pytest.raises(TimeoutError):
-                runner.run(timeout=0.3)
-            assert runner.run(timeout=9.0) is Status.SUCCESS
-        assert journal.ends() == ["canceled", "succeeded"]
+    def test_the_timeout_drains_and_raises(self, journal: Journal, name: str, node: Any) -> None:
+        with TreeRunner(MoveRobot("m", 9.0, action_name=name), node=node) as runner:
+            with pytest.raises(TimeoutError, match="m did not finish within 3 s"):
+                runner.run(timeout=3.0)
+            assert journal.ends() == ["canceled"]
 
     def test_a_second_run_at_a_time_is_refused(self, node: Any) -> None:
         gate = Gate()
