@@ -8,9 +8,8 @@ thread, no wait, no ROS: a thread steps it, or a test in virtual time.
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from py_trees.behaviour import Behaviour
@@ -78,19 +77,17 @@ class TickLoop:
         self._observers: list[Observer] = []
         self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.mind())
         self.watchdog = Watchdog(self._traffic, self.goals)
-        self._visitor = ChangeVisitor(self._set_up_rest, self._after_each)
+        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each)
         self._set_up = SetUp()
         self._doing = "setup"
         self._stop_wanted = self.abandoned = self._pause_wanted = self._paused = False
-        self._leaving: BaseException | None = None
-        """What an observer, or a terminate(), raised to end the program: after the drain."""
-        self._has_begun = False
         self._timeout: float | None = None
         self._deadline = math.inf
         self._now = 0.0
         self._burst = 0
         self._status = Status.INVALID
         self._error: BaseException | None = None
+        """What is raised after the drain; also what an observer raised to end the program."""
         self._drain: Drain | None = None
         self._traffic.observe(self.goals.note)
 
@@ -113,16 +110,16 @@ class TickLoop:
         self._wake()
 
     def is_to_end(self, now: float) -> bool:
-        """Whether the run was interrupted, or is out of time."""
-        return self._stop_wanted or now >= self._deadline
+        """Whether the run was interrupted, has failed, or is out of time."""
+        return self._stop_wanted or self._error is not None or now >= self._deadline
 
     # A run
 
     def begin(self, now: float, timeout: float | None = None) -> None:
         """Begin a run on this thread, which is to end within `timeout` seconds."""
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
-        self._leaving = self._error = self._drain = None
-        self._has_begun, self._status, self._burst = False, Status.INVALID, 0
+        self._error = self._drain = None
+        self._status, self._burst = Status.INVALID, 0
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)
 
@@ -140,8 +137,8 @@ class TickLoop:
                     return Sleep(seconds)
             except BaseException as error:  # noqa: BLE001 - raised again after the drain
                 self.fail(error)
-            self._stop()
-        return self._wind_up()
+            self._drain = self._stop()
+        return self._wind_up(self._drain)
 
     def fail(self, error: BaseException) -> None:
         """Have the next step end the run, which raises `error` after the drain.
@@ -162,36 +159,33 @@ class TickLoop:
         """Tick if that is wanted; return the seconds until the next look, None at the end."""
         if self._error is not None:
             return None
-        if not self._has_begun:
-            self._has_begun = True
+        if self._visitor not in self.tree.visitors:
             self._visitor.forget()
             self.tree.visitors.append(self._visitor)
-            self._guarded(self._set_up_all)
+            self._guarded(self._set_up_missing)
             self._ready()
             self._emit(TreeStarted(self._now))
         self._check()
         if self.is_to_end(self._now):
             return None
         self.goals.tell(self._now)
-        changed = False
-        if not self._held():
-            changed = self._tick()
-            if self.watchdog.gave_up:
-                return None
-            if self.tree.root.status in (Status.SUCCESS, Status.FAILURE):
-                self._status = self.tree.root.status
-                return None
-        self._burst = self._burst + 1 if changed else 0
-        if 0 < self._burst < BURST:
-            return 0.0
-        self._burst = 0
-        dues = [] if self._paused else self._dues()
-        return min(self.heartbeat, LONGEST_WAIT, *dues, max(0.0, self._deadline - self._now))
+        wait = min(self.heartbeat, LONGEST_WAIT, max(0.0, self._deadline - self._now))
+        if self._held():
+            return wait
+        self._burst = (self._burst + 1) % BURST if self._tick() else 0
+        if self.watchdog.gave_up:
+            return None
+        if self.tree.root.status in (Status.SUCCESS, Status.FAILURE):
+            self._status = self.tree.root.status
+            return None
+        return 0.0 if self._burst else min([wait, *self._dues()])
 
-    def _set_up_all(self) -> None:
+    def _set_up_missing(self) -> None:
         """Set up the tree, in the first run, or what is new in it."""
-        self._doing = "setup"
         tree = self.tree
+        if self._set_up.is_complete(tree.root):
+            return
+        self._doing = "setup"
         if type(tree).setup is not BehaviourTree.setup and not self._set_up.has_begun:
             tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
             for _ in self._set_up.missing(tree.root):
@@ -199,10 +193,6 @@ class TickLoop:
         for behaviour in self._set_up.missing(tree.root):
             behaviour.setup(node=self._node)
         self._doing = "tick"
-
-    def _set_up_rest(self) -> None:
-        if not self._set_up.is_complete(self.tree.root):
-            self._set_up_all()
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
@@ -223,15 +213,13 @@ class TickLoop:
             raise _Abandoned
         return self._misbehaved()
 
-    def _dues(self) -> list[float]:
+    def _dues(self) -> Iterator[float]:
         """The deadlines that running behaviours have of their own, as seconds from now."""
-        dues = []
         for node in self._visitor.running:
             due_in = getattr(node, "due_in", None)
             due = due_in() if callable(due_in) else None
             if isinstance(due, int | float):
-                dues.append(max(due, 0.001))
-        return dues
+                yield max(due, 0.001)
 
     def _held(self) -> bool:
         """Whether the tree is paused; carries a change of that over to goals not sent yet."""
@@ -253,13 +241,12 @@ class TickLoop:
 
     # Its end
 
-    def _stop(self) -> None:
+    def _stop(self) -> Drain:
         """Stop what still runs, and begin to drain."""
         if self._visitor in self.tree.visitors:
             self.tree.visitors.remove(self._visitor)
-        if self._paused:
-            self._traffic.resume(self.goals.not_over)
-            self._paused = False
+        self._pause_wanted = False
+        self._held()
         self.goals.tell(self._now)  # a goal may have begun in a tick that raised
         root = self.tree.root
         if any(node.status is Status.RUNNING for node in root.iterate()):  # not the root, then
@@ -270,10 +257,10 @@ class TickLoop:
                 self._leave_with(error)
                 self._let_go(culprit_of(error))
         self.watchdog.end()
-        self._drain = Drain(self._traffic.host, self.goals.not_over)
+        return Drain(self._traffic.host, self.goals.not_over)
 
     def _let_go(self, culprit: Behaviour | None) -> None:
-        """Stop what a terminate() that raised has kept from it, and interrupt every action."""
+        """Stop what a terminate() that raised has kept from it."""
         for node in self.tree.root.iterate():
             if node.status is Status.RUNNING:
                 try:
@@ -283,14 +270,11 @@ class TickLoop:
                     self._log.error(f"terminate of {node.name} raised: {raised(error)}")
                     self._leave_with(error)
                 node.status = Status.INVALID
-            if isinstance(node, ActionBehaviour):
-                ActionBehaviour.terminate(node, Status.INVALID)
 
-    def _wind_up(self) -> Sleep | Done[Status]:
+    def _wind_up(self, drain: Drain) -> Sleep | Done[Status]:
         """Drain the tree's goals, and tell."""
-        assert self._drain is not None
         self.goals.tell(self._now)
-        step = self._drain.step(self._now, hurry=self.abandoned)
+        step = drain.step(self._now, hurry=self.abandoned)
         self.goals.tell(self._now)
         if isinstance(step, Sleep):
             return step
@@ -306,7 +290,7 @@ class TickLoop:
 
     def raise_what_ended_it(self) -> None:
         """Raise what has ended the run, or is to end the program, if anything has; once."""
-        error, self._error, self._leaving = self._error or self._leaving, None, None
+        error, self._error = self._error, None
         try:
             if error is not None:
                 raise error
@@ -317,14 +301,12 @@ class TickLoop:
         """Shut the tree down, if it was set up here: else another one may run it."""
         if not self._set_up.has_begun:
             return
-        try:
-            self.tree.shutdown()
-        except Exception as error:  # noqa: BLE001 - the user's: any
-            self._log.error(f"shutdown of a behaviour raised: {raised(error)}")
-            for behaviour in self.tree.root.iterate():  # ours must let go all the same
-                if isinstance(behaviour, ActionBehaviour):
-                    with contextlib.suppress(Exception):
-                        behaviour.shutdown()
+        ours = [each for each in self.tree.root.iterate() if isinstance(each, ActionBehaviour)]
+        for shutdown in self.tree.shutdown, *(each.shutdown for each in ours):
+            try:  # ours must let go though another one raises
+                shutdown()
+            except Exception as error:  # noqa: BLE001 - the user's: any
+                self._log.error(f"shutdown of a behaviour raised: {raised(error)}")
 
     def close(self, now: float) -> None:
         """Listen to goals no more, and tell what has only now become known of them."""
@@ -350,5 +332,5 @@ class TickLoop:
     def _leave_with(self, error: BaseException) -> None:
         """End the run, and then raise what is meant to end the program, as SystemExit is."""
         if not isinstance(error, Exception):
-            self._leaving, self._stop_wanted = error, True
+            self._error = self._error or error
             self._wake()

@@ -198,9 +198,6 @@ class TreeRunner:
         """With a node of the user's, its context's signal handling is the user's as well."""
         if not self._spinner.owns_node:
             return contextlib.nullcontext()
-        return self._ended_by_signals()
-
-    def _ended_by_signals(self) -> contextlib.AbstractContextManager[None]:
         return wiring.ended_by_signals(self._signalled)
 
     def _signalled(self, again: bool, ends_process: bool) -> bool:
@@ -314,7 +311,7 @@ class TreeRunner:
         return self._spinner.spins and self._spinner.is_here()
 
     def _at_exit(self) -> None:
-        with contextlib.suppress(KeyboardInterrupt), self._ended_by_signals():
+        with contextlib.suppress(KeyboardInterrupt), wiring.ended_by_signals(self._signalled):
             self._shut_down(PATIENCE_AT_EXIT)
 
     def _shut_down(self, patience: float) -> None:

@@ -51,8 +51,7 @@ class Watchdog:
 
     def gives_up(self) -> bool:
         """Whether nobody waits for the rest of this thread's tick any more."""
-        endless = self._ends_at == math.inf  # as it mostly is, and a clock takes time
-        if not endless and self.is_overdue(self._host.steady()) and not self._goals.wanted:
+        if self.is_overdue(self._host.steady()) and not self._goals.wanted:
             self._give_up()  # else it is for `attend`, which bears with stalls
         return self.gave_up
 
