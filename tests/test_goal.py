@@ -250,18 +250,17 @@ def test_what_was_replaced_and_is_at_two_servers_ends_as_canceled() -> None:
     life.ended(Outcome.CANCELED, End.ABORTED)
 
 
-def test_a_twin_is_canceled_and_holds_nothing() -> None:
+def test_what_turns_up_again_is_canceled_and_holds_nothing() -> None:
     """A goal that has ended, and that a second server runs."""
-    life = executing()
-    life.on(Event.RESULT, SUCCEEDED)
-    duplicate = life.goal.duplicate(life.now)
-    assert (duplicate.id, duplicate.outcome) == (life.goal.id, Outcome.SERVER_AMBIGUOUS)
-    assert not duplicate.holding
-    assert list(duplicate.on(Event.SERVER_RETURNED, life.now)) == [CANCEL, ASK]
-    assert duplicate.end is End.UNKNOWN
-    assert duplicate.blocks(waiting().goal, same_server=True)
-    assert list(duplicate.on(Event.RESULT, life.now, CANCELED)) == []
-    assert (duplicate.state, duplicate.end) == (State.DONE, End.CANCELED)
+    life = Life()
+    life.goal.turns_up_again()
+    assert life.goal.outcome is Outcome.SERVER_AMBIGUOUS
+    assert not life.goal.holding
+    assert life.on(Event.SERVER_RETURNED) == [CANCEL, ASK]
+    assert life.goal.end is End.UNKNOWN
+    assert life.goal.blocks(waiting().goal, same_server=True)
+    assert life.on(Event.RESULT, CANCELED) == []
+    assert (life.goal.state, life.goal.end) == (State.DONE, End.CANCELED)
 
 
 @pytest.mark.parametrize("how", ["at once", "in time"])

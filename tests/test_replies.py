@@ -274,16 +274,6 @@ def test_who_gives_feedback_lives_whoever_denies_the_goal(
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_CHANGED]
 
 
-def test_what_ended_at_one_may_run_at_the_other_that_has_gone(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    assert not said.may_run_at(watch)
-    said.answered(watch, 0.1, [True, True])
-    assert not said.may_run_at(watch), "both are there, and both have to tell"
-    watch.observe(1.0, True, frozenset({ONE}))
-    assert said.may_run_at(watch) == {OTHER}
-
-
 def test_all_three_in_sight_have_to_tell(said: replies.Replies, watch: ServerWatch) -> None:
     watch.observe(0.0, True, BOTH | {b"third"})
     said.sent(watch)
@@ -489,14 +479,6 @@ def test_a_request_went_to_all_that_were_shown_before_and_after(watch: ServerWat
     watch.observe(0.1, True, frozenset({ONE}))
     said.sent(watch)
     assert said.sent_to == BOTH
-
-
-def test_a_ghost_that_leaves_runs_nothing(said: replies.Replies, watch: ServerWatch) -> None:
-    now = alone(watch)
-    said.looked(watch, now)
-    watch.observe(now, True, frozenset({ONE}))
-    said.looked(watch, now)
-    assert not said.may_run_at(watch)
 
 
 def test_who_refused_does_not_matter_where_the_other_has_accepted(

@@ -159,18 +159,12 @@ class Goal(Facts):
         """What its server has said of the request to cancel it, to follow a reason; or ""."""
         return cancel_said(self)
 
-    def duplicate(self, now: Now) -> Goal:
-        """Return the same goal, which has ended here, as a second server runs it.
+    def turns_up_again(self) -> None:
+        """Let a new one stand for a goal of this id that has ended, and that a second server runs.
 
         It counts as lost, and is canceled at SERVER_RETURNED.
         """
-        duplicate = Goal(
-            self.id, self.server, self.timeouts, now, resources=self.resources, busy=self.busy
-        )
-        duplicate.deadlines.clear()
-        duplicate.holding, duplicate.end = False, End.SERVER_GONE
-        duplicate.state, duplicate.before = State.LOST, State.CANCELING
-        duplicate.settle(
-            Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended"
-        )
-        return duplicate
+        self.deadlines.clear()
+        self.holding, self.end = False, End.SERVER_GONE
+        self.state, self.before = State.LOST, State.CANCELING
+        self.settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")

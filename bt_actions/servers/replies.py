@@ -4,8 +4,7 @@ One server's word does not speak for another's: where a second one opened, or wo
 request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
 other may run. So while more than one of the servers that the request went to may live, an ending
 is believed when all in sight have answered a question, or when it has turned out that one is left,
-beside ghosts. A goal that has ended, and turns up at another server, is a duplicate
-(duplicates.py).
+beside ghosts.
 
 Told of answers and of looks at the server, it returns what the goal is to be told. What follows
 from that is the goal's (goals/goal.py); who lives is known to the watch (presence.py). No ROS, no
@@ -58,23 +57,10 @@ class Replies:
         self._in_sight: frozenset[GID] = frozenset()  # just now
         self._crowd: frozenset[GID] = frozenset()  # the same, where it is not known who lives
         self._one_left = self._one_came = False  # since the last look
-        self._told_of_two = False
+        self._told_of_two = self._runs_anew = False
         self._just_sent = False
-        self._ends_told: tuple[End, ...] = ()
         self._fresh_since = NEVER
         """What was asked before may have been answered by who is gone, or did not have it yet."""
-
-    @property
-    def servers(self) -> frozenset[GID]:
-        """All that may have told how the goal ended."""
-        return self.sent_to
-
-    @property
-    def ends_told(self) -> tuple[End, ...]:
-        """Return the ends that were told, one for each server that did."""
-        if self._ends_told or self._goal.end not in ENDS.values():
-            return self._ends_told
-        return (self._goal.end,)
 
     def sent(self, watch: ServerWatch) -> None:
         """Take note of who is shown when the request goes out; the next look completes that."""
@@ -90,18 +76,17 @@ class Replies:
         self._one_left = self._one_came = False
         self._crowd = self._in_sight = frozenset()
 
-    def may_run_at(self, watch: ServerWatch) -> frozenset[GID]:
-        """Return who may run it though it has ended here: who took it, perhaps, and has gone."""
-        all_told = len(self.ends_told) >= len(self.servers)
-        doubtful = len(self.servers) > 1 and self._fresh_since > NEVER
-        return self.servers - watch.gids if doubtful and not all_told else frozenset()
+    def taken_by_two(self, servers: frozenset[GID], now: float) -> None:
+        """It has ended at one of these, which tells that again, and another one runs it."""
+        self.sent_to, self._fresh_since = servers, now
+        self._told_of_two = self._runs_anew = True
 
     # Told by the servers
 
     def answered(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
         """Take an answer to the goal request: accepted or not."""
         self._note_changes(watch, now)
-        if sum(answers) > 1 and len(self.servers | watch.gids) == 1:
+        if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:
             return []  # by one, twice
         accepted = sum(answers)
         self._accepted_by = max(self._accepted_by, accepted)
@@ -158,14 +143,15 @@ class Replies:
             return [(Event.STATUS, runs[-1][0])]
         ended = [answer for answer in answers if answer[0] in ENDS]
         if ended:
-            done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), ended[-1])
+            done = ended[-1]
+            if not self._runs_anew:  # else this is most likely whoever ran it, too
+                done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), done)
             if len(self.sent_to) > 1:
                 if asked < self._fresh_since:
                     return []
                 if len(answers) < _answers_wanted(watch) and self._may_be_at_two(watch):
                     self._ended = done
                     return []
-            self._ends_told = tuple(ENDS[each[0]] for each in ended)
             if len(ended) > 1 and self._accepted_by < 2 and not self._told_of_two:  # both ran it
                 watch.two_answered()
                 return [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, done)]
@@ -246,8 +232,8 @@ class Replies:
     def _note_changes(self, watch: ServerWatch, now: float) -> None:
         """Who has left may have answered what was asked before; who is back was not asked."""
         crowd = watch.gids if _is_crowded(watch) else frozenset[GID]()
-        left, came = self._crowd - watch.gids, (watch.gids - self._in_sight) & self.servers
-        if left or (came and len(self.servers) > 1):
+        left, came = self._crowd - watch.gids, (watch.gids - self._in_sight) & self.sent_to
+        if left or (came and len(self.sent_to) > 1):
             self._fresh_since = now
             self._one_left |= bool(left)
             self._one_came |= bool(came)

@@ -48,6 +48,7 @@ class Before(NamedTuple):
     accepted: bool
     lost: bool
     answered: bool
+    done: bool
 
     @classmethod
     def of(cls, handle: GoalHandle) -> Before:
@@ -55,7 +56,8 @@ class Before(NamedTuple):
         goal = handle.goal
         in_the_way = goal.in_flight, goal.unanswered, goal.outstanding, goal.lost, goal.holding
         shown = goal.state.shown, goal.outcome, goal.end
-        return cls(shown, in_the_way, goal.accepted, goal.lost, _is_answered(handle))
+        done = goal.state is State.DONE
+        return cls(shown, in_the_way, goal.accepted, goal.lost, _is_answered(handle), done)
 
 
 def what_follows(
@@ -72,7 +74,7 @@ def what_follows(
         yield Do.STRIKE
     elif not now.answered and now.lost != before.lost and goal.state is not State.DONE:
         yield Do.RECORD
-    if goal.state is State.DONE:
+    if goal.state is State.DONE and not before.done:
         yield Do.RETIRE
     newly = now.accepted and not before.accepted and goal.state is State.EXECUTING
     if newly and goal.busy is Busy.REPLACE:

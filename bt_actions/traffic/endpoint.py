@@ -170,7 +170,7 @@ class ActionEndpoint:
             self.watch.heard(self._host.steady())
             if not (denies and self.watch.changed(handle.replies.sent_to)):
                 self.heard_at = self._host.steady()
-            if len(handle.replies.servers) > 1:
+            if len(handle.replies.sent_to) > 1:
                 self.see()
         return handle
 
@@ -321,7 +321,7 @@ class ActionEndpoint:
     def retire(self, handle: GoalHandle) -> None:
         """See to this goal no more, and attend only to what is left."""
         goal = handle.goal
-        if self.goals.get(goal.id) is handle:  # and not its duplicate
+        if self.goals.get(goal.id) is handle:  # and not what has turned up again
             del self.goals[goal.id]
             self.transport.forget(goal.id)
             if goal.end is End.UNKNOWN:

@@ -107,6 +107,7 @@ class CrowdPlay(Play):
         world, caller = self.world, self.caller
         self.say("the faults end;", "links heal" if heals else "what is cut off is gone")
         world.room = 10_000
+        hidden = {gid for gid, _ in world.overlooked}
         world.overlooked.clear()
         for server in world.servers:
             server.mood = Mood.OBEYS
@@ -114,8 +115,9 @@ class CrowdPlay(Play):
                 world.heal(server)
             elif server.cut or not server.alive:
                 server.alive = server.cut = server.shown = False
+        world.publish_status(hidden)
         world.wait(0.1)
-        for _ in range(80):
+        for _ in range(100):
             for leaf in caller.leaves:
                 caller.interrupt(leaf)
             if self._loses or world.was_full:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.goals.facts import PATIENCE
-from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
 from tests.machine.parts import Before, GoalHandle, Leaf, Ledger
@@ -317,24 +316,13 @@ class Judge:
             handle.ledger.crowded = True
 
     def is_done(self, handle: GoalHandle) -> None:
-        """A goal is DONE, and its line has put it away; not what a line is told that is gone."""
-        if self.caller.closed or len(handle.ledger.heard) < 2:
+        """A goal is DONE, and its endpoint has retired it."""
+        world, several = self.caller.world, self._may_be_several(handle)
+        if self.caller.closed or len(handle.ledger.heard) < 2 or not several:
             return
-        world = self.caller.world
         known = [job for job in handle.ledger.jobs if job.server.gid in handle.ledger.heard]
         runs = any(job.live and world.in_sight(job.server, handle.node) for job in known)
-        rule = "an end is known when it has ended everywhere, or a twin is kept in mind"
-        minded = self._is_minded(handle) or not self._may_be_several(handle)
-        self._hold(not runs or minded, rule)
-
-    def twin_is_done(self, duplicate: Goal) -> None:
-        """What a second server took has ended there."""
-        handle = self.caller.seen[duplicate.id]
-        ends = [ENDS[job.status] for job in handle.ledger.jobs if job.status in ENDS]
-        if handle.goal.end in ends:
-            ends.remove(handle.goal.end)
-        true = duplicate.end in ends or duplicate.end not in ENDS.values()
-        self._hold(true, f"the end of a twin is none that was told before: {duplicate!r}, {ends}")
+        self._hold(not runs, "an end is known when it has ended at all in sight that took it")
 
     def hears_acceptance(self, handle: GoalHandle, server: ModelServer) -> None:
         """A server's acceptance has been taken in, the first or one more."""

@@ -215,12 +215,8 @@ class Witness(Trace):
             self._caller.judge.after(known, self._before, shown, detail, commands)
 
     def retired(self, handle: traffic.GoalHandle) -> None:
-        if handle.goal.state is not State.DONE:
-            return
         known = self._caller.known(handle.goal)
-        if known is None:
-            self._caller.judge.twin_is_done(handle.goal)
-        else:
+        if known is not None and handle.goal.state is State.DONE:
             self._caller.judge.is_done(known)
 
 

@@ -23,7 +23,6 @@ from bt_actions.goals.steps.step import Does, Step, drop
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import UNANSWERED, Command, Event, State
 from bt_actions.servers import replies
-from bt_actions.servers.duplicates import DuplicateReplies
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import admission, handover
 from bt_actions.traffic.admission import Admission
@@ -372,13 +371,7 @@ def test_the_generator_finds_a_machine_that(wrong: str, monkeypatch: pytest.Monk
 OF_CROWDS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
     "believes two of three": (replies, "_answers_wanted", lambda watch: 2),
     "waits for who is not there": (replies, "_answers_wanted", lambda watch: 3),
-    "takes what was told before for news": (DuplicateReplies, "_news", lambda self, ended: ended),
     "takes any answer for all": (replies.Replies, "_may_be_at_two", lambda self, watch: False),
-    "is alone with whom it does not know": (
-        DuplicateReplies,
-        "_is_alone",
-        lambda self, watch: True,
-    ),
     "hears the first of two acceptances": (Past, "accepted", lambda self, *answer: None),
     "forgets what has ended": (Past, "keep", lambda self, handle: None),
 }

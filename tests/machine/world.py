@@ -7,7 +7,7 @@ no thread, no randomness: a move is offered by `World.options` and made by `Worl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol
@@ -156,7 +156,7 @@ class World:
             "lapse": (self._lapsable, lambda server: setattr(server, "shown", False)),
             "falter": (self._alive, self._falter),
             "overlook": (self._overlookable, self.overlooked.add),
-            "notice": (lambda: sorted(self.overlooked), self.overlooked.discard),
+            "notice": (lambda: sorted(self.overlooked), self._notice),
             "heal": (lambda: [s for s in self.servers if s.cut and s.alive], self.heal),
             "wait": (lambda: (0.05, 0.3, 0.3, 0.9, 0.9, None, 3.1), self.wait),
             "calm": (lambda: (None,), lambda _: self.calm()),
@@ -313,11 +313,20 @@ class World:
     def _finishable(self) -> Options:
         return [(job, status) for job in self.jobs if job.live for status in TERMINAL]
 
-    def publish_status(self) -> None:
-        """Publish the status of every goal once more, as servers do at each change of any."""
+    def publish_status(self, servers: Collection[bytes] | None = None) -> None:
+        """Publish the status of every goal, or those of some servers, once more.
+
+        As servers do at each change of any, and the middleware for whoever discovers them later.
+        """
         for job in self.jobs:
+            if servers is not None and job.server.gid not in servers:
+                continue
             if job.server.alive and job.status != UNANSWERED and job.goal_id in job.server.jobs:
                 self._tell(job, "status", job.status)
+
+    def _notice(self, which: tuple[bytes, int]) -> None:
+        self.overlooked.discard(which)
+        self.publish_status(which[:1])
 
     def finish(self, job: Job, status: int) -> None:
         """Bring a goal to its end; CANCELED without being asked is what an operator does."""
@@ -402,3 +411,4 @@ class World:
         if any(s.alive and s is not server and s.action == server.action for s in self.servers):
             self.client.crowded(server.action, but_lost=True)
         server.cut, server.shown = False, True
+        self.publish_status([server.gid])

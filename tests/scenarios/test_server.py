@@ -924,7 +924,7 @@ class TestTwice:
             runner.start()
             until(lambda: state(leaf) == "EXECUTING", 20.0)
             with process.lock:
-                traffic_of(node)._endpoints[name].client.server_is_ready = lambda: False
+                traffic_of(node)._endpoints[name].transport.ready = lambda: False
             assert holds_for(lambda: leaf.outcome is None, 2 * NOT_READY_FOR)
             assert journal.events() == ["received", "accepted"]
         assert stood(leaf) == (Outcome.CANCELED, End.CANCELED)
