@@ -326,7 +326,7 @@ def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
 
     said: list[str] = []
 
-    def interrupted(handles: Any, hurry: Any) -> None:
+    def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
     host.open(name, "1:reject_cancel")
