@@ -25,14 +25,12 @@ class Unanswered:
     def read(self, domain: int) -> Iterator[Sent]:
         """Read the records of those that have died since; return goals that are elsewhere's."""
         troubles: list[OSError] = []
-        for path, goals in left_behind(troubles.append, self._read):
-            if not troubles:
-                self._read.add(path)  # else it may be the one: again
-            for sent in goals:
-                if sent.domain == domain and sent.author.here:
-                    self._sent[sent.goal_id] = sent
-                elif sent.domain == domain:
-                    yield sent
+        for sent in left_behind(troubles.append, self._read):
+            self._read.add(sent.path)
+            if sent.domain == domain and sent.author.here:
+                self._sent[sent.goal_id] = sent
+            elif sent.domain == domain:
+                yield sent
         self.trouble = troubles[0] if troubles else None
 
     def new(

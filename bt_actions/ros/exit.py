@@ -38,8 +38,6 @@ def close_process() -> None:
             for handle in left:
                 if not handle.is_over:
                     log.error(f"{handle.goal!r}: the process ends and cannot account for it")
-            with host.lock:
-                host.record.close()
             log.flush()
 
 

@@ -55,9 +55,6 @@ class Record(Protocol):
     def strike(self, goal_id: bytes) -> None:
         """Take a goal off the record, if it is there."""
 
-    def close(self) -> None:
-        """Remove the record, where nothing is on it; the next goal opens another."""
-
 
 class Changed(Protocol):
     """A condition of the lock (threading.Condition)."""

@@ -270,4 +270,3 @@ class Traffic:
                     endpoint.tell(handle, Event.PROCESS_EXITING)
                 endpoint.transport.close()
             self._endpoints.clear()
-            self.host.record.close()

@@ -49,8 +49,6 @@ class Recorder:
     def strike(self, goal_id: bytes) -> None:
         self.open.pop(goal_id, None)
 
-    def close(self) -> None: ...
-
 
 @pytest.fixture
 def ledger(monkeypatch: pytest.MonkeyPatch) -> Recorder:

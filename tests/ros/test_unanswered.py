@@ -248,7 +248,7 @@ def test_records_that_cannot_be_read_are_told(
 def record(*servers: bytes) -> Sent:
     """What is on record of a goal that was sent to these."""
     author = Author(here=True, pid=2**22 + 1, started=b"ab")
-    return Sent(b"goal", "/move", 0, frozenset(servers), 0.0, False, 0.0, author, Path("x"), 0)
+    return Sent(b"goal", "/move", 0, frozenset(servers), 0.0, False, author, Path("x"))
 
 
 @pytest.fixture

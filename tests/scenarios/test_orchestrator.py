@@ -198,7 +198,7 @@ def test_a_second_sigint_where_nothing_is_at_a_server_changes_nothing(
     assert run.wait() == 130, run
     assert "not accounted for" not in str(run)
     assert not any("Traceback" in line for line in run.errors), run
-    assert [path for path in ledger.glob("*") if path.read_bytes().strip()] == []
+    assert list(ledger.glob("*")) == []
     assert ([] if journal is None else journal.ends()) == ENDS[phase]
     record.outcome = "exit code 130, nothing is left"
 
@@ -534,8 +534,8 @@ def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
         journal.wait_for("accepted", times=3)
         run.send(signal.SIGKILL)
         run.wait()
-        [path] = [path for path in ledger.iterdir() if f"{run.pid:08x}" in path.name]
-        assert path.read_bytes().strip() == b"", "it has been answered, and its server shows it"
+        of_run = [path for path in ledger.iterdir() if f"{run.pid:08x}" in path.name]
+        assert of_run == [], "it has been answered, and its server shows it"
         assert holds_for(lambda: journal.ends() == [None] * 3, 0.5)
         assert journal.count("cancel_requested") == 0, "a killed client can cancel nothing"
         received = {e.goal for e in journal.entries() if e.event == "received"}
