@@ -600,21 +600,10 @@ class TestWhoSpins:
             until(lambda: state(leaf) == "EXECUTING")
             executor.create_task(lambda: (held.set(), free.wait(20.0)))
             held.wait(5.0)
-            where = rf"has been in <lambda> \({__file__}:\d+\) for 1 s"
-            with pytest.raises(RuntimeError, match=where):
+            with pytest.raises(RuntimeError, match="have not returned for 1 s"):
                 runner.wait(15.0)
             assert journal.ends() == ["canceled"]
             free.set()
-
-    def test_an_executor_that_is_spun_may_be_too_busy_to_answer(
-        self, node: Any, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(spinning, "PATIENCE", 0.05)
-        monkeypatch.setattr(spinning, "PATIENCE_SPUN", 0.1)
-        with spun(node) as executor, TreeRunner(Gate(), node=node) as runner:
-            monkeypatch.setattr(executor, "create_task", lambda callback: None)
-            with pytest.raises(TimeoutError):
-                runner.run(timeout=0.8)
 
     @pytest.mark.parametrize("whose", ["the executor's", "rclpy's"])
     def test_a_loop_that_spins_once_now_and_then_spins(

@@ -71,8 +71,7 @@ class Spinner:
         self._context: Context | None = None
         self._stopping = False
         self._alive = threading.Event()
-        self._asked_at = self._seen_at = 0.0
-        self._seen_in: set[Task] = set()
+        self._asked_at = 0.0
         self._own_node = node is None
         if executor not in (None, "multi", "single") and not isinstance(executor, Executor):
             raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {executor!r}")
@@ -125,16 +124,14 @@ class Spinner:
                 self._thread.start()
             return
         self._ask_for_life()
-        while not self._alive.wait(0.05) and _callbacks_in(self.executor) is None:
-            if give_up():
-                return
+        while not self._alive.wait(0.05) and not give_up():
             self._check()
 
     def check(self) -> None:
         """Make sure now and then that whoever spins our node still does.
 
-        Raises RuntimeError when nobody has for 5 s, the executor stands in callbacks that do not
-        return, or the node was taken out of it. Out of one that is spun here: calls `died`.
+        Raises RuntimeError when nobody has for 5 s, as where the executor is in callbacks that do
+        not return, or the node was taken out of it. Out of one that is spun here: calls `died`.
         """
         if not self.spins:
             self._check()
@@ -161,7 +158,7 @@ class Spinner:
         """
         frames = list(_frames(sys._getframe()))  # noqa: SLF001 - documented
         return any(_spins(self.executor, each) for each in frames) or (
-            self.spins and any(_task(self.executor, each) for each in frames)
+            self.spins and any(_calls(self.executor, each) for each in frames)
         )
 
     def _check(self) -> None:
@@ -171,28 +168,17 @@ class Spinner:
         if self._alive.is_set() and not left:
             if now - self._asked_at >= PATIENCE:
                 self._ask_for_life()
-            return
-        callbacks = None if left else _callbacks_in(self.executor)
-        if callbacks is not None and (not callbacks or callbacks.keys() != self._seen_in):
-            self._seen_at, self._seen_in = now, set(callbacks)
-        elif now - self._seen_at >= PATIENCE_SPUN and (left or not self._alive.wait(PATIENCE)):
+        elif now - self._asked_at >= PATIENCE_SPUN and (left or not self._alive.wait(PATIENCE)):
             # that wait: where this whole process stood still, they need a moment, too
-            raise self._unspun(callbacks or {})
-
-    def _unspun(self, callbacks: dict[Task, str]) -> RuntimeError:
-        why = "nobody spins; spin it on another thread while the tree runs"
-        if callbacks:
-            why = (
-                f"has been in {' and '.join(callbacks.values())} for {PATIENCE_SPUN:g} s, and "
-                "hears nothing of goals meanwhile; let callbacks return"
+            raise RuntimeError(
+                f"node {self.node.get_fully_qualified_name()} is in an executor that nobody spins, "
+                f"or that is in callbacks which have not returned for {PATIENCE_SPUN:g} s; spin it "
+                "on another thread while the tree runs, or leave the executor out"
             )
-        name = self.node.get_fully_qualified_name()
-        return RuntimeError(f"node {name} is in an executor that {why}, or leave the executor out")
 
     def _ask_for_life(self) -> None:
         self._alive = threading.Event()
-        self._asked_at = self._seen_at = time.monotonic()
-        self._seen_in = set()
+        self._asked_at = time.monotonic()
         with contextlib.suppress(AttributeError):  # of the guard of an executor that is shut down
             self.executor.create_task(self._alive.set)
             self.executor.wake()
@@ -304,27 +290,8 @@ def _spins(executor: Executor, frame: FrameType) -> bool:
     return "spin" in frame.f_code.co_name and frame.f_locals.get("self") is executor
 
 
-def _task(executor: Executor, frame: FrameType) -> Task | None:
-    """Return what the executor does in a frame, where that is where it calls a callback."""
+def _calls(executor: Executor, frame: FrameType) -> bool:
+    """Whether it is in a frame that the executor calls a callback."""
     if frame.f_code is not Task.__call__.__code__:
-        return None
-    task: Task = frame.f_locals["self"]
-    return task if task._executor() is executor else None  # noqa: SLF001
-
-
-def _callbacks_in(executor: Executor) -> dict[Task, str] | None:
-    """Return which callbacks the executor is in, with their places; None where nobody spins it.
-
-    However busy it or the machine is: nothing has to be answered for that.
-    """
-    is_spun, callbacks = False, dict[Task, str]()
-    for top in sys._current_frames().values():  # noqa: SLF001 - documented
-        outermost = top
-        for frame in _frames(top):
-            is_spun = is_spun or _spins(executor, frame)
-            if task := _task(executor, frame):
-                code = outermost.f_code
-                callbacks[task] = f"{code.co_name} ({code.co_filename}:{outermost.f_lineno})"
-            if not frame.f_globals.get("__name__", "").startswith("rclpy."):
-                outermost = frame
-    return callbacks if is_spun else None
+        return False
+    return frame.f_locals["self"]._executor() is executor  # noqa: SLF001
