@@ -25,8 +25,6 @@ from bt_actions.utilities.places import path_of
 DONE = "DONE"
 UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
 """States of a goal before its request goes out."""
-STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
-"""Outcomes that say how the goal ended on its server."""
 REMEMBERED = 64
 """Goals of a leaf that are known again when their last news come late."""
 
@@ -125,26 +123,6 @@ class Row:
             self.outcome = Outcome.CANCELED
             self.duration = self.counted + max(0.0, now - self.begun)
         self.end = End.UNKNOWN
-
-    @property
-    def verdict(self) -> str:
-        """The outcome for the table: where the goal stands while there is none.
-
-        The end is told where the goal may still be running, or run again, and where the robot did
-        what nobody waited for.
-        """
-        if self.outcome is None:
-            return self.state
-        surprise = self.outcome not in STOOD and self.end in (End.SUCCEEDED, End.ABORTED)
-        gone = self.end is End.SERVER_GONE and self.outcome is not Outcome.SERVER_LOST
-        told = f", end {self.end}" if surprise or gone or self.end is End.UNKNOWN else ""
-        late = self.outcome is Outcome.SUCCEEDED and self.reason.startswith("late:")
-        return f"{self.outcome}{told}{', late' if late else ''}"
-
-    @property
-    def tries(self) -> str:
-        """The attempts for the table, with the visits where there were several."""
-        return f"{self.attempts}" if self.visits <= 1 else f"{self.attempts} in {self.visits}"
 
     def _begin(self, event: GoalChanged) -> None:
         self._recent.append(event.goal_id)

@@ -16,7 +16,7 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Inverter
 
 from bt_actions.cli.exits import Exit
-from bt_actions.cli.views.table import summary, table
+from bt_actions.cli.views.table import summary, table, verdict
 from bt_actions.cli.views.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import PLACE
@@ -87,8 +87,8 @@ def test_a_success_that_warns_is_told_at_the_end(leaf: FakeAction, story: Story)
 def test_a_success_after_its_deadline_is_told_as_late(leaf: FakeAction, story: Story) -> None:
     ended = {"outcome": Outcome.SUCCEEDED, "end": End.SUCCEEDED}
     late = story.goal(leaf, "DONE", **ended, reason="late: not finished within 1 s")
-    assert row_of(leaf, late).verdict == "SUCCEEDED, late"
-    assert row_of(leaf, story.goal(leaf, "DONE", **ended)).verdict == "SUCCEEDED"
+    assert verdict(row_of(leaf, late)) == "SUCCEEDED, late"
+    assert verdict(row_of(leaf, story.goal(leaf, "DONE", **ended))) == "SUCCEEDED"
 
 
 def test_attempts_are_counted_over_the_retries_of_a_visit(leaf: FakeAction, story: Story) -> None:
@@ -133,18 +133,18 @@ def test_a_leaf_that_is_visited_again_adds_to_its_row(leaf: FakeAction, story: S
 def test_an_end_that_nobody_waited_for_is_told(leaf: FakeAction, story: Story) -> None:
     canceled = {"outcome": Outcome.CANCELED, "end": End.SUCCEEDED}
     row = row_of(leaf, story.goal(leaf, "EXECUTING"), story.goal(leaf, "DONE", **canceled))
-    assert row.verdict == "CANCELED, end SUCCEEDED"
+    assert verdict(row) == "CANCELED, end SUCCEEDED"
 
 
 @pytest.mark.parametrize(
-    ("outcome", "verdict"),
+    ("outcome", "told"),
     [(Outcome.CANCELED, "CANCELED, end SERVER_GONE"), (Outcome.SERVER_LOST, "SERVER_LOST")],
 )
 def test_a_goal_that_may_run_on_where_its_server_went_is_no_canceled_one(
-    leaf: FakeAction, story: Story, outcome: Outcome, verdict: str
+    leaf: FakeAction, story: Story, outcome: Outcome, told: str
 ) -> None:
     gone = story.goal(leaf, "CANCELING", outcome=outcome, end=End.SERVER_GONE)
-    assert row_of(leaf, story.goal(leaf, "EXECUTING"), gone).verdict == verdict
+    assert verdict(row_of(leaf, story.goal(leaf, "EXECUTING"), gone)) == told
 
 
 def test_a_goal_that_was_not_sent_is_not_live(leaf: FakeAction, story: Story) -> None:

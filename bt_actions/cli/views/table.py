@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
-from bt_actions.running.report import Report
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
+
+STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
+"""Outcomes that say how the goal ended on its server."""
 
 
 def table(report: Report, width: int | None = None) -> list[str]:
     """Return the table of actions as lines; names are cut so that lines fit into `width`."""
     body = [
-        (row.name, row.server, row.tries, row.verdict, f"{report.seconds(row):.2f} s")
+        (row.name, row.server, _tries(row), verdict(row), f"{report.seconds(row):.2f} s")
         for row in report.rows
     ]
     return columns(body, width) if body else []
+
+
+def _tries(row: Row) -> str:
+    return f"{row.attempts}" if row.visits <= 1 else f"{row.attempts} in {row.visits}"
+
+
+def verdict(row: Row) -> str:
+    """Return the outcome for the table: where the goal stands while there is none.
+
+    The end is told where the goal may still be running, or run again, and where the robot did what
+    nobody waited for.
+    """
+    if row.outcome is None:
+        return row.state
+    surprise = row.outcome not in STOOD and row.end in (End.SUCCEEDED, End.ABORTED)
+    gone = row.end is End.SERVER_GONE and row.outcome is not Outcome.SERVER_LOST
+    told = f", end {row.end}" if surprise or gone or row.end is End.UNKNOWN else ""
+    late = row.outcome is Outcome.SUCCEEDED and row.reason.startswith("late:")
+    return f"{row.outcome}{told}{', late' if late else ''}"
 
 
 def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
