@@ -45,7 +45,7 @@ lint: dev ## ruff: rules and formatting; bandit: security
 
 chaos: dev ## every scenario with killed processes and cut networks, and storms; writes docs/reliability.md
 	$(BIN)/python -m pytest tests/scenarios -m "" --reliability docs/reliability.md
-	$(BIN)/python -m pytest tests/serving -m chaos
+	$(BIN)/python -m pytest tests --ignore tests/scenarios -m chaos
 
 soak: dev ## 20,000 goals with every fault; an hour or two
 	$(BIN)/python scripts/soak.py

@@ -293,9 +293,9 @@ def no_leaks(domain: int) -> Iterator[None]:
         raise AssertionError(f"these threads are left: {threads() - before}") from None
 
 
-@pytest.fixture(params=["multi", "single"])
+@pytest.fixture(params=["multi", pytest.param("single", marks=pytest.mark.chaos)])
 def executor(request: pytest.FixtureRequest) -> str:
-    """Both executors."""
+    """Both executors; the second in `make chaos` only."""
     return str(request.param)
 
 

@@ -1,6 +1,6 @@
 """Our leaves in a user's node, executor and loop, which end in every way there is.
 
-The programs are those of tests/support/foreign.py, each a process of its own, all started at once.
+The programs are those of tests/support/foreign.py, each a process of its own.
 Whatever they do, the server's journal shows that the goal was canceled, and only once executed.
 """
 
@@ -65,7 +65,16 @@ END_BY_A_SIGNAL = [
 ]
 RUNNERS = {"wait_for_a_runner": "TERM", "run_and_clean_up": "INT"}
 """And the signal for each; they have a context of their own, without rclpy's signal handlers."""
-TO_SUCCEED = ["tick_in_a_timer_until_done"]
+ALWAYS = {
+    "never_shut_down",
+    "just_end",
+    "crash_in_a_timer",
+    "crash_beside_a_runner",
+    ("loop_until_a_signal", "INT"),
+    ("spin_until_a_signal_and_clean_up", "TERM"),
+    ("run_and_clean_up", "INT"),
+}
+"""One of a kind that runs in every `make test`."""
 CRASHED = {-signal.SIGSEGV, -signal.SIGABRT, -signal.SIGBUS}
 
 
@@ -75,39 +84,30 @@ class Program:
     journal: Journal
 
 
-@pytest.fixture(scope="module")
-def programs(session_host: Host) -> Iterator[dict[str, Program]]:
-    """All programs, started at once: they spend their time with starting."""
-    names = [*END_BY_THEMSELVES, *TO_SUCCEED, "just_end_soon"]
-    names += [f"{each} {number}" for each in END_BY_A_SIGNAL for number in ("INT", "TERM")]
-    names += [f"{each} {number}" for each, number in RUNNERS.items()]
-    started: dict[str, Program] = {}
+@pytest.fixture
+def program(session_host: Host, record: Record) -> Iterator[Callable[..., Program]]:
+    """Start one of the programs, of which the report then tells."""
     with contextlib.ExitStack() as stack:
-        for number, name in enumerate(names):
-            action = f"/f{os.getpid()}_{number}/move"
+
+        def start(name: str, number: str = "") -> Program:
+            action = f"/f{os.getpid()}_{name}_{number}/move"
             faults = ["1:reject_cancel"] if name == "just_end_soon" else []
-            pace = (
-                0.25 if name in TO_SUCCEED else 2.0
-            )  # the others stand about until their test comes
-            journal = session_host.open(action, *faults, step_period=pace)
-            process = Process(["-m", "tests.support.foreign", name.split()[0], action])
+            journal = session_host.open(action, *faults, step_period=0.25)
+            process = Process(["-m", "tests.support.foreign", name, action])
             stack.callback(process.close)
             stack.callback(session_host.close_server, action)
-            started[name] = Program(process, journal)
-        yield started
+            record.did = first_paragraph(PROGRAMS[name].__doc__)
+            record.did += f"; SIG{number}" if number else ""
+            record.journals.append(journal)
+            return Program(process, journal)
+
+        yield start
 
 
-@pytest.fixture
-def program(programs: dict[str, Program], record: Record) -> Callable[..., Program]:
-    """Take one of the programs, of which the report then tells."""
-
-    def take(name: str, number: str = "") -> Program:
-        program = programs[f"{name} {number}".strip()]
-        record.did = first_paragraph(PROGRAMS[name].__doc__) + (f"; SIG{number}" if number else "")
-        record.journals.append(program.journal)
-        return program
-
-    return take
+def case(*values: str) -> Any:
+    """The values of a test's parameters, of which most are for `make chaos` only."""
+    often = (values if len(values) > 1 else values[0]) in ALWAYS
+    return pytest.param(*values, marks=() if often else pytest.mark.chaos)
 
 
 def ended(code: int) -> str:
@@ -115,7 +115,7 @@ def ended(code: int) -> str:
     return f"exit code {code}" if code >= 0 else f"ended by {signal.Signals(-code).name}"
 
 
-@pytest.mark.parametrize("name", END_BY_THEMSELVES)
+@pytest.mark.parametrize("name", [case(name) for name in END_BY_THEMSELVES])
 def test_a_program_that_ends_leaves_no_goal(
     program: Callable[..., Program], name: str, record: Record
 ) -> None:
@@ -132,8 +132,9 @@ def test_a_program_that_ends_leaves_no_goal(
     record.outcome = f"canceled; {ended(code)}"
 
 
-@pytest.mark.parametrize("number", ["INT", "TERM"])
-@pytest.mark.parametrize("name", END_BY_A_SIGNAL)
+@pytest.mark.parametrize(
+    ("name", "number"), [case(name, to) for name in END_BY_A_SIGNAL for to in ("INT", "TERM")]
+)
 def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
     program: Callable[..., Program], name: str, number: str, record: Record
 ) -> None:
@@ -150,7 +151,7 @@ def test_a_program_that_rclpys_signal_handlers_end_leaves_no_goal(
     record.outcome = f"canceled; {ended(code)}"
 
 
-@pytest.mark.parametrize(("name", "number"), RUNNERS.items())
+@pytest.mark.parametrize(("name", "number"), [case(*each) for each in RUNNERS.items()])
 def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
     program: Callable[..., Program], name: str, number: str, record: Record
 ) -> None:
@@ -166,7 +167,7 @@ def test_a_runner_in_a_program_that_is_interrupted_leaves_no_goal(
 
 
 def test_a_program_may_just_succeed(program: Callable[..., Program], record: Record) -> None:
-    taken = program(TO_SUCCEED[0])
+    taken = program("tick_in_a_timer_until_done")
     assert taken.process.line("end") == "end SUCCEEDED SUCCEEDED"
     assert taken.process.wait() == 0, taken.process
     assert taken.journal.events() == ["received", "accepted", "succeeded"]
@@ -229,7 +230,13 @@ def test_setup_again_after_shutdown_is_fine(
     assert [record.attempt for record in leaf.history] == [1]
 
 
-@pytest.mark.parametrize("accept", [5.0, 0.5], ids=["in time", "as a suspect"])
+@pytest.mark.parametrize(
+    "accept",
+    [
+        pytest.param(5.0, id="in time", marks=pytest.mark.chaos),
+        pytest.param(0.5, id="as a suspect"),
+    ],
+)
 def test_a_goal_left_behind_by_a_visit_before_is_drained_too(
     host: Host, name: str, node: Any, spin: Any, accept: float
 ) -> None:
@@ -251,7 +258,13 @@ def test_a_goal_left_behind_by_a_visit_before_is_drained_too(
     host.close_server(name)
 
 
-@pytest.mark.parametrize("queued", [False, True], ids=["afterwards", "in the queue"])
+@pytest.mark.parametrize(
+    "queued",
+    [
+        pytest.param(False, id="afterwards", marks=pytest.mark.chaos),
+        pytest.param(True, id="in the queue"),
+    ],
+)
 def test_what_a_runner_leaves_is_waited_for_by_another(
     host: Host, name: str, domain: int, queued: bool, record: Record
 ) -> None:
@@ -318,6 +331,7 @@ def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
     record.outcome = "CANCELED by the parent; its child knows no goal and gets the lock"
 
 
+@pytest.mark.chaos
 def test_an_interrupt_of_the_last_drain_still_says_which_goal_is_left(
     host: Host, name: str, node: Any, spin: Any, monkeypatch: pytest.MonkeyPatch, record: Record
 ) -> None:

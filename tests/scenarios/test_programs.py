@@ -188,7 +188,7 @@ AT_EXIT = """
         (IN_RUN, [signal.SIGTERM], "0.5"),
         (IN_RUN, [signal.SIGTERM, signal.SIGTERM], "60.0"),
         pytest.param(IN_RUN, [signal.SIGINT, signal.SIGTERM], "60.0", marks=pytest.mark.chaos),
-        (IN_SHUTDOWN, [signal.SIGTERM], "3.0"),
+        pytest.param(IN_SHUTDOWN, [signal.SIGTERM], "3.0", marks=pytest.mark.chaos),
         pytest.param(
             IN_SHUTDOWN, [signal.SIGTERM, signal.SIGTERM], "60.0", marks=pytest.mark.chaos
         ),
@@ -383,7 +383,7 @@ A_PUBLISHER_BETWEEN_TWO_GOALS = """
         ("stock", A_PUBLISHER_IN_MID_GOAL),
         pytest.param("short", A_PUBLISHER_IN_MID_GOAL, marks=pytest.mark.chaos),
         pytest.param("stock", A_PUBLISHER_WHILE_A_GOAL_IS_MADE, marks=pytest.mark.chaos),
-        ("short", A_PUBLISHER_BETWEEN_TWO_GOALS),
+        pytest.param("short", A_PUBLISHER_BETWEEN_TWO_GOALS, marks=pytest.mark.chaos),
         pytest.param("stock", A_PUBLISHER_BETWEEN_TWO_GOALS, marks=pytest.mark.chaos),
     ],
     ids=["stock", "short", "while-a-goal-is-made", "between-two-goals", "between-stock"],
@@ -422,6 +422,7 @@ LOOKS_OUT = """
 """
 
 
+@pytest.mark.chaos
 def test_who_stands_still_itself_looks_out_for_a_server_that_went_away_all_the_same(
     new_host: HostFactory, name: str, program: Start, record: Record
 ) -> None:
@@ -470,6 +471,7 @@ AFTER_ANOTHER = """
 """
 
 
+@pytest.mark.chaos
 def test_so_does_the_first_goal_of_a_node_that_is_alone_in_its_context(
     new_host: HostFactory, name: str, program: Start, record: Record
 ) -> None:
@@ -482,7 +484,7 @@ def test_so_does_the_first_goal_of_a_node_that_is_alone_in_its_context(
     record.outcome = "SERVER_AMBIGUOUS, and nothing is sent"
 
 
-@pytest.mark.parametrize("server", [0.7, 5.0])
+@pytest.mark.parametrize("server", [0.7, pytest.param(5.0, marks=pytest.mark.chaos)])
 def test_no_deadline_counts_the_second_that_a_process_waits(
     new_host: HostFactory, name: str, program: Start, server: float, record: Record
 ) -> None:
@@ -495,7 +497,7 @@ def test_no_deadline_counts_the_second_that_a_process_waits(
     record.outcome = "SUCCEEDED"
 
 
-@pytest.mark.parametrize("servers", [1, 2])
+@pytest.mark.parametrize("servers", [pytest.param(1, marks=pytest.mark.chaos), 2])
 def test_the_first_goal_of_a_process_waits_until_it_has_seen_who_is_there(
     new_host: HostFactory, name: str, program: Start, servers: int, record: Record
 ) -> None:

@@ -233,6 +233,7 @@ def lose(host: Host, leaf: MoveRobot, runner: TreeRunner) -> None:
 
 
 class TestStopped:
+    @pytest.mark.chaos
     def test_stopped_for_less_than_the_feedback_deadline(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
@@ -318,7 +319,14 @@ class TestStopped:
         assert journal.max_live == 1
         record.outcome = "SERVER_LOST; back: canceled first, then the next goal SUCCEEDED"
 
-    @pytest.mark.parametrize("ends", ["by-itself", "interrupted", "interrupted-late"])
+    @pytest.mark.parametrize(
+        "ends",
+        [
+            "by-itself",
+            pytest.param("interrupted", marks=pytest.mark.chaos),
+            pytest.param("interrupted-late", marks=pytest.mark.chaos),
+        ],
+    )
     def test_stopped_for_a_little_longer_than_its_lease_when_nobody_wants_more(
         self, new_host: HostFactory, name: str, node: Any, ends: str, record: Record
     ) -> None:
@@ -344,6 +352,7 @@ class TestStopped:
             assert runner.unaccounted == []
         record.outcome = "SERVER_GONE; back: canceled before the run is over, end CANCELED"
 
+    @pytest.mark.chaos
     def test_stopped_while_it_decides_on_a_goal_that_it_denied(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
@@ -449,6 +458,7 @@ class TestStopped:
         assert canceled.t <= received.t
         record.outcome = "UNKNOWN; canceled before the goal on the other server is sent"
 
+    @pytest.mark.chaos
     def test_left_behind_where_the_next_node_has_not_discovered_its_server_yet(
         self, host: Host, name: str, record: Record, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -472,6 +482,7 @@ class TestStopped:
         assert canceled.t <= received.t
         record.outcome = "UNKNOWN; canceled before the goal on the other server is sent"
 
+    @pytest.mark.chaos
     def test_left_behind_on_a_server_that_is_stopped_for_less_than_its_lease(
         self, new_host: HostFactory, host: Host, name: str, record: Record
     ) -> None:
@@ -494,6 +505,7 @@ class TestStopped:
         assert ended.t <= received.t
         record.outcome = "UNKNOWN; the other server is sent to when the goal has ended"
 
+    @pytest.mark.chaos
     def test_left_behind_on_a_server_that_is_killed_is_waited_for_once(
         self,
         new_host: HostFactory,
@@ -561,6 +573,7 @@ class TestStopped:
         assert ended.t <= received.t
         record.outcome = "SERVER_LOST; canceled before the goal on the other server is sent"
 
+    @pytest.mark.chaos
     def test_a_node_that_is_destroyed_gives_up_the_resource_of_a_server_that_dies(
         self,
         new_host: HostFactory,
@@ -605,6 +618,7 @@ class TestStopped:
         assert journal.ends() == ["succeeded"]
         record.outcome = "the other server of the arm is used as soon as nobody has it"
 
+    @pytest.mark.chaos
     def test_a_node_that_is_destroyed_does_not_wait_for_what_the_successor_denies(
         self,
         new_host: HostFactory,
@@ -824,6 +838,7 @@ class TestRestarted:
 
 
 class TestLate:
+    @pytest.mark.chaos
     def test_a_server_that_appears_3_s_late(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
@@ -881,9 +896,10 @@ class TestTwice:
             assert of_process(journal, each.pid) == CANCELED
         record.outcome = "SERVER_AMBIGUOUS, canceled at both"
 
+    @pytest.mark.chaos
     @pytest.mark.parametrize(
         "answer",
-        ["heard", pytest.param("lost", marks=pytest.mark.chaos), "lost, and no feedback"],
+        ["heard", "lost", "lost, and no feedback"],
     )
     def test_a_second_server_that_wakes_up_when_the_goal_has_ended(
         self, new_host: HostFactory, name: str, node: Any, answer: str, record: Record
@@ -913,6 +929,7 @@ class TestTwice:
         assert stood(more) == (Outcome.SERVER_AMBIGUOUS, End.NEVER_STARTED)
         record.outcome = "SUCCEEDED; what the second server took is canceled"
 
+    @pytest.mark.chaos
     def test_a_second_server_that_is_seen_in_part_leaves_the_firsts_goal_alone(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
@@ -931,6 +948,7 @@ class TestTwice:
         assert of_process(journal, one.pid) == CANCELED
         record.outcome = "runs on; CANCELED when it is not wanted any more"
 
+    @pytest.mark.chaos
     def test_a_busy_server_that_was_heard_beside_the_second_is_not_taken_for_dead(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
@@ -948,6 +966,7 @@ class TestTwice:
         assert of_process(journal, other.pid) == []
         record.outcome = "runs on; SUCCEEDED"
 
+    @pytest.mark.chaos
     def test_what_a_second_server_denies_the_first_may_still_start(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
@@ -972,7 +991,9 @@ class TestTwice:
         assert of_process(journal, other.pid) == []
         record.outcome = "ACCEPT_TIMEOUT, not tried again; canceled when it is accepted"
 
-    @pytest.mark.parametrize("loop", ["our runner", "a foreign loop"])
+    @pytest.mark.parametrize(
+        "loop", ["our runner", pytest.param("a foreign loop", marks=pytest.mark.chaos)]
+    )
     def test_shutdown_waits_for_what_the_second_server_took(
         self, new_host: HostFactory, name: str, node: Any, loop: str, record: Record
     ) -> None:
@@ -1021,6 +1042,7 @@ class TestTwice:
         assert [report.name for report in runner.unaccounted] == ["m"]
         record.outcome = "told as unaccounted for, also by the leaf, after shutdown"
 
+    @pytest.mark.chaos
     def test_a_goal_that_turns_up_when_its_leaf_is_gone_is_reported_by_name(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:

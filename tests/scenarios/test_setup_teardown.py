@@ -29,7 +29,9 @@ did not answer for two seconds."""
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("cycles", [20, pytest.param(200, marks=pytest.mark.chaos)])
-@pytest.mark.parametrize("how", ["own", "user", "interrupted"])
+@pytest.mark.parametrize(
+    "how", [pytest.param("own", marks=pytest.mark.chaos), "user", "interrupted"]
+)
 def test_cycles_in_one_process_leave_nothing(
     how: str, cycles: int, launch: Launch, record: Record
 ) -> None:

@@ -45,11 +45,12 @@ def canceled_at_once(journal: Journal) -> None:
     assert canceled - accepted < 2.0
 
 
+@pytest.mark.chaos
 @pytest.mark.parametrize(
     "how",
     [
         pytest.param(signal.SIGKILL, id="SIGKILL"),
-        pytest.param(signal.SIGINT, id="SIGINT twice", marks=pytest.mark.chaos),
+        pytest.param(signal.SIGINT, id="SIGINT twice"),
     ],
 )
 def test_cleanup_awaits_what_its_server_has_not_accepted_yet(
@@ -85,6 +86,7 @@ def test_cleanup_first_awaits_it_before_the_tree_starts(
     record.outcome = "the old goal CANCELED, then the new one SUCCEEDED; exit code 0"
 
 
+@pytest.mark.chaos
 def test_cleanup_that_is_stopped_leaves_the_record_to_the_next(
     launch: Launch, serve: Serve, tree: Tree, name: str, record: Record
 ) -> None:
@@ -115,6 +117,7 @@ def test_cleanup_gives_up_a_goal_that_its_server_denies_for_good(
     record.outcome = "exit code 0 after 30 s"
 
 
+@pytest.mark.chaos
 def test_a_server_that_was_restarted_has_nothing_to_await(
     launch: Launch, new_host: HostFactory, tree: Tree, name: str, ledger: Path, record: Record
 ) -> None:
