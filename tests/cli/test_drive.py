@@ -45,6 +45,7 @@ class Run:
         with Signals() as signals:
             drive = Drive(
                 self.runner,
+                self.runner.tick_to_end,
                 self.report,
                 LineView(self.report, self.out),
                 signals,

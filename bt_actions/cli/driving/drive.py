@@ -61,11 +61,8 @@ class Runner(Protocol):
     def observe(self, callback: Callable[[Event], None]) -> object:
         """Call `callback` with each event, on the ticking thread."""
 
-    def tick_to_end(self) -> object:
-        """Run the tree to its end, drain its goals, and close what belongs to it."""
-
     def interrupt(self, *, abandon: bool = False) -> None:
-        """Make `tick_to_end` drain and return; with `abandon`, drain no longer."""
+        """Make the run drain and return; with `abandon`, drain no longer."""
 
     def catch_up(self) -> None:
         """Tell what became of goals while a behaviour does not return from its tick."""
@@ -101,6 +98,7 @@ class Drive:
     def __init__(
         self,
         runner: Runner,
+        tick_to_end: Callable[[], object],
         report: Report,
         view: View,
         signals: Signals,
@@ -109,8 +107,10 @@ class Drive:
         clock: Callable[[], float] = time.monotonic,
         output: PatientOutput | None = None,
     ) -> None:
-        """`output` is what the view writes to, where that is written later."""
+        """`tick_to_end` runs the tree to its end, drains its goals, and closes what belongs to it;
+        `output` is what the view writes to, where that is written later."""
         self._runner = runner
+        self._tick_to_end = tick_to_end
         self._output = output
         self._report = report
         self._view = view
@@ -171,7 +171,7 @@ class Drive:
 
     def _tree(self) -> None:
         try:
-            self._runner.tick_to_end()
+            self._tick_to_end()
         except BaseException as error:  # noqa: BLE001 - handed to the main thread
             self._error = error
         finally:

@@ -10,12 +10,11 @@ import contextlib
 import json
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
 from bt_actions.cli.driving.drive import Drive, Ended
 from bt_actions.cli.driving.presence import Presence
@@ -33,9 +32,7 @@ from bt_actions.cli.views.words import Closing
 from bt_actions.running.report import Report
 
 if TYPE_CHECKING:
-    from bt_actions.events import Event
     from bt_actions.ros.naming import Outlook
-    from bt_actions.running.goals import GoalReport
     from bt_actions.running.runner import TreeRunner
     from bt_actions.simulation.faults import Fault
     from bt_actions.simulation.world import Part
@@ -142,7 +139,13 @@ class Session:
                 self._output.catch_stderr()
             with Signals() as signals:
                 drive = Drive(
-                    self, self.report, view, signals, timeout=timeout, output=self._output
+                    self._runner,
+                    self._tick_to_end,
+                    self.report,
+                    view,
+                    signals,
+                    timeout=timeout,
+                    output=self._output,
                 )
                 ended = drive.run()
                 code = drive.finish(self._close(ended, part_at))
@@ -155,36 +158,17 @@ class Session:
                 view.close()
         return code
 
-    # What Drive needs of a runner
+    # Within
 
-    def observe(self, callback: Callable[[Event], None]) -> None:
-        """Pass the runner's events on."""
-        self._runner.observe(callback)
-
-    def interrupt(self, *, abandon: bool = False) -> None:
-        """Make the run drain and end; with `abandon`, drain no longer."""
-        self._runner.interrupt(abandon=abandon)
-
-    def catch_up(self) -> None:
-        """Tell what became of goals while a behaviour does not return from its tick."""
-        self._runner.catch_up()
-
-    @property
-    def unaccounted(self) -> list[GoalReport]:
-        """The goals whose end is not known."""
-        return self._runner.unaccounted
-
-    def tick_to_end(self) -> Status:
+    def _tick_to_end(self) -> None:
         """Run the tree, drain its goals, and close servers, node and context."""
         try:
-            return self._runner.run()
+            self._runner.run()
         except BaseException as error:
             self._error = error
             raise
         finally:
             self._runner.shutdown()
-
-    # Within
 
     def _close(self, ended: Ended, part_at: float | None) -> Closing:
         """Let the simulated world say what became of the part, and settle the exit code."""
