@@ -82,6 +82,7 @@ def test_each_namespace_has_a_world_of_its_own(bench: Bench, space: str) -> None
         simulation.world("/c")
 
 
+@pytest.mark.parametrize("executor", ["multi"])
 def test_fifty_robots_move_at_once_without_a_thread_each(ros_bench: RosBench, space: str) -> None:
     names = [f"{space}/r{number}" for number in range(50)]
     clients = [ros_bench.client(MoveRobot, f"{name}/move_robot") for name in names]
