@@ -26,6 +26,7 @@ from tests.support.middleware import on_loopback
 if TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour
     from tests.support.processes import Host, HostFactory, Journal, Process
+    from tests.support.virtual import World
 
 DOMAINS = range(70, 90)
 OUR_OWN = ("bt_actions-alarm", "bt_actions-log", "bt_actions-lookout")
@@ -243,6 +244,16 @@ def start_program(domain: int, no_leaks: None) -> Iterator[Callable[..., Process
     yield start
     for each in processes:
         each.close()
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    """A network of the test's own, in virtual time."""
+    from tests.support.virtual import World
+
+    world = World(tmp_path)
+    yield world
+    world.close()
 
 
 @pytest.fixture

@@ -181,7 +181,10 @@ class VirtualParticipant:
 
     def full_name(self, action: str) -> str:
         """Return the full name of an action."""
-        return action if action.startswith("/") else f"{self.namespace.rstrip('/')}/{action}"
+        if action.startswith("/"):
+            return action
+        own = f"{self.name}{action[1:]}" if action.startswith("~") else action
+        return f"{self.namespace.rstrip('/')}/{own}"
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> VirtualTransport:
         """Open a transport."""

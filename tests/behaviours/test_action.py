@@ -1,28 +1,32 @@
 """What a user of the leaf sees, beyond outcomes."""
 
-from collections.abc import Callable
-from typing import Any
+from __future__ import annotations
 
-import py_trees
+from typing import TYPE_CHECKING, Any
+
 import pytest
 from py_trees.common import Status
-from rclpy.executors import SingleThreadedExecutor
 
 from bt_actions import ActionBehaviour, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
-from bt_actions.wiring import backend_of
+from bt_actions.testing import VirtualBackend, VirtualNetwork
 from tests.support.trees import state, together
 from tests.support.waiting import until
 
+if TYPE_CHECKING:
+    from tests.support.virtual import World
 
-def test_an_unexpected_result_says_what_was_expected_and_what_came(
-    host: Any, name: str, run: Callable[..., Any]
-) -> None:
-    host.open(name)
-    leaf = run(MoveRobot("m", 0.1, action_name=name, expect="result.final_pose > 4.0"))
+
+@pytest.fixture
+def backend(world: World) -> VirtualBackend:
+    return VirtualBackend(world.network)
+
+
+def test_an_unexpected_result_says_what_was_expected_and_what_came(world: World) -> None:
+    world.serve()
+    leaf = world.run(MoveRobot("m", 0.1, expect="result.final_pose > 4.0"))
     assert leaf.outcome is Outcome.UNEXPECTED_RESULT
     assert leaf.reason.startswith("result.final_pose > 4.0 was expected, but the result is: ")
     assert "final_pose: 0.1" in leaf.reason
-    host.close_server(name)
 
 
 @pytest.mark.parametrize(
@@ -36,107 +40,87 @@ def test_an_unexpected_result_says_what_was_expected_and_what_came(
     ],
 )
 def test_what_does_not_fit_the_action_is_found_in_setup(
-    node: Any, name: str, settings: dict[str, Any], message: str
+    backend: VirtualBackend, settings: dict[str, Any], message: str
 ) -> None:
     """And not when a goal has moved the robot already."""
     wanted = {"goal": {"distance": 1.0}, **settings}
-    leaf = ActionBehaviour("m", "robot_control_interfaces/MoveRobot", name, **wanted)
+    leaf = ActionBehaviour("m", "robot_control_interfaces/MoveRobot", "move", **wanted)
     with pytest.raises(ValueError, match="m: ") as raised:
-        leaf.setup(node=node)
+        leaf.setup(node=backend)
     assert message in str(raised.value)
 
 
-def test_a_tick_before_setup_says_what_is_wrong(name: str) -> None:
+def test_a_tick_before_setup_says_what_is_wrong() -> None:
     with pytest.raises(RuntimeError, match="setup"):
-        MoveRobot("m", 1.0, action_name=name).tick_once()
+        MoveRobot("m", 1.0).tick_once()
 
 
-def test_setup_without_a_node_says_what_is_wrong(name: str) -> None:
+def test_setup_without_a_node_says_what_is_wrong() -> None:
     with pytest.raises(TypeError, match="node"):
-        MoveRobot("m", 1.0, action_name=name).setup()
+        MoveRobot("m", 1.0).setup()
 
 
-def test_constants_of_a_result_are_known(node: Any, name: str) -> None:
-    leaf = MoveRobot("m", 1.0, action_name=name, expect="result.status != result.STATUS_FAULT")
-    leaf.setup(node=node)
-    leaf.shutdown()
+def test_constants_of_a_result_are_known(backend: VirtualBackend) -> None:
+    MoveRobot("m", 1.0, expect="result.status != result.STATUS_FAULT").setup(node=backend)
 
 
-def test_the_first_leaf_that_is_shut_down_closes_for_the_whole_tree(
-    node: Any, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    by_leaves = list[Any]()
-
-    def drain(handles: list[Any], *hurry: Any) -> None:
-        if not hurry:  # else it is the run's
-            by_leaves.append(handles)
-
-    monkeypatch.setattr(backend_of(node).traffic, "drain", drain)
-    leaves = [MoveRobot(f"m{n}", 1.0, action_name=name) for n in range(20)]
-    root = py_trees.composites.Sequence("all", memory=True, children=list(leaves))
-    with TreeRunner(root, node=node) as runner:
-        runner.interrupt()
-        runner.run()
-    assert len(by_leaves) == 1
+def test_the_first_leaf_that_is_shut_down_closes_for_the_whole_tree(world: World) -> None:
+    world.serve("*:reject_cancel")
+    leaves = [
+        MoveRobot(f"m{n}", 60.0, busy="share", timeout=Timeouts(cancel=2.0)) for n in range(5)
+    ]
+    runner = world.runner(together(*leaves))
+    runner.start()
+    runner.until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
+    began = runner.now
+    leaves[0].shutdown()
+    assert runner.now - began == pytest.approx(2.1, abs=0.1), "all are waited for together"
+    for leaf in leaves:
+        leaf.shutdown()
+    assert runner.now - began == pytest.approx(2.1, abs=0.1)
 
 
-def test_a_tick_begins_one_more_attempt_at_most(node: Any, name: str) -> None:
-    first = MoveRobot("first", 1.0, action_name=name)
-    second = MoveRobot("second", 1.0, action_name=name, busy="fail", retry=1000)
+def test_a_tick_begins_one_more_attempt_at_most(backend: VirtualBackend) -> None:
+    first = MoveRobot("first", 1.0)
+    second = MoveRobot("second", 1.0, busy="fail", retry=1000)
     for leaf in (first, second):
-        leaf.setup(node=node)
+        leaf.setup(node=backend)
         leaf.tick_once()
         assert leaf.status is Status.RUNNING
     assert [each.outcome for each in second.history] == [Outcome.SERVER_BUSY] * 2
     second.tick_once()
     assert len(second.history) == 3
-    for leaf in (first, second):
-        leaf.shutdown()
 
 
 def test_a_visit_whose_first_tick_breaks_off_is_interrupted_by_the_next(
-    host: Any, node: Any, name: str, monkeypatch: pytest.MonkeyPatch
+    world: World, backend: VirtualBackend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ctrl-C in a notebook, which ticks on: no status is set yet, and nobody stops the leaf."""
-    journal = host.open(name)
-    leaf = MoveRobot("m", 3.0, action_name=name)
-    leaf.setup(node=node)
-    traffic = backend_of(node).traffic
-    until(lambda: leaf._endpoint is not None and leaf._endpoint.transport.ready())
-    advance = traffic.advance
+    journal = world.serve()
+    leaf = MoveRobot("m", 3.0)
+    leaf.setup(node=backend)
+    advance = backend.traffic.advance
 
     def interrupted(handle: Any, make: Any) -> None:
         advance(handle, make)
-        if handle.goal.sent:
-            raise KeyboardInterrupt
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(traffic, "advance", interrupted)
-
-    def first_ticks() -> None:
-        while True:
-            leaf.tick_once()
-            leaf.status = Status.INVALID
-
+    monkeypatch.setattr(backend.traffic, "advance", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        first_ticks()
+        leaf.tick_once()
     monkeypatch.undo()
     leaf.goal = {"distance": 0.1}
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
     while leaf.status is not Status.SUCCESS:
-        executor.spin_once()
         leaf.tick_once()
-    executor.remove_node(node)
+        world.network.timeline.advance(world.network.now() + 0.1)
     assert journal.ends() == ["canceled", "succeeded"]
     leaf.shutdown()
-    host.close_server(name)
 
 
-def test_a_name_of_the_nodes_own(node: Any) -> None:
+def test_a_name_of_the_nodes_own() -> None:
     leaf = MoveRobot("m", 1.0, action_name="~/dock")
-    leaf.setup(node=node)
-    assert leaf.server == f"{node.get_fully_qualified_name()}/dock"
-    leaf.shutdown()
+    leaf.setup(node=VirtualBackend(VirtualNetwork("r1")))
+    assert leaf.server == "/r1/tree/dock"
 
 
 def test_a_name_that_ros_refuses_is_refused_in_setup(node: Any) -> None:

@@ -18,7 +18,7 @@ from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Retry, Timeouts
 from bt_actions.behaviours.variables import read, write
 from bt_actions.events import GoalChanged
 from tests.support.trees import Gate, in_sequence, in_turn, together
-from tests.traffic.conftest import World
+from tests.support.virtual import World
 
 
 def stood(leaf: ActionBehaviour) -> tuple[Outcome | None, End | None]:

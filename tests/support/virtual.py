@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 from unittest.mock import Mock
 
-import pytest
 from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
@@ -94,11 +93,7 @@ class World:
         for goal_id in self.servers[name].live_goals:
             operator.cancel(bytes.fromhex(goal_id))
 
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    """One of its own for each test."""
-    world = World(tmp_path)
-    yield world
-    for server in world.servers.values():
-        server.close()
+    def close(self) -> None:
+        """Close the servers."""
+        for server in self.servers.values():
+            server.close()
