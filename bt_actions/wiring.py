@@ -23,9 +23,9 @@ def backend_of(node: Any) -> Backend:
     """Return what a node gives; what is a Backend itself is returned as it is."""
     if isinstance(node, Backend):
         return node
-    from bt_actions.ros.backend import RosBackend
+    from bt_actions.ros.node_participant import NodeParticipant
 
-    return RosBackend.of(node)
+    return NodeParticipant.of(node)
 
 
 def spinner(node: Any, executor: Any, **given: Any) -> Spinner:

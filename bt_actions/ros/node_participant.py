@@ -1,6 +1,6 @@
-"""A node as traffic/ sees it (transport.Participant), and the one Traffic of each node.
+"""A node as traffic/ sees it (transport.Participant), and as leaves do (backend.Backend).
 
-Names, clocks and the graph of rclpy; decides nothing about a goal.
+Names, clocks, topics, services and the graph of rclpy; decides nothing about a goal.
 """
 
 from __future__ import annotations
@@ -8,7 +8,9 @@ from __future__ import annotations
 import atexit
 import functools
 import os
+import random
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.expand_topic_name import expand_topic_name
@@ -25,6 +27,8 @@ from bt_actions.ros.host import host
 from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.log import log
 from bt_actions.ros.rediscovery import look_for
+from bt_actions.ros.service_client import ServiceClient
+from bt_actions.ros.topics import Publisher, Subscription
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import Listener, Seeker
 from bt_actions.utilities.suggest import did_you_mean, listing
@@ -53,12 +57,14 @@ _sights: weakref.WeakKeyDictionary[Any, _Sight] = weakref.WeakKeyDictionary()
 
 
 class NodeParticipant:
-    """What goals see and hear through one node."""
+    """What goals and leaves see and hear through one node; there is one of each node."""
+
+    randomness = random.Random()
 
     def __init__(self, node: Node) -> None:
         """The caller holds the lock."""
         self.node = node
-        self.clocks = Clocks(node)
+        self.clock = Clocks(node)
         self.domain: int = node.context.get_domain_id()
         self.name: str = node.get_name()
         self.namespace: str = node.get_namespace()
@@ -69,8 +75,6 @@ class NodeParticipant:
         sight.nodes.add(node)
         self.seen_since, self.long_stalls = sight.since, sight.long_stalls
         self.traffic = Traffic(host, self)
-        self.backend: Any = None
-        """What leaves have by this node, once one has asked (ros/backend.py)."""
         self._warned_of: set[str] = set()
 
     @classmethod
@@ -83,9 +87,36 @@ class NodeParticipant:
                 setattr(node, _ON_NODE, found)  # lives as long as the node does
             return found
 
+    # What leaves ask for
+
+    def service(self, service_type: type, name: str) -> ServiceClient:
+        """Become a client of a service."""
+        return ServiceClient(self.node, service_type, name, self.wake)
+
+    def subscription(
+        self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
+    ) -> Subscription:
+        """Listen to a topic."""
+        return Subscription(self.node, self.seen_since, message_type, topic, qos, take)
+
+    def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
+        """Become a publisher on a topic."""
+        return Publisher(self.node, self.seen_since, message_type, topic, qos)
+
+    def wake(self) -> None:
+        """Have whoever runs a tree on this node tick it soon; callable from any thread."""
+        with host.lock:
+            self.traffic.notify(None)
+
+    def log(self, level: str, text: str) -> None:
+        """Write a line to the node's log."""
+        log.by(self.node.get_logger(), level, text)
+
+    # What traffic asks for
+
     def now(self) -> Now:
         """Return this moment, by the steady clock and by the node's own."""
-        return self.clocks.now()
+        return self.clock.now()
 
     def alive(self) -> bool:
         """Whether the node is there, and its context was not shut down."""

@@ -1,7 +1,7 @@
 """What `setup(node=...)` resolves to: all that a leaf, or a run, asks of the world, as protocols.
 
-ros/backend.py keeps them over rclpy, for one node. One that stands for no node at all is given to
-`setup` in a node's place. Nothing is decided here, and nothing of ROS is imported.
+ros/node_participant.py keeps them over rclpy, for one node. One that stands for no node at all is
+given to `setup` in a node's place. Nothing is decided here, and nothing of ROS is imported.
 """
 
 from __future__ import annotations
