@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.traffic.backend import Backend
+from bt_actions.traffic.host import Record
 
 if TYPE_CHECKING:
     from bt_actions.ros.log import Log
@@ -23,9 +24,14 @@ def backend_of(node: Any) -> Backend:
     """Return what a node gives; what is a Backend itself is returned as it is."""
     if isinstance(node, Backend):
         return node
+    from bt_actions.recovery.ledger import Ledger
+    from bt_actions.ros.host import host
     from bt_actions.ros.node_participant import NodeParticipant
 
-    return NodeParticipant.of(node)
+    with host.lock:
+        if type(host.record) is Record:
+            host.record = Ledger(host.log.warning)
+        return NodeParticipant.of(node)
 
 
 def spinner(node: Any, executor: Any, **given: Any) -> Spinner:

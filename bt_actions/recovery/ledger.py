@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bt_actions.goals.ids import Author, author_of
+from bt_actions.traffic.host import Record
 
 DIRECTORY = "BT_ACTIONS_LEDGER"
 """The environment variable that names another directory: one that outlives a container, say."""
@@ -57,7 +58,7 @@ class Sent:
     path: Path
 
 
-class Ledger:
+class Ledger(Record):
     """The record of this process. Under its caller's lock; nothing here raises.
 
     `complain` is called once with why a goal is not on record, should that happen.

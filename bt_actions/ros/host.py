@@ -11,11 +11,10 @@ import time
 import uuid
 
 from bt_actions.goals.ids import new_goal_id
-from bt_actions.recovery.ledger import Ledger
 from bt_actions.ros.log import log
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.host import Trace
+from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduler
 from bt_actions.utilities.plain_text import raised
 
@@ -32,7 +31,8 @@ class RosHost:
         """Taken before a lock of rclpy's, or of a transport's, never after."""
         self.changed = threading.Condition(self.lock)
         self.log = log
-        self.record = Ledger(log.warning)
+        self.record = Record()
+        """Replaced in wiring.py by one that is kept."""
         self.stalls = Stalls(_idle)
         self.scheduler = Scheduler(
             self.steady,

@@ -7,14 +7,13 @@ come from a seed, and a mistake of ours is raised where it happens.
 from __future__ import annotations
 
 import random
-from collections.abc import Collection
 from contextlib import nullcontext
 
 from bt_actions.servers.stalls import Stalls
 from bt_actions.testing.network import Lines
 from bt_actions.testing.timeline import Alarm, Timeline
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.host import Trace
+from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Attended, Scheduler
 
 
@@ -25,7 +24,7 @@ class VirtualHost:
         self.lock = nullcontext()
         self.changed = _Changed(timeline)
         self.log = log
-        self.record = _NoRecord()
+        self.record = Record()
         self.stalls = Stalls()
         self.scheduler = Scheduler(self.steady, self.stalls, self._wake, self._failed)
         self.trace = Trace()
@@ -100,28 +99,3 @@ class _Changed:
 
     def notify_all(self) -> None:
         """Wake nobody: who waits looks again after each thing that happens."""
-
-
-class _NoRecord:
-    """A process that is played leaves nothing behind."""
-
-    def __contains__(self, goal_id: bytes) -> bool:
-        return False
-
-    def enter(
-        self,
-        goal_id: bytes,
-        action: str,
-        domain: int,
-        servers: Collection[bytes],
-        *,
-        accept: float | None = None,
-        lost: bool = False,
-    ) -> None:
-        """Take no note."""
-
-    def strike(self, goal_id: bytes) -> None:
-        """Have nothing to strike."""
-
-    def close(self) -> None:
-        """Have nothing to remove."""

@@ -34,11 +34,15 @@ class Log(Protocol):
         """Have what was said written, before more is told by other ways; waits a moment at most."""
 
 
-class Record(Protocol):
-    """What was sent and is not answered yet, on record should the process be killed."""
+class Record:
+    """What was sent and is not answered yet, should the process be killed; this one keeps nothing.
+
+    recovery/ledger.py has one that does.
+    """
 
     def __contains__(self, goal_id: bytes) -> bool:
         """Whether a goal is on record."""
+        return False
 
     def enter(
         self,
@@ -54,6 +58,9 @@ class Record(Protocol):
 
     def strike(self, goal_id: bytes) -> None:
         """Take a goal off the record, if it is there."""
+
+    def disown(self) -> None:
+        """Let go of it, as the child of a fork: it is the parent's."""
 
 
 class Changed(Protocol):

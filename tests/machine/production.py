@@ -22,7 +22,7 @@ from bt_actions.servers.stalls import IN_A_ROW, Stalls
 from bt_actions.traffic import handle as traffic
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.host import Trace
+from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduler
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import GOALS_KEPT, Listener
@@ -172,17 +172,6 @@ class ModelLog:
             self._caller.judge.found(text)
 
 
-class NoRecord:
-    """The record of what is sent, which nobody reads."""
-
-    def enter(self, *entry: Any, **more: Any) -> None: ...
-
-    strike = close = enter
-
-    def __contains__(self, goal_id: bytes) -> bool:
-        return False
-
-
 class Witness(Trace):
     """Has the judge see what goals are told, and what they say; not those of a duplicate."""
 
@@ -229,7 +218,7 @@ class ModelHost:
         self.caller = caller
         self.lock = contextlib.nullcontext()
         self.changed = self
-        self.log, self.record, self.trace = ModelLog(caller), NoRecord(), Witness(caller)
+        self.log, self.record, self.trace = ModelLog(caller), Record(), Witness(caller)
         self.stalls = Stalls()
         self.scheduler = Scheduler(self.steady, self.stalls, lambda: None, lambda *_: None)
         self._domain = Domain(DOMAIN)
