@@ -7,7 +7,6 @@ import json
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
@@ -125,11 +124,6 @@ def test_each_goal_runs_one_version_of_a_file_that_changes_all_the_time(
 # Cancels: of one that waits in a queue and of one that runs, see test_tree_server.py
 
 
-def told(client: TreeClient, sent: Any) -> tuple[int, int, bool]:
-    status, result = client.result(sent)
-    return status, result.error_code, result.settled
-
-
 def test_a_goal_can_be_canceled_as_soon_as_it_is_accepted(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:
@@ -138,7 +132,7 @@ def test_a_goal_can_be_canceled_as_soon_as_it_is_accepted(
     for _ in range(20):
         sent = client.send("move", LONG)
         assert client.cancel(sent) == 1
-        assert told(client, sent) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
+        assert client.told(sent) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
     assert None not in journal.ends()
 
 
@@ -172,7 +166,7 @@ def test_a_goal_can_be_canceled_while_its_server_is_about_to_begin_it(
     start_program("-c", SLOW, str(folder), space, short_lease=True).line("ready: ")
     sent = client.send("move", LONG)
     assert client.cancel(sent) == 1
-    assert told(client, sent) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
+    assert client.told(sent) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
     assert journal.count("received") == 0
     assert client.send("empty").accepted
 
@@ -186,8 +180,8 @@ def test_a_goal_that_waits_for_the_one_it_replaces_can_be_canceled(
     journal.wait_for("accepted")
     newer = client.send("move", LONG)
     assert client.cancel(newer) == 1
-    assert told(client, newer) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
-    assert told(client, older) == (GoalStatus.STATUS_ABORTED, R.REPLACED, True)
+    assert client.told(newer) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
+    assert client.told(older) == (GoalStatus.STATUS_ABORTED, R.REPLACED, True)
     assert journal.count("accepted") == 1
 
 
@@ -201,12 +195,12 @@ def test_a_cancel_of_a_goal_that_is_halted_already_changes_nothing(
     halt = ControlTree.Request.HALT
     assert client.call(ControlTree, goal_id=sent.handle.goal_id, command=halt).accepted
     assert client.cancel(sent) == 1
-    assert told(client, sent) == (GoalStatus.STATUS_ABORTED, R.HALTED, True)
+    assert client.told(sent) == (GoalStatus.STATUS_ABORTED, R.HALTED, True)
     assert journal.ends() == ["canceled"]
 
 
 def test_a_goal_that_has_ended_cannot_be_canceled(serve_trees: Serve, client: TreeClient) -> None:
     serve_trees()
     sent = client.send("empty")
-    assert told(client, sent) == (GoalStatus.STATUS_SUCCEEDED, R.NONE, True)
+    assert client.told(sent) == (GoalStatus.STATUS_SUCCEEDED, R.NONE, True)
     assert client.cancel(sent) == 0

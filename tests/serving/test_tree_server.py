@@ -167,10 +167,7 @@ def test_replace_begins_the_newer_tree_when_all_goals_of_the_older_have_ended(
     older = client.send("move", LONG)
     journal.wait_for("accepted")
     newer = client.send("move", "{distance: 0.2}")
-    status, result = client.result(older)
-    assert (status, result.error_code, result.settled) == (
-        GoalStatus.STATUS_ABORTED, R.REPLACED, True,
-    )  # fmt: skip
+    assert client.told(older) == (GoalStatus.STATUS_ABORTED, R.REPLACED, True)
     assert client.result(newer)[0] == GoalStatus.STATUS_SUCCEEDED
     assert journal.max_live == 1
 

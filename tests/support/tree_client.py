@@ -80,6 +80,11 @@ class TreeClient:
         answer = sent.result_future.result()
         return answer.status, answer.result
 
+    def told(self, sent: Sent) -> tuple[int, int, bool]:
+        """Status, error code, and whether it is settled, of a goal that ends."""
+        status, result = self.result(sent)
+        return status, result.error_code, result.settled
+
     def cancel(self, sent: Sent) -> int:
         """Ask to cancel a goal; how many are being canceled."""
         future = sent.handle.cancel_goal_async()
