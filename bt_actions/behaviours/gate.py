@@ -15,22 +15,35 @@ class Gate(Decorator):
     """Like py_trees' Decorator, with a question asked first.
 
     A subclass says in `gate` what to do: None ticks the child, RUNNING waits without ticking it,
-    SUCCESS and FAILURE end the node. `update` then reads the child's status as usual.
+    SUCCESS and FAILURE end the node. `update` then reads the child's status as usual. Where `begin`
+    raises ValueError, the visit fails with its text.
     """
 
     refused = False
     """Whether it failed by itself: its child did not, or was not ticked this time, or `update` says
     so."""
 
+    _wrong = ""
+
+    def begin(self) -> None:
+        """Begin a visit; may raise ValueError."""
+
+    def initialise(self) -> None:
+        self.feedback_message = self._wrong = ""
+        try:
+            self.begin()
+        except ValueError as error:
+            self.feedback_message = self._wrong = str(error)
+
     def gate(self) -> Status | None:
-        """What to do this time; called after `initialise`."""
+        """What to do this time; called after `begin`."""
         return None
 
     def tick(self) -> Iterator[Behaviour]:
         if self.status is not Status.RUNNING:
             self.initialise()
         self.refused = False
-        decided, child_failed = self.gate(), False
+        decided, child_failed = Status.FAILURE if self._wrong else self.gate(), False
         if decided is None:
             yield from self.decorated.tick()
             child_failed = self.decorated.status is Status.FAILURE

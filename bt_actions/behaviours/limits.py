@@ -35,25 +35,17 @@ class Deadline(Gate):
         self._after = after
         self._countdown = Countdown()
         self._expired = False
-        self._limit: float | None = None
+        self._limit = 0.0
 
     def setup(self, **kwargs: Any) -> None:
         self._countdown.setup(kwargs.get("node"))
 
-    def initialise(self) -> None:
+    def begin(self) -> None:
         self._expired = False
-        self.feedback_message = ""
-        try:
-            self._limit = parse_duration(self._after())
-        except ValueError as error:
-            self._limit = None
-            self.feedback_message = str(error)
-            return
+        self._limit = parse_duration(self._after())
         self._countdown.start(self._limit)
 
     def gate(self) -> Status | None:
-        if self._limit is None:
-            return Status.FAILURE
         if not self._expired and self._countdown.left() <= 0.0:
             self._expired = True
             self.decorated.stop(Status.INVALID)

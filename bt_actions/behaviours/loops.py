@@ -51,17 +51,12 @@ class RetryChild(Gate):
     def setup(self, **kwargs: Any) -> None:
         self._pause.setup(kwargs.get("node"))
 
-    def initialise(self) -> None:
+    def begin(self) -> None:
         self.failures = 0
         self._pause.start(0.0)
-        self.limit = None
-        self.feedback_message = ""
+        self.limit = _whole(self._attempts, "attempts", 1)
 
     def gate(self) -> Status | None:
-        if self.limit is None and self._attempts is not None:
-            self.limit, self.feedback_message = _whole(self._attempts, "attempts", 1)
-            if self.limit is None:
-                return Status.FAILURE
         return None if self._pause.left() <= 0.0 else Status.RUNNING
 
     def update(self) -> Status:
@@ -97,16 +92,11 @@ class Repeat(Gate):
         self.successes = 0
         self.limit: int | None = None
 
-    def initialise(self) -> None:
+    def begin(self) -> None:
         self.successes = 0
-        self.limit = None
-        self.feedback_message = ""
+        self.limit = _whole(self._times, "times", 0)
 
     def gate(self) -> Status | None:
-        if self.limit is None and self._times is not None:
-            self.limit, self.feedback_message = _whole(self._times, "times", 0)
-            if self.limit is None:
-                return Status.FAILURE
         return Status.SUCCESS if self.limit == 0 else None
 
     def update(self) -> Status:
@@ -147,36 +137,26 @@ class ForEach(Gate):
     ) -> None:
         super().__init__(name, child)
         self._get_items = items
-        self._begin = begin
+        self._write = begin
         self._keep_going = keep_going
-        self._items: list[object] | None = None
+        self._items: list[object] = []
         self.index = 0
         self.failures = 0
 
-    def initialise(self) -> None:
+    def begin(self) -> None:
         self.index = self.failures = 0
-        self._items = None
-        self.feedback_message = ""
-        try:
-            items = self._get_items()
-            items = plain(items)
-            if not isinstance(items, (list, tuple)):
-                raise ValueError(f"a list is needed, not {shorten(items, 60)}")
-        except ValueError as error:
-            self.feedback_message = str(error)
-            return
+        items = plain(self._get_items())
+        if not isinstance(items, (list, tuple)):
+            raise ValueError(f"a list is needed, not {shorten(items, 60)}")
         self._items = list(items)
-        if self._items and not self._begins():
-            self._items = None
+        if self._items:
+            self._hand_over()
 
     def gate(self) -> Status | None:
-        if self._items is None:
-            return Status.FAILURE
         return None if self._items else Status.SUCCESS
 
     def update(self) -> Status:
         status = self.decorated.status
-        assert self._items is not None
         if status not in (Status.SUCCESS, Status.FAILURE):
             return status
         if status is Status.FAILURE:
@@ -190,31 +170,34 @@ class ForEach(Gate):
             self.feedback_message += f", {self.failures} failed"
         if self.index >= len(self._items):
             return Status.FAILURE if self.failures == len(self._items) else Status.SUCCESS
-        return Status.RUNNING if self._begins() else Status.FAILURE
-
-    def _begins(self) -> bool:
-        """Whether the next item is where the child reads it."""
-        assert self._items is not None
         try:
-            self._begin(self._items[self.index], self.index)
+            self._hand_over()
         except ValueError as error:
-            self.feedback_message = f"item {self.index}: {error}"
-            self.refused = True
-            return False
-        return True
+            self.feedback_message, self.refused = str(error), True
+            return Status.FAILURE
+        return Status.RUNNING
+
+    def _hand_over(self) -> None:
+        """Put the next item where the child reads it. Raises ValueError."""
+        try:
+            self._write(self._items[self.index], self.index)
+        except ValueError as error:
+            raise ValueError(f"item {self.index}: {error}") from error
 
     def due_in(self) -> float | None:
         """Zero when the next item can begin at once."""
         return None if self.decorated.status is Status.RUNNING else 0.0
 
 
-def _whole(given: Number | int, what: str, least: int) -> tuple[int | None, str]:
-    """A whole number, or None and what is wrong with it."""
+def _whole(given: Number | int | None, what: str, least: int) -> int | None:
+    """A whole number, or None where none is given. Raises ValueError for anything else."""
+    if given is None:
+        return None
     try:
         value = given() if callable(given) else given
     except ValueError as error:
-        return None, f"{what}: {error}"
+        raise ValueError(f"{what}: {error}") from error
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         wanted = f"a whole number of at least {least}"
-        return None, f"{what}: {wanted} is needed, not {shorten(value, 60)}"
-    return value, ""
+        raise ValueError(f"{what}: {wanted} is needed, not {shorten(value, 60)}")
+    return value

@@ -34,21 +34,13 @@ class Subtree(Gate):
         super().__init__(name, child)
         self._begin = begin
         self._end = end
-        self._refused = ""
 
-    def initialise(self) -> None:
-        self._refused = ""
+    def begin(self) -> None:
         try:
             self._begin()
-        except ValueError as error:
-            self._refused = str(error)
+        except ValueError:
             self.decorated.stop(Status.INVALID)
-
-    def gate(self) -> Status | None:
-        if not self._refused:
-            return None
-        self.feedback_message = self._refused
-        return Status.FAILURE
+            raise
 
     def update(self) -> Status:
         status = self.decorated.status
