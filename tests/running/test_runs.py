@@ -67,6 +67,7 @@ class TestTicks:
         stage = Stage(in_sequence(*leaves), lasts=0.0, heartbeat=5.0)
         assert stage.runner.run() is Status.SUCCESS
         assert stage.runner.now < 5.0
+        assert not stage.loop.goals._handles, "what is over is forgotten"
 
 
 class TestItsEnd:
@@ -93,6 +94,8 @@ class TestItsEnd:
         while stage.network.timeline.advance(20.0):
             pass
         assert stage.runner.unaccounted == [], "its end was heard of since"
+        stage.runner.shutdown()
+        assert stage.goals[-1].end is End.SUCCEEDED, "and is told"
 
     def test_is_told_when_all_its_goals_are_drained(self) -> None:
         leaf = MoveRobot("m", 9.0)
