@@ -10,6 +10,7 @@ from test_msgs.action import Fibonacci
 
 from bt_actions.simulation import FaultError, FaultPlan, Script, ScriptedServer
 from bt_actions.simulation import journal as j
+from bt_actions.simulation.execution import FLOOD_AT_ONCE
 from tests.simulation.conftest import Bench, Client
 
 SUCCEEDED = GoalStatus.STATUS_SUCCEEDED
@@ -115,6 +116,17 @@ def test_abort_half_way(serve: Any, bench: Bench) -> None:
     assert bench.entries()[-1].reason == "fault: abort"
 
 
+@pytest.mark.parametrize(("seconds", "at"), [(0.1, 50), (9, 100)], ids=["then", "at the end"])
+def test_abort_after_seconds(serve: Any, seconds: float, at: int) -> None:
+    goal = serve(f"1:abort={seconds}").send().until_ended()
+    assert goal.status == ABORTED
+    assert at - 30 <= goal.feedback[-1].sequence[0] < at
+
+
+def test_a_goal_that_is_done_at_once_still_meets_its_fault(serve: Any) -> None:
+    assert serve("1:abort", script=Script(duration=0.0)).send().until_ended().status == ABORTED
+
+
 def test_slow(serve: Any, bench: Bench) -> None:
     client = serve("1:slow=4")
     slow, normal = client.send(), client.send()
@@ -148,6 +160,12 @@ def test_flood(serve: Any, bench: Bench) -> None:
     bench.until(lambda: len(goal.feedback) > 200, 2.0)
     goal.cancel()
     assert goal.until_ended().status == CANCELED
+
+
+def test_a_flood_is_never_endless_in_one_step(serve: Any, bench: Bench) -> None:
+    goal = serve("1:flood=1000000").send().until_ended()
+    bench.go_on_for(0.1)
+    assert len(goal.feedback) <= 10 * FLOOD_AT_ONCE
 
 
 def test_reject_cancel(serve: Any, bench: Bench) -> None:
@@ -213,6 +231,11 @@ def test_delay_result(serve: Any, bench: Bench) -> None:
     assert goal.until_ended().status == SUCCEEDED
     assert list(goal.result.sequence) == [3]
     assert bench.now() - bench.entries()[-1].t >= 0.5
+
+
+def test_a_result_that_is_later_than_its_server_remembers_is_unknown(serve: Any) -> None:
+    goal = serve("1:delay_result=1", result_timeout=0.2).send().until_ended()
+    assert goal.status == GoalStatus.STATUS_UNKNOWN
 
 
 def test_drop_result(serve: Any, bench: Bench) -> None:
