@@ -190,7 +190,8 @@ class Play:
             for message in list(world.air):
                 if message in world.air:
                     world.deliver(message)
-            if all(leaf.attempts is None for leaf in caller.leaves) and self.judge.settled():
+            is_over = all(leaf.attempts is None for leaf in caller.leaves) and not world.air
+            if is_over and self.judge.settled():
                 break
             for job in list(world.jobs):
                 if job.status == UNANSWERED and job.server.alive:

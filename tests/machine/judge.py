@@ -367,6 +367,9 @@ class Judge:
 
     def settled(self) -> bool:
         """Whether every goal is DONE, or given up with its end known."""
+        open_ones = [each for at in self.caller.endpoints for each in at.goals.values()]
+        if any(each.goal.state is State.CANCELING for each in open_ones):
+            return False  # also what has turned up at a second server
         return all(
             handle.goal.state is State.DONE
             or (handle.goal.outcome is not None and handle.goal.end is not End.UNKNOWN)
@@ -410,7 +413,8 @@ class Judge:
             forgot = any(job.goal_id not in job.server.jobs for job in jobs)
             dead = any(not job.server.alive for job in jobs)
             asked = goal.unconfirmed and goal.waited_for  # a request that was never answered
-            cause = closed or ledger.crowded or forgot or dead or asked
+            another = len(handle.replies.sent_to) > 1  # as far as is known, and it denied the goal
+            cause = closed or ledger.crowded or forgot or dead or asked or another
             self._hold(cause, f"UNKNOWN with a cause: {said}")
 
     def insist(self) -> None:
