@@ -41,8 +41,6 @@ LOOKED_OUT_FOR = 3.0
 """Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
 went away: one that only stood still goes on with its goal. Once for each goal."""
 
-_probes = itertools.count(1)
-
 
 class ActionEndpoint:
     """One action as one node sees it: the shared transport, and the goals on it."""
@@ -72,6 +70,7 @@ class ActionEndpoint:
         self.cancels = domain.cancels_at((name, action_type))
         self.orphaned = False
         self.in_sight_since = self.heard_at = host.steady()
+        self._probes = itertools.count(1)
         self._last_probes: deque[int] = deque()
         self._warned_of: set[str] = set()
         self._past = Past(self, host)
@@ -287,7 +286,7 @@ class ActionEndpoint:
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
-        probe = next(_probes)
+        probe = next(self._probes)
         self.watch.probe_sent(self._host.steady(), probe)
         self._last_probes.append(probe)
         if len(self._last_probes) > PROBES_KEPT:

@@ -81,6 +81,15 @@ class ModelServer:
     def __repr__(self) -> str:
         return f"{self.action}#{self.gid.decode()}"
 
+    def becomes(self, mood: Mood) -> None:
+        self.mood = mood
+
+    def is_cut(self) -> None:
+        self.cut = True
+
+    def lapses(self) -> None:
+        self.shown = False
+
 
 @dataclass(eq=False, slots=True)
 class Message:
@@ -146,14 +155,14 @@ class World:
             "feedback": (self._running, self.give_feedback),
             "finish": (self._finishable, lambda choice: self.finish(*choice)),
             "expire": (self._finished, self._expire),
-            "mood": (self._moods, lambda choice: setattr(choice[0], "mood", choice[1])),
+            "mood": (self._moods, lambda choice: choice[0].becomes(choice[1])),
             "kill": (self._alive, self._kill),
             "leave": (self._alive, self._leave),
             "crash": (self._alive, self._crash),
             "start": (self._startable, self.start),
-            "cut": (self._connected, lambda server: setattr(server, "cut", True)),
+            "cut": (self._connected, lambda server: server.is_cut()),
             "outage": (self._connected, self._outage),
-            "lapse": (self._lapsable, lambda server: setattr(server, "shown", False)),
+            "lapse": (self._lapsable, lambda server: server.lapses()),
             "falter": (self._alive, self._falter),
             "overlook": (self._overlookable, self.overlooked.add),
             "notice": (lambda: sorted(self.overlooked), self._notice),
