@@ -6,6 +6,7 @@ rclpy's own loggers would print it as well, and hold up the process where nobody
 from __future__ import annotations
 
 import contextlib
+from typing import Literal
 
 from rcl_interfaces.msg import Log
 from rclpy.duration import Duration
@@ -16,7 +17,7 @@ from bt_actions.utilities.plain_text import clean_lines
 
 __all__ = ["Rosout"]
 
-INFO, ERROR = 20, 40
+LEVELS = {"info": 20, "error": 40}
 LINGER = 0.5
 """Seconds, at most, for the last line to be acknowledged by those who listen."""
 
@@ -38,27 +39,16 @@ class Rosout:
             ),
         )
 
-    def info(self, text: str) -> None:
-        """Say something worth knowing."""
-        self._say(INFO, text)
-
-    def error(self, text: str) -> None:
-        """Say something that needs attention."""
-        self._say(ERROR, text)
-
-    def _say(self, level: int, text: str) -> None:
+    def say(self, level: Literal["info", "error"], text: str) -> None:
+        """Say something; an error needs attention."""
         with contextlib.suppress(Exception):  # its node is gone, say: the log has it as well
             stamp = self._node.get_clock().now().to_msg()
-            said = clean_lines(text)
-            self._publisher.publish(Log(stamp=stamp, level=level, name=self._name, msg=said))
-
-    def flush(self) -> None:
-        """Wait until those in sight have what was said, but not for long."""
-        with contextlib.suppress(Exception):
-            self._publisher.wait_for_all_acked(Duration(seconds=LINGER))
+            said = Log(stamp=stamp, level=LEVELS[level], name=self._name, msg=clean_lines(text))
+            self._publisher.publish(said)
 
     def close(self) -> None:
-        """Flush, and be gone; before the node is."""
-        self.flush()
+        """Be gone, before the node is, and when those in sight have what was said; not for long."""
+        with contextlib.suppress(Exception):
+            self._publisher.wait_for_all_acked(Duration(seconds=LINGER))
         with contextlib.suppress(Exception):
             self._node.destroy_publisher(self._publisher)

@@ -372,7 +372,7 @@ class TreeServer:
     def _tell_all(self, level: Literal["info", "error"], text: str) -> None:
         """Log it, and say it on /rosout, where the log's lines do not come."""
         getattr(log, level)(text)
-        getattr(self._rosout, level)(text)
+        self._rosout.say(level, text)
 
     def _answer(self, goal: Goal, outcome: RunOutcome) -> None:
         status, canceled = GoalStatus.STATUS_ABORTED, outcome.code == Code.CANCELED

@@ -56,7 +56,7 @@ class Presence:
         self._report.observe(event)
         if isinstance(event, TreeStarted):
             self._begun = True
-            self._rosout.info(self._begins)
+            self._rosout.say("info", self._begins)
 
     def close(self, *, left: bool = False, error: BaseException | None = None) -> None:
         """Say how the run has ended; `left`: without waiting for its goals. Once is enough."""
@@ -70,12 +70,12 @@ class Presence:
         status = self._report.status
         failed = "\n".join(summary(self._report)) if error is None else in_words(error)
         if failed:
-            self._rosout.error(f"{self._name}: {failed}")
+            self._rosout.say("error", f"{self._name}: {failed}")
         word = status.value if status is not Status.INVALID else "STOPPED"
         unaccounted = [f"{goal.name} on {goal.server}" for goal in self._runner.unaccounted]
         text = f"{self._name} ends: {word} after {self._report.elapsed():.2f} s"
         text += ", left without waiting for its goals" if left else ""
         text += f"; not accounted for: {', '.join(unaccounted)}" if unaccounted else ""
         wrong = left or unaccounted or failed or status is Status.FAILURE
-        (self._rosout.error if wrong else self._rosout.info)(text)
+        self._rosout.say("error" if wrong else "info", text)
         self._rosout.close()
