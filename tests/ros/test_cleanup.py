@@ -63,13 +63,6 @@ def sweep(wanted: Collection[str], **more: Any) -> tuple[Swept, list[str]]:
     return swept, told
 
 
-def test_a_healthy_server_is_known(serve: Callable[..., Journal], name: str, domain: int) -> None:
-    serve()
-    swept, told = sweep([name])
-    assert (swept.left, told) == ([], [])
-    assert name in swept.known
-
-
 def test_of_two_servers_each_has_to_answer(
     new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -93,6 +86,7 @@ def test_of_two_servers_each_has_to_answer(
     assert name not in swept.known
 
 
+@pytest.mark.chaos
 def test_an_answer_does_not_show_that_the_status_has_come(
     new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -315,6 +309,7 @@ def test_cleanup_sees_no_server_where_there_is_a_client_only(
     leaf.shutdown()
 
 
+@pytest.mark.chaos
 def test_cleanup_that_cannot_look_again_says_who_has_not_answered(
     new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,6 +36,7 @@ def test_after_a_crash_what_was_left_is_canceled_before_goals_are_accepted(
     assert not any("cleaning up" in line for line in third.errors), "nothing is left"
 
 
+@pytest.mark.chaos
 def test_where_nobody_can_see_what_was_left_no_goal_is_accepted_and_it_is_said_what_to_do(
     new_host: HostFactory,
     serve_trees: Serve,
@@ -63,6 +64,7 @@ def test_where_nobody_can_see_what_was_left_no_goal_is_accepted_and_it_is_said_w
     assert again.errors[-1].endswith("accepts no goals before that is settled")
 
 
+@pytest.mark.chaos
 def test_a_server_below_that_is_killed_aborts_the_run_and_it_is_settled(
     new_host: HostFactory, serve_trees: Serve, client: TreeClient, name: str
 ) -> None:

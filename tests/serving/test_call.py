@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import signal
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
-from tests.serving.conftest import MAIN, Serve
+from tests.serving.conftest import MAIN, MOVE, Serve
 from tests.support.processes import Journal, Process
 
 Call = Callable[..., Process]
@@ -79,8 +80,9 @@ def test_ctrl_c_cancels_and_a_server_that_is_busy_is_no_bad_input(
 
 
 def test_a_run_that_left_a_goal_behind_ends_with_3(
-    serve: Callable[..., Journal], serve_trees: Serve, call: Call
+    serve: Callable[..., Journal], serve_trees: Serve, call: Call, folder: Path, name: str
 ) -> None:
+    (folder / "move.yaml").write_text(MOVE.format(server=name, cancel="500 ms"))
     journal = serve("1:ignore_cancel")
     serve_trees()
     process = call("move", "--set", "distance=30.0", "-q")

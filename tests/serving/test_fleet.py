@@ -134,6 +134,7 @@ def test_a_link_that_is_back_soon_is_no_reason_to_fail(fleet: Fleet, cut: float)
     assert fleet.ends() == [["succeeded"]] * 2
 
 
+@pytest.mark.chaos
 def test_a_link_that_stays_cut_leaves_ends_that_nobody_knows(fleet: Fleet, stock: Path) -> None:
     fleet.begin(20.0, "feedback: 2 s, cancel: 2 s", stock)
     fleet.machines.cut()

@@ -87,6 +87,7 @@ def test_a_managed_server_goes_through_its_life_again_and_again_and_refuses_what
     assert not client.send("empty").accepted
 
 
+@pytest.mark.chaos
 def test_while_a_deactivation_drains_its_state_is_told_and_goals_are_rejected(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, manager: Manager
 ) -> None:

@@ -47,6 +47,7 @@ def test_where_no_server_is_in_sight_it_says_what_to_look_for(
     assert "is `bt-actions serve` running" in "\n".join(process.errors)
 
 
+@pytest.mark.chaos
 def test_a_server_that_comes_in_sight_late_and_does_not_answer_is_named_beside_the_others(
     serve_trees: Serve, fresh_context: Any, space: str, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -155,6 +155,7 @@ executor.spin()
 """
 
 
+@pytest.mark.chaos
 def test_a_goal_can_be_canceled_while_its_server_is_about_to_begin_it(
     serve: Callable[..., Journal],
     start_program: Callable[..., Process],
@@ -171,6 +172,7 @@ def test_a_goal_can_be_canceled_while_its_server_is_about_to_begin_it(
     assert client.send("empty").accepted
 
 
+@pytest.mark.chaos
 def test_a_goal_that_waits_for_the_one_it_replaces_can_be_canceled(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:
@@ -185,6 +187,7 @@ def test_a_goal_that_waits_for_the_one_it_replaces_can_be_canceled(
     assert journal.count("accepted") == 1
 
 
+@pytest.mark.chaos
 def test_a_cancel_of_a_goal_that_is_halted_already_changes_nothing(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:

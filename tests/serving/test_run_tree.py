@@ -78,6 +78,7 @@ def test_a_cancel_goes_down_to_the_robot_and_is_waited_for(
     assert journal.ends() == ["canceled"]
 
 
+@pytest.mark.chaos
 def test_a_run_that_left_a_goal_behind_is_not_accounted_for_here_either(
     serve: Callable[..., Journal], serve_trees: Serve, outer: Outer, folder: Path, name: str
 ) -> None:

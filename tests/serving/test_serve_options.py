@@ -88,6 +88,7 @@ def test_ready_counts_the_trees_that_can_be_run_and_names_the_others(serve_trees
     assert server.lines[0].endswith("/run_tree, 2 trees, 1 broken: broken")
 
 
+@pytest.mark.chaos
 def test_a_ctrl_c_that_comes_twice_within_a_moment_counts_once(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:

@@ -57,6 +57,7 @@ def test_a_tree_runs_to_its_end_and_tells_what_it_did(
     assert action.place.startswith(str(folder / "move.yaml"))
 
 
+@pytest.mark.chaos
 def test_a_run_is_told_on_rosout(serve_trees: Serve, client: TreeClient, space: str) -> None:
     heard: list[Log] = []
     latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -110,6 +111,7 @@ def test_a_goal_that_cannot_be_run_is_rejected_and_the_reason_is_told_to_all(
     ]
 
 
+@pytest.mark.chaos
 def test_reject_runs_one_tree_at_a_time(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:
@@ -127,6 +129,7 @@ def test_reject_runs_one_tree_at_a_time(
     assert journal.max_live == 1
 
 
+@pytest.mark.chaos
 def test_a_queued_goal_runs_the_version_of_the_tree_that_it_was_checked_against(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path
 ) -> None:
@@ -172,6 +175,7 @@ def test_replace_begins_the_newer_tree_when_all_goals_of_the_older_have_ended(
     assert journal.max_live == 1
 
 
+@pytest.mark.chaos
 def test_parallel_trees_share_resources_as_trees_of_one_process_do(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:
@@ -253,6 +257,7 @@ def test_a_behaviour_that_raises_is_named(
     assert client.send("empty").accepted, "the server goes on"
 
 
+@pytest.mark.chaos
 def test_a_behaviour_that_wants_to_end_the_program_leaves_no_goal_below_unsaid(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path, name: str
 ) -> None:
@@ -330,6 +335,7 @@ def test_a_signal_drains_all_goals_and_answers_before_the_process_ends(
     assert journal.ends() == ["canceled"]
 
 
+@pytest.mark.chaos
 def test_a_tick_that_does_not_return_does_not_hold_the_process_at_the_second_signal(
     serve_trees: Serve, client: TreeClient, folder: Path
 ) -> None:
@@ -401,6 +407,7 @@ server.close()
 """
 
 
+@pytest.mark.chaos
 def test_where_the_context_is_shut_down_first_all_goals_are_drained_and_nobody_can_be_answered(
     serve: Callable[..., Journal],
     start_program: Callable[..., Process],

@@ -271,8 +271,8 @@ def tick_tock_until_a_signal(user: User) -> None:
         thread.join()  # rclpy aborts a process that ends while a thread of its own still spins
 
 
-def _started(action: str) -> TreeRunner:
-    """A runner with a node of its own, whose goal runs."""
+def _started(action: str, *, until_it_runs: bool = True) -> TreeRunner:
+    """A runner with a node of its own, whose goal runs, or will."""
     leaf = MoveRobot("m", 60.0, action_name=action, timeout=PATIENT)
     runner = TreeRunner(leaf)
 
@@ -284,7 +284,8 @@ def _started(action: str) -> TreeRunner:
     executing = threading.Event()
     runner.observe(say)
     runner.start()
-    executing.wait()
+    if until_it_runs:
+        executing.wait()
     return runner
 
 
@@ -301,7 +302,7 @@ def end_beside_a_runner(action: str) -> None:
 
 def wait_for_a_runner(action: str) -> None:
     """start() and wait() of a TreeRunner, in mid-goal."""
-    _started(action).wait()
+    _started(action, until_it_runs=False).wait()
 
 
 def run_and_clean_up(action: str) -> None:
