@@ -188,23 +188,3 @@ def test_when_the_node_goes_what_is_not_accounted_for_stays(
             handover.park(line, process, domain, all_of_them=True)
             handle.endpoint.tell(handle, Event.PROCESS_EXITING)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
-
-
-def test_what_is_put_away_as_gone_stays_marked_as_lost(
-    new_host: HostFactory, name: str, node: Any, ledger: Recorder
-) -> None:
-    with losing(new_host(), name, node):
-        pass
-    assert [lost for *_, lost in ledger.open.values()] == [True]
-
-
-def test_of_many_that_were_lost_the_newest_stay(
-    new_host: HostFactory,
-    name: str,
-    node: Any,
-    ledger: Recorder,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(handover, "LOST_KEPT", -1)  # all but the newest -1: the oldest one goes
-    with losing(new_host(), name, node):
-        until(lambda: ledger.open == {})

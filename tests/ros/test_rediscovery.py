@@ -86,7 +86,13 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     )
 
 
-@pytest.mark.parametrize("canceled", [False, True], ids=["it ends", "it is canceled"])
+@pytest.mark.parametrize(
+    "canceled",
+    [
+        pytest.param(False, id="it ends", marks=pytest.mark.chaos),
+        pytest.param(True, id="it is canceled"),
+    ],
+)
 def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
     serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, canceled: bool
 ) -> None:
@@ -113,6 +119,7 @@ def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
     until(nobody_looks)
 
 
+@pytest.mark.chaos
 def test_a_server_whose_goals_are_all_done_is_found_too(
     serve: Any, name: str, node: Any, blind: Blind, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -190,9 +197,6 @@ class TestMoves:
             runner.run(10.0)
         assert leaf.outcome is Outcome.SUCCEEDED
 
-    def test_goals_go_and_come(self, moved: Any, name: str, node: Any) -> None:
-        self.goes(name, node)
-
     def test_a_participant_that_is_used_again_is_not_closed(
         self, moved: Any, name: str, node: Any
     ) -> None:
@@ -214,64 +218,6 @@ class TestMoves:
         assert not endpoint.route.elsewhere
         assert not endpoint.orphaned
 
-    def test_without_another_thread_no_resource_is_lost(
-        self, moved: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        endpoint, sight = moved
-
-        def no_more(_thread: threading.Thread) -> None:
-            raise RuntimeError("can't start new thread")
-
-        with process.lock, monkeypatch.context() as patch:
-            patch.setattr(threading.Thread, "start", no_more)
-            assert endpoint.route.fall_back()
-        assert not sight.closed
-        self.goes(name, node)
-        sight.close()
-
-
-def test_a_line_that_leaves_during_a_look_does_not_close_it_underneath(
-    name: str, node: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its goal is soon done; it still counts as missing, and is looked for on."""
-    from std_srvs.srv import Trigger
-
-    class Seeker:
-        tried, closed = 0, False
-
-        def misses(self) -> bool:
-            return True
-
-        def is_waited_for(self) -> bool:
-            return True
-
-        def try_in(self, sight: SecondParticipant) -> Any:
-            self.second = sight
-            self.tried += 1
-            return self
-
-        def ready(self) -> bool:
-            return True
-
-        def prefers(self, client: Any) -> bool:
-            return True
-
-        def move_to(self, transport: Any) -> None:
-            self.second._left_by(transport)
-
-        def close(self) -> None:
-            assert not self.second.closed
-
-    monkeypatch.setattr(rediscovery, "LASTS", 3.0)
-    service = node.create_service(Trigger, f"{name}/_action/send_goal", print)
-    seeker = Seeker()
-    looks = rediscovery.Rediscovery(_domain(node).number, "/")
-    looks._missing = {seeker: name}
-    assert looks._look() is False
-    assert seeker.tried > 1
-    assert seeker.second.closed
-    node.destroy_service(service)
-
 
 def test_an_action_that_had_a_server_once_is_looked_for(
     serve: Any, name: str, node: Any, blind: Blind, monkeypatch: pytest.MonkeyPatch
@@ -289,6 +235,7 @@ def test_an_action_that_had_a_server_once_is_looked_for(
         assert leaf.outcome is Outcome.SUCCEEDED
 
 
+@pytest.mark.chaos
 def test_whoever_else_reads_goal_requests_moves_nobody(
     name: str, node: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -374,50 +321,3 @@ def test_where_names_are_remapped_nobody_looks(
     leaf.shutdown()
     remapped.destroy_node()
     context.shutdown()
-
-
-def test_without_a_pause_to_break_off_a_look_begins_as_soon_as_ever() -> None:
-    """Not after the first pause, and then another."""
-
-    class Looks(rediscovery.Rediscovery):
-        def _wait(self, pause: float) -> None:
-            pauses.append(pause)
-
-        def _still_missing(self) -> bool:
-            raise StopIteration
-
-    pauses, looks = list[float](), Looks(0, "/")
-    looks._thread = threading.current_thread()
-    with process.lock:
-        looks.add(Missing(), "/m", at_once=True)  # type: ignore[arg-type]
-    with pytest.raises(StopIteration):
-        looks._run()
-    assert pauses == [rediscovery.FIRST_AFTER]
-
-
-class Missing:
-    """An endpoint that nobody waits for."""
-
-    def misses(self) -> bool:
-        return True
-
-    def is_waited_for(self) -> bool:
-        return False
-
-
-def test_who_is_in_doubt_waits_for_no_pause_that_others_have_reached() -> None:
-    looks = rediscovery.Rediscovery(0, "/")
-    first, second = Missing(), Missing()
-    looks._missing = {first: "/m"}  # type: ignore[arg-type]
-    looks._thread = threading.current_thread()
-
-    def wait() -> None:
-        with process.lock:
-            looks._wait(600.0)
-
-    waits = threading.Thread(target=wait, daemon=True)
-    waits.start()
-    with process.lock:
-        looks.add(second, "/m", at_once=True)  # type: ignore[arg-type]
-    waits.join(30.0)
-    assert not waits.is_alive()
