@@ -38,6 +38,7 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions.ros.graph import servers
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
+from bt_actions.ros.workarounds.statuses import status_reader
 from bt_actions.servers.reachability import NEVER, Reachability
 from bt_actions.traffic.transport import GOALS_KEPT, Listener
 from bt_actions.utilities.plain_text import raised
@@ -202,6 +203,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
     def take_data(self) -> None:
         """Take all that has arrived into the inbox. Called by the executor, and by `pump`."""
         taken = self._inbox
+        status_type, read_statuses = status_reader()
         with self._lock:
             if self._closed:
                 return
@@ -236,14 +238,10 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                     result = response.result if status else None
                     self._file("result", self._result_requests.get(number), (status, result))
                 for _ in range(TAKE_AT_MOST):
-                    message = self._client_handle.take_status(self._impl.GoalStatusMessage)
+                    message = self._client_handle.take_status(status_type)
                     if message is None:
                         break
-                    statuses = {
-                        bytes(entry.goal_info.goal_id.uuid): entry.status
-                        for entry in message.status_list
-                    }
-                    taken.append(("status", statuses, None))
+                    taken.append(("status", read_statuses(message), None))
 
     def _file(self, kind: str, question: _Question | None, answer: Any) -> None:
         """Put an answer into the inbox, with those before it; none that nobody waits for."""

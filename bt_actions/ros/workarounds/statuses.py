@@ -1,0 +1,108 @@
+"""Takes GoalStatusArray without a Python object for each goal in it.
+
+A server publishes the status of every goal that it still knows, by default for 15 minutes, each
+time that one changes. rclpy makes two objects and an array of numpy for each: 1.4 ms for 150 goals,
+where this takes 0.02 ms. It reads the C message as rosidl lays it out; that is tried at the first
+use, and where it comes out different, rclpy's own way is taken. Can go when rosidl_generator_py
+converts in less than a microsecond an entry (tests/ros/test_statuses.py measures nothing, but shows
+that both ways read the same). Decides nothing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Callable
+from typing import Any
+
+from action_msgs.msg import GoalStatus, GoalStatusArray
+
+__all__ = ["status_reader"]
+
+ID, ENTRY, STATUS = 16, 28, 24
+"""Bytes of a goal's id, and of an entry (id, time, status, filled up); and where the status is."""
+
+
+class _Sequence(ctypes.Structure):
+    """action_msgs__msg__GoalStatus__Sequence, which is all of a GoalStatusArray."""
+
+    _fields_ = (
+        ("data", ctypes.c_void_p),
+        ("size", ctypes.c_size_t),
+        ("capacity", ctypes.c_size_t),
+    )
+
+
+def _read(message: int) -> dict[bytes, int]:
+    sequence = _Sequence.from_address(message)
+    raw = ctypes.string_at(sequence.data, sequence.size * ENTRY) if sequence.size else b""
+    return {raw[at : at + ID]: raw[at + STATUS] for at in range(0, len(raw), ENTRY)}
+
+
+_CONVERT = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)(_read)
+"""The same as a C function; it has to be there as long as anybody may call it."""
+
+
+def status_reader() -> tuple[Any, Callable[[Any], dict[bytes, int]]]:
+    """Return what to give a `take_status`, and what makes {goal id: status} of what that returns.
+
+    In place of the message type stands one that is read at once, if the layout is as expected.
+    """
+    fast = _fast_type()
+    return (fast, lambda statuses: statuses) if fast is not None else (GoalStatusArray, by_objects)
+
+
+def by_objects(message: Any) -> dict[bytes, int]:
+    """Read it as rclpy makes it."""
+    return {bytes(entry.goal_info.goal_id.uuid): entry.status for entry in message.status_list}
+
+
+@functools.cache
+def _fast_type() -> type | None:
+    """Return a stand-in for GoalStatusArray that rclpy takes for a message type; or None."""
+    support: Any = type(GoalStatusArray)
+    support.__import_type_support__()
+    try:
+        if not _reads_as_expected(support):
+            return None
+        capsule = _python(
+            "PyCapsule_New", ctypes.py_object, ctypes.c_void_p, *[ctypes.c_char_p] * 2
+        )
+        members = {
+            "_CREATE_ROS_MESSAGE": support._CREATE_ROS_MESSAGE,  # noqa: SLF001 - what rclpy reads
+            "_DESTROY_ROS_MESSAGE": support._DESTROY_ROS_MESSAGE,  # noqa: SLF001
+            "_CONVERT_TO_PY": capsule(ctypes.cast(_CONVERT, ctypes.c_void_p), None, None),
+        }
+    except (AttributeError, OSError, ValueError):
+        return None
+    stand_in: type = type("Meta", (type,), members)("Statuses", (), {})
+    return stand_in
+
+
+def _reads_as_expected(support: Any) -> bool:
+    """Whether a message of two goals that rosidl has laid out is read as what it is."""
+    entries = [GoalStatus(status=2), GoalStatus(status=6)]
+    for number, entry in enumerate(entries, 1):
+        entry.goal_info.goal_id.uuid = [number] * ID
+        entry.goal_info.stamp.sec, entry.goal_info.stamp.nanosec = -number, number
+    message = GoalStatusArray(status_list=entries)
+    create = ctypes.PYFUNCTYPE(ctypes.c_void_p)(_pointer(support._CREATE_ROS_MESSAGE))  # noqa: SLF001
+    destroy = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)(_pointer(support._DESTROY_ROS_MESSAGE))  # noqa: SLF001
+    fill = ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.py_object, ctypes.c_void_p)(
+        _pointer(support._CONVERT_FROM_PY)  # noqa: SLF001
+    )
+    laid_out = create()
+    try:
+        return bool(fill(message, laid_out)) and _read(laid_out) == by_objects(message)
+    finally:
+        destroy(laid_out)
+
+
+def _pointer(capsule: Any) -> int:
+    get = _python("PyCapsule_GetPointer", ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)
+    return int(get(capsule, None))
+
+
+def _python(name: str, returns: Any, *takes: Any) -> Any:
+    """A function of Python's C interface; made anew, as the one of `pythonapi` is shared by all."""
+    return ctypes.PYFUNCTYPE(returns, *takes)((name, ctypes.pythonapi))
