@@ -18,10 +18,15 @@ from bt_actions.traffic.traffic import Traffic
 class VirtualBackend:
     """The virtual network as one node sees it; give it to `setup` in a node's place."""
 
-    def __init__(self, network: VirtualNetwork, *, seed: int = 0) -> None:
-        """Goal ids, and the pauses before retries, depend on `seed` alone."""
+    def __init__(
+        self, network: VirtualNetwork, *, seed: int = 0, host: VirtualHost | None = None
+    ) -> None:
+        """Goal ids, and the pauses before retries, depend on `seed` alone.
+
+        `host` is that of another backend, where both stand for nodes of one process.
+        """
         self.network = network
-        self.host = VirtualHost(network.timeline, network.log, seed)
+        self.host = host or VirtualHost(network.timeline, network.log, seed)
         self.participant = VirtualParticipant(network, "tree", network.namespace)
         self.traffic = Traffic(self.host, self.participant)
         self.clock = VirtualClock(network)

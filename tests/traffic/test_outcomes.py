@@ -17,6 +17,7 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Retry, Timeouts, Var
 from bt_actions.behaviours.variables import read, write
 from bt_actions.events import GoalChanged
+from bt_actions.testing import VirtualBackend
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -226,6 +227,35 @@ class TestBusy:
             runner.wait(20.0)
         assert stood(older) == (Outcome.CANCELED, End.CANCELED)
         assert older.reason == f"replaced by a newer goal on {newer.server}"
+
+    @pytest.mark.parametrize(
+        ("faults", "accept", "outcome"),
+        [
+            (["1:delay_accept=2"], 9.0, Outcome.CANCELED),
+            (["1:delay_accept=2", "1:reject"], 9.0, Outcome.REJECTED),
+            (["1:drop_goal"], 2.0, Outcome.CANCELED),
+        ],
+        ids=["accepted", "refused", "past accept"],
+    )
+    def test_what_replaces_a_goal_of_another_node_is_sent_when_that_is_answered(
+        self, world: World, faults: list[str], accept: float, outcome: Outcome
+    ) -> None:
+        """Requests of two nodes arrive in any order, and the last one wins."""
+        journal = world.serve(*faults, preempts=True)
+        older = MoveRobot("older", 9.0, timeout=Timeouts(accept=accept, cancel=0.5))
+        newer = MoveRobot("newer", 0.1, busy="replace", timeout=9.0)
+        backend = VirtualBackend(world.network)
+        older.setup(node=backend)
+        newer.setup(node=VirtualBackend(world.network, host=backend.host))
+        running = [older, newer]
+        while running:
+            for leaf in running:
+                leaf.tick_once()
+                world.network.timeline.advance(world.network.now() + 0.05)
+            running = [leaf for leaf in running if leaf.status is Status.RUNNING]
+        assert (older.outcome, newer.outcome) == (outcome, Outcome.SUCCEEDED)
+        first, second = (each.t for each in journal.entries() if each.event == "received")
+        assert second - first > 1.9, "before, the newer might have been first"
 
     @pytest.mark.parametrize("written", ["relative", "absolute"])
     def test_a_resource_is_named_as_a_server_is(self, world: World, written: str) -> None:
