@@ -9,6 +9,7 @@ thread, no wait, no ROS: a thread steps it, or a test in virtual time.
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -19,7 +20,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.running.goals import RunGoals
-from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, SetUp, tick_once
+from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain
 from bt_actions.utilities.places import culprit_of, path_of
@@ -77,8 +78,7 @@ class TickLoop:
         self._observers: list[Observer] = []
         self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.mind())
         self.watchdog = Watchdog(self._traffic, self.goals)
-        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each)
-        self._set_up = SetUp()
+        self._set_up = weakref.WeakSet[Behaviour]()
         self._doing = "setup"
         self._stop_wanted = self.abandoned = self._pause_wanted = self._paused = False
         self._timeout: float | None = None
@@ -120,6 +120,7 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
+        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each)
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)
 
@@ -160,7 +161,6 @@ class TickLoop:
         if self._error is not None:
             return None
         if self._visitor not in self.tree.visitors:
-            self._visitor.forget()
             self.tree.visitors.append(self._visitor)
             self._guarded(self._set_up_missing)
             self._ready()
@@ -181,22 +181,22 @@ class TickLoop:
         return 0.0 if self._burst else min([wait, *self._dues()])
 
     def _set_up_missing(self) -> None:
-        """Set up the tree, in the first run, or what is new in it."""
-        tree = self.tree
-        if self._set_up.is_complete(tree.root):
-            return
-        self._doing = "setup"
-        if type(tree).setup is not BehaviourTree.setup and not self._set_up.has_begun:
-            tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
-            for _ in self._set_up.missing(tree.root):
-                pass
-        for behaviour in self._set_up.missing(tree.root):
-            behaviour.setup(node=self._node)
+        """Set up what was not yet: the tree, in the first run, or what is new in it."""
+        tree, done = self.tree, self._set_up
+        by_itself = type(tree).setup is not BehaviourTree.setup and not done
+        while new := [each for each in tree.root.iterate() if each not in done]:
+            self._doing = "setup"
+            if by_itself:
+                tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
+            for behaviour in new:
+                if not by_itself:
+                    behaviour.setup(node=self._node)
+                done.add(behaviour)
+            by_itself = False
         self._doing = "tick"
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
-        self._visitor.begin()
         try:
             with self.goals.begun_here():
                 self._guarded(lambda: tick_once(self.tree))
@@ -299,7 +299,7 @@ class TickLoop:
 
     def shutdown(self) -> None:
         """Shut the tree down, if it was set up here: else another one may run it."""
-        if not self._set_up.has_begun:
+        if not self._set_up:
             return
         ours = [each for each in self.tree.root.iterate() if isinstance(each, ActionBehaviour)]
         for shutdown in self.tree.shutdown, *(each.shutdown for each in ours):

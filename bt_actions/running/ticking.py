@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite
 from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
@@ -35,48 +34,13 @@ class Misbehaviour(Exception):
     """What a behaviour did wrong without raising anything; raised in its `visit`."""
 
 
-class SetUp:
-    """Which behaviours of a tree have been set up, and whether others have been inserted since.
-
-    That is asked at each tick, so it compares the lists of children with what they were (about
-    10 ns a behaviour), and walks the tree only where one differs.
-    """
-
-    def __init__(self) -> None:
-        self._done = weakref.WeakSet[Behaviour]()
-        self._root: Behaviour | None = None
-        self._parents: list[Behaviour] = []
-        self._children: list[list[Behaviour]] = []
-
-    @property
-    def has_begun(self) -> bool:
-        """Whether any behaviour has been."""
-        return len(self._done) > 0
-
-    def is_complete(self, root: Behaviour) -> bool:
-        """Whether the tree holds what it held when nothing was missing any more."""
-        return self._root is root and self._children == [each.children for each in self._parents]
-
-    def missing(self, root: Behaviour) -> Iterator[Behaviour]:
-        """Yield what has not been set up, children first; who asks for the next one has done it."""
-        while new := [each for each in root.iterate() if each not in self._done]:
-            for behaviour in new:
-                yield behaviour
-                self._done.add(behaviour)
-        self._root = root
-        self._parents = [
-            each for each in root.iterate() if each.children or isinstance(each, Composite)
-        ]
-        self._children = [list(each.children) for each in self._parents]
-
-
 class ChangeVisitor(VisitorBase):
     """Collects which behaviours have another status than before, and which run."""
 
     def __init__(
         self,
-        before: Callable[[], None] = lambda: None,
-        after_each: Callable[[], str] = lambda: "",
+        before: Callable[[], None],
+        after_each: Callable[[], str],
     ) -> None:
         """`before` is called between the handlers of a tick and its first behaviour.
 
@@ -88,17 +52,9 @@ class ChangeVisitor(VisitorBase):
         self._visited: list[Behaviour] = []
         self._known = weakref.WeakKeyDictionary[Behaviour, Status]()
 
-    def forget(self) -> None:
-        """Begin a run."""
-        self.running = []
-        self._known.clear()
-
-    def begin(self) -> None:
-        """Begin a tick."""
-        self._visited = []
-
     def initialise(self) -> None:
-        """Do what has to be done before (py_trees calls this)."""
+        """Begin a tick (py_trees calls this)."""
+        self._visited = []
         self._before()
 
     def run(self, behaviour: Behaviour) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import time
 import weakref
 from pathlib import Path
 
@@ -20,11 +19,11 @@ from bt_actions.cli.views.table import summary, table, verdict
 from bt_actions.cli.views.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import PLACE
-from bt_actions.events import Event, NodeChanged, TreeFinished
+from bt_actions.events import Event, TreeFinished
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.running.ticking import ChangeVisitor
-from bt_actions.utilities.places import path_of
+from bt_actions.testing import VirtualRunner
 from tests.cli.fakes import FakeAction, Story
 
 
@@ -326,17 +325,9 @@ def test_who_failed_is_named_and_nobody_who_did_not_run(
     )
     (tmp_path / "sub.yaml").write_text("tree: sub\noutputs: {z: int32}\nroot: {set: {z: 500}}\n")
     root = load_tree(tree)
-    events: list[Event] = []
-    visitor = ChangeVisitor()
-    ticking = py_trees.trees.BehaviourTree(root)
-    ticking.visitors.append(visitor)
-    while root.status in (Status.INVALID, Status.RUNNING):
-        visitor.begin()
-        ticking.tick()
-        for node, status in visitor.finish():
-            message = node.feedback_message
-            events.append(NodeChanged(time.monotonic(), path_of(node), node, status, message))
-    report = told(root, *events, TreeFinished(time.monotonic(), root.status))
+    runner = VirtualRunner(root)
+    runner.run()
+    report = told(root, *runner.events)
     named = {culprit.path[-1]: culprit.message for culprit in report.culprits()}
     assert list(named) == list(culprits)
     for name, message in culprits.items():
@@ -345,11 +336,11 @@ def test_who_failed_is_named_and_nobody_who_did_not_run(
 
 def test_what_was_pruned_in_a_run_is_not_kept() -> None:
     root = Sequence("root", memory=False)
-    ticking, visitor = py_trees.trees.BehaviourTree(root), ChangeVisitor()
+    ticking = py_trees.trees.BehaviourTree(root)
+    visitor = ChangeVisitor(lambda: None, lambda: "")
     ticking.visitors.append(visitor)
 
     def tick() -> None:
-        visitor.begin()
         ticking.tick()
         visitor.finish()
 
