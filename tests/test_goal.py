@@ -101,7 +101,7 @@ def executing(timeouts: Timeouts = LIMITS, **kwargs: Any) -> Life:
     return life
 
 
-def suspect(timeouts: Timeouts = LIMITS) -> Life:
+def unconfirmed(timeouts: Timeouts = LIMITS) -> Life:
     """A goal whose request was not answered within timeout.accept."""
     life = sending(timeouts)
     assert life.pass_time(timeouts.accept or 0.0) == [CANCEL]
@@ -112,9 +112,9 @@ def denied(life: Life) -> None:
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
 
 
-def denied_suspect() -> Life:
-    """A suspect for which the tree did not wait any longer, because its server denied it."""
-    life = suspect()
+def denied_unconfirmed() -> Life:
+    """One for which the tree did not wait any longer, because its server denied it."""
+    life = unconfirmed()
     life.pass_time((LIMITS.accept or 0.0) - 1.0)
     denied(life)
     life.pass_time(1.0)
@@ -143,7 +143,7 @@ def test_after_done_nothing_is_sent_whatever_comes() -> None:
     life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
 
 
-@pytest.mark.parametrize("make", [Life, waiting, sending, executing, suspect])
+@pytest.mark.parametrize("make", [Life, waiting, sending, executing, unconfirmed])
 @pytest.mark.parametrize("event", list(Event))
 def test_any_event_may_come_in_any_state(make: Any, event: Event) -> None:
     details = {Event.STATUS: STATUS_ABORTED, Event.RESULT: ABORTED, Event.CANCEL_ANSWERED: 0}
@@ -308,13 +308,13 @@ def test_interrupted_before_acceptance_it_is_canceled_as_soon_as_it_turns_up(eve
 
 @pytest.mark.parametrize("code", [CANCEL_ACCEPTED, CANCEL_TERMINATED])
 def test_a_server_that_knows_a_goal_it_had_not_answered_has_accepted_it(code: int) -> None:
-    life = suspect()
+    life = unconfirmed()
     assert life.on(Event.CANCEL_ANSWERED, code) == [CANCEL, ASK]
     assert life.goal.accepted
 
 
 def test_accepted_however_late_it_is_canceled() -> None:
-    life = denied_suspect()
+    life = denied_unconfirmed()
     life.pass_time(3600.0)
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
     assert life.goal.end is End.UNKNOWN
@@ -329,7 +329,7 @@ def test_interrupted_and_then_refused() -> None:
     life.ended(Outcome.CANCELED, End.NEVER_STARTED)
 
 
-# Rule 3: suspects
+# Rule 3: unconfirmed goals
 
 
 def test_an_unanswered_request_is_asked_about_by_canceling() -> None:
@@ -338,16 +338,16 @@ def test_an_unanswered_request_is_asked_about_by_canceling() -> None:
     assert life.goal.outcome is None, "the leaf waits: it might have been executed"
 
 
-def test_a_suspect_that_the_server_denies_never_started_and_frees_its_resource() -> None:
-    life = suspect()
+def test_an_unconfirmed_goal_that_the_server_denies_never_started_and_frees_its_resource() -> None:
+    life = unconfirmed()
     life.pass_time(2.0)
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     assert RELEASE in life.pass_time(1.0)
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
 
 
-def test_a_suspect_that_nobody_denies_stays_unknown_and_keeps_its_resource() -> None:
-    life = suspect()
+def test_an_unconfirmed_goal_that_nobody_denies_stays_unknown_and_keeps_its_resource() -> None:
+    life = unconfirmed()
     life.pass_time(3.0)
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
     assert life.goal.holding
@@ -362,8 +362,8 @@ def test_a_suspect_that_nobody_denies_stays_unknown_and_keeps_its_resource() -> 
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
 
 
-def test_a_suspect_that_is_refused_late_was_rejected() -> None:
-    life = suspect()
+def test_an_unconfirmed_goal_that_is_refused_late_was_rejected() -> None:
+    life = unconfirmed()
     life.on(Event.REJECTED)
     life.ended(Outcome.REJECTED, End.NEVER_STARTED)
     assert life.goal.late
@@ -447,7 +447,7 @@ def test_interrupted_while_executing_it_is_canceled_whatever_it_ended_with() -> 
         assert not life.goal.late
 
 
-@pytest.mark.parametrize("make", [sending, executing, suspect])
+@pytest.mark.parametrize("make", [sending, executing, unconfirmed])
 def test_interrupting_twice_is_interrupting_once(make: Any) -> None:
     life = make()
     life.on(Event.INTERRUPTED)
@@ -563,7 +563,7 @@ def test_a_word_about_a_goal_that_is_done_wakes_nobody() -> None:
 
 
 def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_server() -> None:
-    life = suspect()
+    life = unconfirmed()
     for _ in range(int(DENIED_FOR_GOOD) + 5):
         life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
         life.pass_time(1.0)
@@ -826,9 +826,9 @@ def test_a_goal_lost_before_its_acceptance_is_judged_when_the_server_is_back() -
     assert not life.goal.outstanding, "others may be sent"
 
 
-def test_a_suspect_that_was_denied_once_may_run_on_a_server_that_is_lost() -> None:
+def test_an_unconfirmed_goal_that_was_denied_once_may_run_on_a_server_that_is_lost() -> None:
     """Its acceptance may have been under way when the link was cut."""
-    life = denied_suspect()
+    life = denied_unconfirmed()
     life.on(Event.SERVER_LOST, "cut")
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.SERVER_GONE)
     assert life.on(Event.SERVER_RETURNED) == [CANCEL]
@@ -836,8 +836,8 @@ def test_a_suspect_that_was_denied_once_may_run_on_a_server_that_is_lost() -> No
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
 
 
-def test_a_suspect_bars_nothing_longer_than_its_server_that_is_back_takes_to_deny_it() -> None:
-    life = denied_suspect()
+def test_an_unconfirmed_goal_bars_nothing_once_its_server_is_back_and_denies_it() -> None:
+    life = denied_unconfirmed()
     life.on(Event.SERVER_LOST, "cut")
     life.on(Event.SERVER_RETURNED)
     assert life.goal.outstanding
@@ -879,7 +879,7 @@ def test_a_goal_that_its_server_denies_is_canceled_all_the_same() -> None:
     life.ended(Outcome.SERVER_LOST, End.UNKNOWN)
 
 
-@pytest.mark.parametrize("make", [sending, executing, suspect])
+@pytest.mark.parametrize("make", [sending, executing, unconfirmed])
 def test_what_its_node_leaves_is_canceled_where_its_server_is_seen_again(make: Any) -> None:
     life = make()
     life.on(Event.INTERRUPTED)
@@ -953,7 +953,7 @@ def test_a_server_that_dies_after_showing_the_end_leaves_no_question() -> None:
 # Rule 8: the process ends
 
 
-@pytest.mark.parametrize("make", [sending, executing, suspect])
+@pytest.mark.parametrize("make", [sending, executing, unconfirmed])
 def test_a_process_that_ends_says_which_goal_it_cannot_account_for(make: Any) -> None:
     life = make()
     life.on(Event.PROCESS_EXITING)
@@ -1080,10 +1080,8 @@ def test_a_cancel_without_a_deadline_has_an_outcome_when_nobody_waits_any_more()
     assert (life.goal.outcome, life.goal.end) == (Outcome.CANCELED, End.UNKNOWN)
 
 
-def test_a_suspect_that_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_up() -> (
-    None
-):
-    life = suspect()
+def test_what_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_up() -> None:
+    life = unconfirmed()
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     life.pass_time(life.goal.timeouts.accept or 0.0)
     assert life.goal.unconfirmed
@@ -1094,7 +1092,7 @@ def test_a_suspect_that_was_waited_for_in_vain_is_unknown_and_still_canceled_if_
 
 
 def test_what_was_waited_for_in_vain_bars_others_again_when_its_lost_server_is_back() -> None:
-    life = suspect()
+    life = unconfirmed()
     life.on(Event.DRAINED)
     life.on(Event.SERVER_LOST, "gone")
     assert not life.goal.outstanding
@@ -1116,8 +1114,8 @@ def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -
     assert life.goal.blocks(beside, same_server=True)
 
 
-def test_a_suspect_that_is_denied_for_good_need_not_be_waited_for() -> None:
-    life = denied_suspect()
+def test_an_unconfirmed_goal_that_is_denied_for_good_need_not_be_waited_for() -> None:
+    life = denied_unconfirmed()
     assert life.pass_time(DENIED_FOR_GOOD - 2.0) == []
     assert life.goal.unconfirmed
     assert life.pass_time(1.0) == [CANCEL], "asked once more"
@@ -1131,7 +1129,7 @@ def test_a_suspect_that_is_denied_for_good_need_not_be_waited_for() -> None:
 
 
 def test_only_denials_count_towards_denied_for_good() -> None:
-    life = denied_suspect()
+    life = denied_unconfirmed()
     life.pass_time(DENIED_FOR_GOOD)
     assert life.goal.unconfirmed, "silence is no denial"
     denied(life)
@@ -1139,14 +1137,14 @@ def test_only_denials_count_towards_denied_for_good() -> None:
 
 
 def test_a_server_that_refuses_to_cancel_it_has_accepted_it() -> None:
-    life = denied_suspect()
+    life = denied_unconfirmed()
     assert life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED) == [CANCEL, ASK]
     assert life.goal.accepted
     assert life.goal.end is End.UNKNOWN
 
 
 def test_a_server_that_is_back_is_not_asked_for_ever_for_what_it_has_denied_for_good() -> None:
-    life = denied_suspect()
+    life = denied_unconfirmed()
     life.pass_time(DENIED_FOR_GOOD)
     denied(life)
     life.on(Event.SERVER_LOST, "gone")
@@ -1159,10 +1157,8 @@ def test_a_server_that_is_back_is_not_asked_for_ever_for_what_it_has_denied_for_
     assert life.sent == []
 
 
-def test_a_suspect_that_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_good() -> (
-    None
-):
-    life = denied_suspect()
+def test_what_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_good() -> None:
+    life = denied_unconfirmed()
     life.on(Event.DRAINED)
     assert life.goal.end is End.UNKNOWN
     life.pass_time(DENIED_FOR_GOOD)
@@ -1173,7 +1169,7 @@ def test_a_suspect_that_was_given_up_as_unknown_is_accounted_for_once_it_is_deni
 @pytest.mark.parametrize(("away", "counts"), [(0.5, True), (5.0, False)])
 def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> None:
     """Each run of a program has a node of its own; the server is the same."""
-    life = denied_suspect()
+    life = denied_unconfirmed()
     for _ in range(int(DENIED_FOR_GOOD / (away + 1.5)) + 1):
         life.pass_time(1.5)
         denied(life)
@@ -1198,7 +1194,7 @@ def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> No
 def test_denials_count_only_as_long_as_the_server_was_there(
     ways: list[Event], counts: bool
 ) -> None:
-    life = denied_suspect()
+    life = denied_unconfirmed()
     for _ in range(25):
         life.pass_time(1.0)
         denied(life)
@@ -1212,13 +1208,13 @@ def test_denials_count_only_as_long_as_the_server_was_there(
     assert life.goal.unconfirmed is not counts
 
 
-def test_a_suspect_whose_server_is_back_beside_another_is_canceled_again() -> None:
-    life = denied_suspect()
+def test_an_unconfirmed_goal_whose_server_is_back_beside_another_is_canceled_again() -> None:
+    life = denied_unconfirmed()
     assert CANCEL in life.on(Event.SERVER_CHANGED)
 
 
 def test_a_process_that_ends_does_not_say_never_started_of_a_request_without_answer() -> None:
-    life = suspect()
+    life = unconfirmed()
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     life.pass_time(life.goal.timeouts.accept or 0.0)
     life.on(Event.PROCESS_EXITING)

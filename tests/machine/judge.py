@@ -97,7 +97,9 @@ class Judge:
         if event is Event.CANCEL_ANSWERED:
             ledger.denied = detail == CANCEL_UNKNOWN_GOAL
         if goal.end is End.NEVER_STARTED is not before.end and event is None:
-            self._hold(ledger.denied, "a suspect is judged when its server denies it, not sooner")
+            self._hold(
+                ledger.denied, "it is presumed not received when its server denies it, not sooner"
+            )
             ledger.excuse = ledger.excuse or "it was judged never to have started"
         self._commands(handle, before, commands)
         self._outcome(handle, before)

@@ -234,14 +234,14 @@ def test_setup_again_after_shutdown_is_fine(
     "accept",
     [
         pytest.param(5.0, id="in time", marks=pytest.mark.chaos),
-        pytest.param(0.5, id="as a suspect"),
+        pytest.param(0.5, id="unconfirmed"),
     ],
 )
 def test_a_goal_left_behind_by_a_visit_before_is_drained_too(
     host: Host, name: str, node: Any, spin: Any, accept: float
 ) -> None:
     """Interrupted before it is accepted, 2 s late; visited again; shutdown(); accept deadline 5 s
-    ("as a suspect": 0.5 s)"""
+    ("unconfirmed": 0.5 s)"""
     journal = host.open(name, "1:delay_accept=2")
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=accept))
     tree = py_trees.trees.BehaviourTree(leaf)
