@@ -158,6 +158,10 @@ def test_the_machine_knows_no_thread_and_no_clock(name: str) -> None:
     assert not [line for line in imports if re.search(r"\b(time|threading|asyncio|rclpy)\b", line)]
 
 
+def test_what_is_known_of_a_goal_can_be_kept_in_mind() -> None:
+    assert len(vars(Life().goal)) <= 20
+
+
 def test_a_goal_shows_where_it_is() -> None:
     assert repr(sending().goal) == f"<Goal /move {'2a' * 16} SENDING>"
     life = executing()

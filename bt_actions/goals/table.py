@@ -99,6 +99,8 @@ _in(
     INTERRUPTED=canceling.interrupted,
     REPLACED=canceling.replaced,
     SERVER_AMBIGUOUS=canceling.taken_by_two,
+    POLL_DUE=canceling.ask_again,
+    CANCEL_ANSWERED=canceling.cancel_answered,
     DRAINED=canceling.drained,
 )
 _in(
@@ -107,18 +109,14 @@ _in(
     FEEDBACK=running.goes_on,
     STATUS=running.status,
     RESULT_UNKNOWN=running.denied,
-    CANCEL_ANSWERED=canceling.cancel_answered,
     CANCEL_DUE=canceling.cancel_due,
-    POLL_DUE=canceling.ask_again,
 )
 _in(
     *UNANSWERED,
     State.NOT_RECEIVED,
     ACCEPTED=unanswered.turned_up,
     REJECTED=unanswered.rejected,
-    CANCEL_ANSWERED=unanswered.denied,
 )
-_in(*UNANSWERED, POLL_DUE=unanswered.ask_again)
 _in(State.UNWANTED, SEND_FAILED=unsent.send_failed, ACCEPT_DUE=unanswered.accept_due)
 _in(State.UNCONFIRMED, ACCEPT_DUE=unanswered.presume)
 _in(State.PRESUMED_NOT_RECEIVED, CANCEL_ANSWERED=unanswered.denied_again)

@@ -86,9 +86,9 @@ def finished(goal: Facts, detail: Any) -> State:
 
 @leads_to()
 def cancel_answered(goal: Facts, detail: Any) -> State:
-    """Take note of it: what counts is how the goal ends."""
+    """Take note of it: what counts is how the goal ends, or how long it is denied."""
     goal.asking.answered(detail, goal.steady)
-    return State.CANCELING
+    return goal.state
 
 
 @leads_to(State.DONE)
@@ -108,11 +108,11 @@ def cancel_due(goal: Facts, detail: Any) -> State:
 
 @leads_to(State.DONE)
 def ask_again(goal: Facts, detail: Any) -> State:
-    """Ask again, cancel and result; after several questions believe the status."""
+    """Ask again; after several questions for a result believe the status."""
     if goal.lost_result.asked_in_vain():
         return goal.end_by_status()
     goal.ask()
-    return State.CANCELING
+    return goal.state
 
 
 @leads_to(State.DONE)

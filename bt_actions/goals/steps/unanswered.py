@@ -90,13 +90,6 @@ def _denied_for_long(goal: Facts) -> State:
     return State.NOT_RECEIVED
 
 
-@leads_to()
-def denied(goal: Facts, detail: Any) -> State:
-    """Take note of the denial."""
-    goal.asking.answered(detail, goal.steady)
-    return goal.state
-
-
 @leads_to(State.NOT_RECEIVED)
 def denied_again(goal: Facts, detail: Any) -> State:
     """Denied for 30 s, nobody need wait for it any more."""
@@ -117,10 +110,3 @@ def turned_up(goal: Facts, detail: Any) -> State:
     goal.ask()
     goal.commands.append(Command.ASK_RESULT)
     return State.CANCELING
-
-
-@leads_to()
-def ask_again(goal: Facts, detail: Any) -> State:
-    """Ask again."""
-    goal.ask()
-    return goal.state
