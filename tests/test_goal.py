@@ -246,14 +246,6 @@ def test_what_two_servers_may_have_taken_is_no_late_success(why: Event) -> None:
     life.ended(Outcome.CANCELED if canceled else Outcome.SERVER_AMBIGUOUS, End.SUCCEEDED)
 
 
-def test_what_was_replaced_and_is_at_two_servers_ends_as_canceled() -> None:
-    life = executing()
-    life.on(Event.REPLACED)
-    assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL, ASK]
-    life.on(Event.RESULT, ABORTED)
-    life.ended(Outcome.CANCELED, End.ABORTED)
-
-
 def test_what_turns_up_again_is_canceled_and_holds_nothing() -> None:
     """A goal that has ended, and that a second server runs."""
     life = Life()
@@ -326,13 +318,6 @@ def test_accepted_however_late_it_is_canceled() -> None:
     life.ended(Outcome.ACCEPT_TIMEOUT, End.CANCELED)
 
 
-def test_interrupted_and_then_refused() -> None:
-    life = sending()
-    life.on(Event.INTERRUPTED)
-    life.on(Event.REJECTED)
-    life.ended(Outcome.CANCELED, End.NEVER_STARTED)
-
-
 # Rule 3: unconfirmed goals
 
 
@@ -400,14 +385,6 @@ def test_what_comes_twice_changes_nothing() -> None:
     life.on(Event.RESULT, SUCCEEDED)
     life.on(Event.RESULT, ABORTED)
     life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
-
-
-def test_a_refusal_after_acceptance_does_not_end_a_goal_that_is_being_canceled() -> None:
-    life = executing()
-    life.on(Event.INTERRUPTED)
-    life.on(Event.REJECTED)
-    assert life.goal.state is State.CANCELING
-    assert life.goal.holding
 
 
 @pytest.mark.parametrize("event", [Event.FEEDBACK, Event.STATUS])
@@ -546,26 +523,6 @@ def test_who_is_asked_less_often_is_asked_when_somebody_waits_for_the_answer() -
     assert life.on(Event.INTERRUPTED) == []
 
 
-def test_to_interrupt_again_what_is_waited_for_asks_no_more_often() -> None:
-    """As an alarm does at each look, whose node is gone."""
-    life = executing(Timeouts(cancel=60.0))
-    life.on(Event.INTERRUPTED)
-    for _ in range(UNHEARD):
-        life.pass_time(ASK_AGAIN)
-    life.pass_time(2.0)
-    assert life.on(Event.INTERRUPTED) == []
-
-
-def test_a_word_about_a_goal_that_is_done_wakes_nobody() -> None:
-    life = executing(Timeouts(cancel=2.0))
-    life.on(Event.INTERRUPTED)
-    for _ in range(UNHEARD):
-        life.pass_time(ASK_AGAIN)
-    life.on(Event.PROCESS_EXITING)
-    life.on(Event.STATUS, STATUS_CANCELED)
-    assert life.due_in is None
-
-
 def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_server() -> None:
     life = unconfirmed()
     for _ in range(int(DENIED_FOR_GOOD) + 5):
@@ -579,16 +536,6 @@ def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_s
         assert life.pass_time(60.0) == []
         assert (life.goal.end, life.goal.unconfirmed) == (End.NEVER_STARTED, False)
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK], "it came after all"
-
-
-def test_a_server_that_is_back_is_asked_often_again() -> None:
-    life = executing()
-    life.on(Event.INTERRUPTED)
-    for _ in range(UNHEARD):
-        life.pass_time(ASK_AGAIN)
-    life.on(Event.SERVER_LOST, "gone")
-    assert life.on(Event.SERVER_RETURNED) == [CANCEL, ASK]
-    assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
 
 
 # Rule 6: deadlines
@@ -659,13 +606,6 @@ def test_a_jump_back_of_the_clock_leaves_what_remained() -> None:
     assert life.goal.state is State.CANCELING
 
 
-def test_a_jump_back_that_nobody_has_polled_yet_does_not_lengthen_the_wait() -> None:
-    life = executing(Timeouts(result=30.0))
-    life.pass_time(20.0)
-    assert life.goal.due_in(Now(life.now.steady, life.now.ros - 500.0)) == pytest.approx(10.0)
-    assert life.goal.deadline(Now(life.now.steady, 0.0)) == (Event.RESULT_DUE, pytest.approx(10.0))
-
-
 def test_no_deadline_means_none() -> None:
     none = Timeouts(None, None, None, None, None, None)
     for make in (Life, waiting, sending):
@@ -714,17 +654,6 @@ def test_an_end_that_the_status_shows_is_known_when_nobody_waits_any_longer(last
     life.ended(Outcome.CANCELED, End.CANCELED)
 
 
-@pytest.mark.parametrize("last", [Event.CANCEL_DUE, Event.DRAINED])
-def test_a_result_that_nobody_has_asked_for_since_the_status_may_still_come(last: Event) -> None:
-    life = executing()
-    life.on(Event.INTERRUPTED)
-    life.on(Event.STATUS, STATUS_CANCELED)
-    life.on(last)
-    assert (life.goal.state, life.goal.end) == (State.CANCELING, End.UNKNOWN)
-    life.on(Event.RESULT, SUCCEEDED)
-    life.ended(Outcome.CANCELED, End.SUCCEEDED)
-
-
 @pytest.mark.parametrize("asked", ["at that moment", "just before"])
 def test_a_question_for_a_result_has_time_to_be_answered_at_the_end_of_the_wait(asked: str) -> None:
     life = executing(Timeouts(result=3.0, cancel=2.0))
@@ -739,39 +668,6 @@ def test_a_question_for_a_result_has_time_to_be_answered_at_the_end_of_the_wait(
     life.on(Event.RESULT, SUCCEEDED)
     life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
     assert life.goal.late
-
-
-def test_who_owes_a_result_at_the_end_of_the_wait_is_given_one_question_and_no_more() -> None:
-    life = executing(Timeouts(result=3.0, cancel=2.0))
-    life.pass_time(3.0)
-    life.on(Event.STATUS, STATUS_CANCELED)
-    life.pass_time(2.0)
-    life.pass_time(ASK_AGAIN)
-    life.ended(Outcome.RESULT_TIMEOUT, End.CANCELED)
-
-
-def test_what_was_held_for_a_server_out_of_sight_does_not_hold_up_its_answer() -> None:
-    life = waiting()
-    life.goal.hold(4.0, life.now)
-    life.on(Event.SERVER_READY)
-    assert life.goal.deadline(life.now) == (Event.ACCEPT_DUE, LIMITS.accept)
-
-
-def test_what_was_held_takes_effect_in_the_order_in_which_it_fell_due() -> None:
-    life = executing(Timeouts(result=3.0, feedback=2.0))
-    life.now = Now(life.now.steady + 4.0, life.now.ros + 4.0)
-    life.goal.hold(1.0, life.now)
-    assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, 1.0)
-    life.pass_time(1.0)
-    life.on(Event.RESULT, ABORTED)
-    life.ended(Outcome.STALLED, End.ABORTED)
-
-
-def test_a_replaced_goal_that_is_interrupted_has_the_deadline_of_its_own_cancel() -> None:
-    life = executing(Timeouts(cancel=None))
-    life.on(Event.REPLACED, "/move")
-    life.on(Event.INTERRUPTED)
-    assert life.goal.deadline(life.now) is None
 
 
 def test_a_paused_tree_stops_the_deadlines_of_what_was_not_sent() -> None:
@@ -809,13 +705,6 @@ def test_feedback_of_a_goal_given_up_as_lost_shows_that_it_runs() -> None:
     life.on(Event.SERVER_LOST, "gone")
     assert life.on(Event.FEEDBACK, "moving") == [CANCEL, ASK]
     assert life.goal.end is End.UNKNOWN
-
-
-def test_a_status_of_a_goal_given_up_as_lost_shows_that_it_runs() -> None:
-    life = executing()
-    life.on(Event.SERVER_LOST, "restarted")
-    assert life.on(Event.STATUS, 2) == [CANCEL, ASK]
-    assert (life.goal.lost, life.goal.end) == (False, End.UNKNOWN)
 
 
 def test_a_goal_lost_before_its_acceptance_is_judged_when_the_server_is_back() -> None:
@@ -1028,13 +917,6 @@ def test_what_was_replaced_on_another_server_is_canceled_at_once(already: bool) 
     life.ended(Outcome.CANCELED, End.CANCELED)
 
 
-def test_being_replaced_again_gives_no_more_time() -> None:
-    life = replaced()
-    life.pass_time(3.0)
-    life.on(Event.REPLACED)
-    assert life.due_in == 1.0
-
-
 @pytest.mark.parametrize("how", ["feedback then silence", "lost", "denied", "result lost"])
 def test_what_was_replaced_never_has_an_outcome_that_is_retried(how: str) -> None:
     life = replaced()
@@ -1068,14 +950,6 @@ def test_replaced_before_acceptance_it_is_canceled_when_it_turns_up() -> None:
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
 
 
-def test_replaced_after_a_deadline_it_is_not_tried_again() -> None:
-    life = executing()
-    life.pass_time(2.0)
-    life.on(Event.REPLACED)
-    life.on(Event.RESULT, CANCELED)
-    life.ended(Outcome.CANCELED, End.CANCELED)
-
-
 def test_a_cancel_without_a_deadline_has_an_outcome_when_nobody_waits_any_more() -> None:
     life = executing(Timeouts(cancel=None))
     life.on(Event.INTERRUPTED)
@@ -1093,15 +967,6 @@ def test_what_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_u
     assert (life.goal.outcome, life.goal.end) == (Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
     assert not life.goal.outstanding, "the server may get other goals"
     assert Command.CANCEL in life.on(Event.ACCEPTED)
-
-
-def test_what_was_waited_for_in_vain_bars_others_again_when_its_lost_server_is_back() -> None:
-    life = unconfirmed()
-    life.on(Event.DRAINED)
-    life.on(Event.SERVER_LOST, "gone")
-    assert not life.goal.outstanding
-    assert life.on(Event.SERVER_RETURNED) == [CANCEL]
-    assert life.goal.outstanding, "the server may have it after all, and can be asked now"
 
 
 def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -> None:
@@ -1147,20 +1012,6 @@ def test_a_server_that_refuses_to_cancel_it_has_accepted_it() -> None:
     assert life.goal.end is End.UNKNOWN
 
 
-def test_a_server_that_is_back_is_not_asked_for_ever_for_what_it_has_denied_for_good() -> None:
-    life = denied_unconfirmed()
-    life.pass_time(DENIED_FOR_GOOD)
-    denied(life)
-    life.on(Event.SERVER_LOST, "gone")
-    life.on(Event.SERVER_RETURNED)
-    for _ in range(60):
-        life.pass_time(1.0)
-        life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
-    life.sent.clear()
-    life.pass_time(60.0)
-    assert life.sent == []
-
-
 def test_what_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_good() -> None:
     life = denied_unconfirmed()
     life.on(Event.DRAINED)
@@ -1183,32 +1034,6 @@ def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> No
     denied(life)
     life.pass_time(2 * (life.goal.timeouts.accept or 0.0))
     denied(life)
-    assert life.goal.unconfirmed is not counts
-
-
-@pytest.mark.parametrize(
-    ("ways", "counts"),
-    [
-        ([Event.NODE_CLOSED], True),
-        ([Event.SERVER_LOST], False),
-        ([Event.NODE_CLOSED, Event.SERVER_LOST], False),
-    ],
-    ids=["left", "lost", "left, and then out of sight"],
-)
-def test_denials_count_only_as_long_as_the_server_was_there(
-    ways: list[Event], counts: bool
-) -> None:
-    life = denied_unconfirmed()
-    for _ in range(25):
-        life.pass_time(1.0)
-        denied(life)
-    for way in ways:
-        life.on(way)
-    life.pass_time(0.5)
-    life.on(Event.SERVER_RETURNED)
-    for _ in range(8):
-        life.pass_time(1.0)
-        denied(life)
     assert life.goal.unconfirmed is not counts
 
 

@@ -164,15 +164,6 @@ def test_a_card_shows_the_types_of_an_action_with_fields_and_constants(tree: Pat
     assert tables["MoveRobot.Feedback"]["STATUS_MOVING"].startswith("= ")
 
 
-def test_a_message_in_a_message_is_shown_with_its_fields_and_within_bounds() -> None:
-    leaf = ActionBehaviour("Look", "test_msgs/action/NestedMessage", "look", {})
-    data = _Reader(page(leaf)).data
-    goal = next(lines for title, lines in data["tables"] if title == "NestedMessage.Goal")
-    assert ["nested_different_pkg", "Time", 0] in goal
-    assert ["sec", "int32", 1] in goal
-    assert all(len(lines) <= 61 for _, lines in data["tables"])
-
-
 def test_the_root_and_a_subtree_show_their_inputs_and_outputs(tree: Path) -> None:
     outer = tree.with_name("outer.yaml")
     inside = "{subtree: fetch.yaml, name: In, with: {at: 1.0}}"
@@ -184,20 +175,6 @@ def test_the_root_and_a_subtree_show_their_inputs_and_outputs(tree: Path) -> Non
     inner = card(page(load_tree(outer)), "To the part")
     assert inner.yaml.startswith("move: To the part")
     assert inner.place.startswith(str(tree))
-
-
-def test_services_and_messages_show_their_types(tmp_path: Path) -> None:
-    (path := tmp_path / "t.yaml").write_text(
-        "tree: t\nroot:\n  sequence: S\n  children:\n"
-        "    - {service: Ask, type: std_srvs/srv/SetBool, server: ask, request: {data: true}}\n"
-        "    - {publish: say, type: std_msgs/msg/String, message: {data: x}}\n"
-        "    - {wait_for_message: Hear, topic: say, type: std_msgs/msg/String}\n"
-    )
-    text = page(load_tree(path))
-    assert card(text, "Ask").tables["SetBool.Request"] == {"data": "bool"}
-    assert card(text, "Ask").tables["Retry"] == {"attempts": "1: not tried again"}
-    assert card(text, "publish say").tables == {"String": {"data": "string"}}
-    assert card(text, "Hear").tables == {"String": {"data": "string"}}
 
 
 def test_a_tree_made_in_python_shows_what_there_is() -> None:
@@ -229,11 +206,6 @@ def test_a_type_that_cannot_be_read_is_said_and_the_rest_is_shown(name: str) -> 
     tables = card(page(ActionBehaviour("a", name, "server", {})), "a").tables
     assert tables["Action"]["type"] == name
     assert list(tables["Type"]) == ["cannot be read here"]
-
-
-def test_a_part_of_a_loaded_tree_shows_its_lines_too(tree: Path) -> None:
-    part = load_tree(tree).children[0]
-    assert card(page(part), "To the part").yaml.startswith("move: To the part")
 
 
 def test_a_value_of_any_length_is_cut(tmp_path: Path) -> None:
@@ -355,12 +327,6 @@ def test_a_large_tree_starts_folded_where_it_can_be_taken_in(
             parent.add_children(nodes)
         level = [node for nodes in below for node in nodes]
     assert open_depth(list(rows(root)), 40) == depth
-
-
-def test_a_page_has_all_levels_and_starts_folded_to_those_that_are_wanted(tree: Path) -> None:
-    whole, folded = (_Reader(page(load_tree(tree), depth=depth)).data for depth in (None, 1))
-    assert folded["nodes"] == whole["nodes"]
-    assert folded["open"] == 1 != whole["open"]
 
 
 @pytest.mark.parametrize(("direction", "down"), [(None, True), ("down", True), ("right", False)])

@@ -121,14 +121,6 @@ def test_who_answers_is_alone_only_where_a_later_probe_shows_it(watch: ServerWat
     assert not watch.alone_since(9.9 + SETTLED_AFTER, denied_at)
 
 
-def test_who_was_asked_before_another_came_is_not_alone_by_that(watch: ServerWatch) -> None:
-    watch.probe_sent(0.9, 2)
-    crowd(watch).probe_answered(1.1, 2)
-    for moment in (1.2, 1.2 + SLOWEST_START):
-        watch.observe(moment, True, gids(OLD, NEW))
-    assert watch.state(1.2 + SLOWEST_START) is Server.SETTLING
-
-
 def test_what_is_shown_beyond_the_lease_is_a_server(watch: ServerWatch) -> None:
     assert settle(watch).state(1.0 + LEASE + 0.1) is Server.AMBIGUOUS
 
@@ -138,20 +130,6 @@ def test_when_the_ghost_is_gone_there_is_one_again(watch: ServerWatch) -> None:
     assert watch.state(20.0) is Server.READY
     assert not watch.alone
     assert not watch.wants_probe(20.0)
-
-
-def test_a_third_one_opens_the_question_again(watch: ServerWatch) -> None:
-    settle(watch).observe(10.0, True, gids(OLD, NEW, THIRD))
-    assert watch.state(10.0) is Server.SETTLING
-
-
-def test_of_three_two_remain_and_the_question_is_open_again(watch: ServerWatch) -> None:
-    watch.observe(1.0, True, gids(OLD, NEW, THIRD))
-    watch.probe_answered(1.1, 1)
-    watch.probe_answered(1.1, 1)
-    assert watch.state(1.1) is Server.AMBIGUOUS
-    watch.observe(2.0, True, gids(NEW, THIRD))
-    assert watch.state(2.0) is Server.SETTLING
 
 
 def test_it_is_probed_now_and_then_while_the_question_is_open(watch: ServerWatch) -> None:
@@ -165,21 +143,6 @@ def test_where_two_have_answered_it_is_not_probed_any_more(watch: ServerWatch) -
     crowd(watch).probe_answered(1.1, 1)
     watch.probe_answered(1.1, 1)
     assert not watch.wants_probe(9.0)
-
-
-def test_a_long_crowd_leaves_no_growing_heap_of_answers(watch: ServerWatch) -> None:
-    crowd(watch)
-    for probe in range(1_000):
-        now = 1.0 + PROBE_EVERY * probe
-        watch.probe_answered(now, probe)
-        watch.observe(now, True, gids(OLD, NEW))
-    assert len(watch._answers) < 50
-
-
-def test_answers_from_before_the_crowd_are_not_counted(watch: ServerWatch) -> None:
-    watch.probe_answered(0.5, 1)
-    crowd(watch).observe(3.0, True, gids(OLD, NEW))
-    assert watch.state(3.0) is Server.SETTLING
 
 
 def test_it_is_gone_when_nobody_a_goal_was_sent_to_is_shown(watch: ServerWatch) -> None:
@@ -277,64 +240,8 @@ def test_a_ghost_that_a_standstill_has_hidden_has_a_moment_to_go(watch: ServerWa
     assert watch.state(late + SETTLED_AFTER) is Server.AMBIGUOUS
 
 
-def test_answers_of_those_that_are_gone_are_not_counted_for_newcomers(watch: ServerWatch) -> None:
-    watch.observe(1.0, True, gids(OLD, NEW, THIRD))
-    watch.two_answered(3)
-    watch.observe(2.0, True, gids(OLD, NEW, b"fourth"))
-    watch.two_answered(2)
-    assert not watch.all_live(2.0)
-    watch.two_answered(3)
-    watch.two_answered(2)
-    assert watch.all_live(2.0), "the most that answered one question"
-
-
-def test_an_answer_to_one_crowd_is_no_second_one_in_another(watch: ServerWatch) -> None:
-    crowd(watch).probe_answered(1.1, 1)
-    watch.observe(2.0, True, gids(OLD, THIRD))
-    watch.probe_answered(2.1, 1)
-    assert watch.state(2.1) is Server.SETTLING
-
-
-def test_a_third_one_has_its_own_time_to_answer(watch: ServerWatch) -> None:
-    settle(watch).observe(10.0, True, gids(OLD, NEW, THIRD))
-    watch.probe_sent(10.0, 2)
-    watch.probe_answered(10.1, 2)
-    watch.observe(10.2 + SETTLED_AFTER, True, gids(OLD, NEW, THIRD))
-    assert watch.state(10.2 + SETTLED_AFTER) is Server.SETTLING
-
-
-def test_where_two_have_answered_one_is_not_alone_by_a_later_silence(watch: ServerWatch) -> None:
-    settle(watch).probe_answered(5.0, 1)
-    assert not watch.alone
-    watch.probe_sent(5.5, 2)
-    watch.probe_answered(5.6, 2)
-    watch.observe(9.0, True, gids(OLD, NEW))
-    assert not watch.alone
-
-
-def test_three_answers_to_one_probe_are_all_three(watch: ServerWatch) -> None:
-    watch.observe(1.0, True, gids(OLD, NEW, THIRD))
-    watch.probe_sent(1.0, 1)
-    for _ in range(3):
-        watch.probe_answered(1.1, 1)
-    assert watch.all_live(1.2)
-
-
 def test_who_is_not_ready_is_not_alone(watch: ServerWatch) -> None:
     settle(watch).probe_sent(5.0, 2)
     watch.probe_answered(5.0, 2)
     watch.observe(7.0, False, gids(OLD, NEW))
     assert not watch.alone_since(7.0, 4.9)
-
-
-def test_nobody_is_asked_where_nobody_is_shown(watch: ServerWatch) -> None:
-    watch.observe(1.0, False, gids())
-    assert not watch.wants_probe(1.0, runs=True)
-
-
-def test_a_crowd_is_as_old_as_its_newest_member(watch: ServerWatch) -> None:
-    assert watch.crowded_for(1.0) == 0.0
-    crowd(watch)
-    assert watch.crowded_for(1.5) == 0.5
-    watch.observe(2.0, True, gids(OLD, NEW, THIRD))
-    assert watch.crowded_for(2.5) == 0.5

@@ -274,44 +274,6 @@ def test_who_gives_feedback_lives_whoever_denies_the_goal(
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_CHANGED]
 
 
-def test_all_three_in_sight_have_to_tell(said: replies.Replies, watch: ServerWatch) -> None:
-    watch.observe(0.0, True, BOTH | {b"third"})
-    said.sent(watch)
-    said.answered(watch, 0.1, [True, True, True])
-    assert said.finished(watch, 0.3, 0.2, [ABORTED, ABORTED]) == []
-    assert said.finished(watch, 0.3, 0.2, [ABORTED, ABORTED, ABORTED]) == [(Event.RESULT, ABORTED)]
-    assert said.canceled(watch, 0.2, 0.2, [DENIED, DENIED]) == [], "the third runs it"
-    assert said.finished(watch, 0.3, 0.2, [UNKNOWN, UNKNOWN]) == []
-    watch.observe(1.0, True, BOTH)
-    assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED]
-    assert said.finished(watch, 1.2, 1.1, [ABORTED, ABORTED]) == [(Event.RESULT, ABORTED)]
-
-
-def test_it_is_refused_when_all_that_it_was_sent_to_have_refused_it(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    watch.observe(0.0, True, BOTH | {b"third"})
-    said.sent(watch)
-    assert said.answered(watch, 0.1, [False]) == []
-    assert said.answered(watch, 0.1, [False, False]) == []
-    assert said.answered(watch, 0.1, [False] * 3) == [(Event.REJECTED, None)]
-    assert said.answered(watch, 0.1, [False, False]) == []
-    watch.observe(1.0, True, BOTH)
-    assert events(said.looked(watch, 1.0)) == [Event.SERVER_AMBIGUOUS], "who has gone may have it"
-
-
-def test_who_is_back_is_asked_and_what_was_asked_before_is_not_all(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    watch.observe(1.0, True, frozenset({ONE}))
-    said.looked(watch, 1.0)
-    watch.observe(2.0, True, BOTH)
-    assert said.finished(watch, 2.1, 1.5, [ABORTED]) == []
-    assert events(said.looked(watch, 2.2)) == [Event.SERVER_CHANGED]
-    assert said.finished(watch, 2.4, 2.3, [ABORTED]) == []
-    assert said.finished(watch, 2.4, 2.3, [ABORTED, ABORTED])[-1] == (Event.RESULT, ABORTED)
-
-
 @pytest.mark.parametrize(
     ("word", "told"),
     [
@@ -329,14 +291,6 @@ def test_what_comes_when_one_has_just_left_may_be_its_word(
     assert events(word(said, watch)) == told
 
 
-def test_one_in_place_of_the_other_is_a_change(said: replies.Replies, watch: ServerWatch) -> None:
-    watch.observe(1.0, True, frozenset({ONE}))
-    said.looked(watch, 1.0)
-    watch.observe(2.0, True, frozenset({OTHER}))
-    assert said.finished(watch, 2.1, 1.5, [ABORTED]) == [], "by the one that has gone"
-    assert events(said.looked(watch, 2.2)) == [Event.SERVER_CHANGED]
-
-
 def test_a_newcomer_is_not_one_that_is_back(watch: ServerWatch) -> None:
     said = sent(watch)
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
@@ -345,26 +299,6 @@ def test_a_newcomer_is_not_one_that_is_back(watch: ServerWatch) -> None:
     assert said.finished(watch, 1.0, 0.5, [UNKNOWN]) == []
     watch.observe(1.1, True, frozenset({OTHER}))
     assert events(said.looked(watch, 1.1)) == [Event.SERVER_LOST]
-
-
-def test_what_was_said_before_a_loss_is_of_no_account_after_it(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == []
-    watch.observe(1.0, False, frozenset())
-    said._goal.on(*said.looked(watch, 1.0)[0][:1], Now(1.0, 1.0), "gone")
-    watch.observe(2.0, True, frozenset({OTHER}))
-    assert events(said.looked(watch, 2.0)) == [Event.SERVER_RETURNED]
-    said._goal.on(Event.SERVER_RETURNED, Now(2.0, 2.0))
-    assert said.looked(watch, 2.1) == [], "and not the end that the other told"
-
-
-def test_an_acceptance_that_follows_a_status_may_be_the_others(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    said._goal.on(Event.STATUS, Now(0.0, 0.0), 2)
-    assert events(said.answered(watch, 1.0, [True])) == [Event.SERVER_CHANGED]
-    assert said.finished(watch, 1.1, 0.5, [UNKNOWN, ABORTED]) == [], "asked before it accepted"
 
 
 def told(said: replies.Replies, what: replies.Told, now: float) -> list[Event]:
@@ -449,11 +383,6 @@ def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -
     assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"
 
 
-def test_what_both_deny_neither_has(watch: ServerWatch) -> None:
-    said = beside_a_newcomer(watch)
-    assert said.canceled(watch, 0.2, 0.1, [DENIED, DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
-
-
 def test_where_one_says_that_it_runs_it_has_not_ended(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
@@ -471,86 +400,3 @@ def test_two_that_accepted_it_both_have_to_tell_also_where_one_came_later(
     assert told(said, said.answered(watch, 0.6, [True, True]), 0.6) == [Event.SERVER_AMBIGUOUS]
     assert said.sent_to == BOTH
     assert said.finished(watch, 0.8, 0.7, [CANCELED_END]) == []
-
-
-def test_a_request_went_to_all_that_were_shown_before_and_after(watch: ServerWatch) -> None:
-    watch.observe(0.0, True, BOTH)
-    said = sent(watch)
-    watch.observe(0.1, True, frozenset({ONE}))
-    said.sent(watch)
-    assert said.sent_to == BOTH
-
-
-def test_who_refused_does_not_matter_where_the_other_has_accepted(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    said.answered(watch, 0.0, [False])
-    told(said, said.answered(watch, 0.0, [False, True]), 0.0)
-    watch.observe(1.0, True, frozenset({ONE}))
-    assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED]
-
-
-def test_where_one_was_asked_its_acceptance_may_follow_its_status(watch: ServerWatch) -> None:
-    said = sent(watch)
-    told(said, [(Event.STATUS, 2)], 0.0)
-    assert events(said.answered(watch, 0.1, [True])) == [Event.ACCEPTED]
-
-
-def test_a_success_counts_most(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED, ABORTED])[-1] == (Event.RESULT, SUCCEEDED)
-
-
-def test_a_denial_counts_from_the_first(watch: ServerWatch) -> None:
-    said = beside_a_newcomer(watch)
-    told(said, said.answered(watch, 0.0, [True]), 0.0)
-    for now in (0.0, 3.5):
-        said.finished(watch, now, now, [UNKNOWN])
-    assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
-
-
-def test_that_there_are_two_is_told_once(said: replies.Replies, watch: ServerWatch) -> None:
-    watch.two_answered()
-    assert events(said.looked(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
-    assert said.looked(watch, 0.2) == []
-
-
-def test_a_newcomer_that_lives_beside_it_is_not_asked_about(watch: ServerWatch) -> None:
-    said = sent(watch)
-    told(said, said.answered(watch, 0.0, [True]), 0.0)
-    watch.observe(1.0, True, BOTH)
-    watch.two_answered()
-    assert said.looked(watch, 2.0) == []
-
-
-def test_one_of_three_that_was_away_between_two_looks_was_away(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    third = BOTH | {b"third"}
-    watch.observe(0.0, True, third)
-    said.sent(watch)
-    said.answered(watch, 0.1, [False])
-    for now, shown in ((1.0, BOTH), (1.1, third)):
-        watch.observe(now, True, shown)
-        said.shown(watch, now, 2)
-    assert events(said.looked(watch, 1.2)) == [Event.SERVER_AMBIGUOUS]
-
-
-def test_a_refusal_of_one_that_has_gone_is_told_as_no_end_ever(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    said.answered(watch, 0.0, [False])
-    watch.observe(1.0, True, frozenset({ONE}))
-    assert told(said, said.looked(watch, 1.0), 1.0) == [Event.SERVER_AMBIGUOUS]
-    assert said.looked(watch, 1.2) == []
-
-
-def test_what_was_asked_before_a_server_was_lost_is_not_its_word_when_it_is_back(
-    watch: ServerWatch,
-) -> None:
-    said = sent(watch)
-    told(said, said.answered(watch, 0.0, [True]), 0.0)
-    watch.observe(1.0, True, frozenset())
-    assert told(said, said.looked(watch, 1.0), 1.0) == [Event.SERVER_LOST]
-    watch.observe(2.0, True, frozenset({ONE}))
-    assert told(said, said.looked(watch, 2.0), 2.0) == [Event.SERVER_RETURNED]
-    assert said.finished(watch, 2.1, 0.5, [UNKNOWN]) == []

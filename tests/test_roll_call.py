@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import pytest
-
 from bt_actions.recovery.roll_call import (
     ASK_AGAIN,
-    LATE,
-    QUESTIONS,
     SETTLE,
     SETTLE_AFTER_SILENCE,
-    SILENT,
     Denial,
     RollCall,
 )
@@ -138,19 +133,6 @@ def test_one_that_comes_newly_begins_anew() -> None:
     assert roll.known
 
 
-@pytest.mark.parametrize("late", [LATE + 0.1, 60.0])
-def test_a_question_that_was_late_begins_anew(late: float) -> None:
-    """We stood still, or the server did: nobody can tell."""
-    roll = Roll()
-    roll.shows(A)
-    for _ in range(int(SETTLE / ASK_AGAIN)):
-        roll.ask(1)
-    roll.ask(1, after=late)
-    assert not roll.known
-    roll.settle()
-    assert roll.known
-
-
 def test_a_status_without_a_server_has_to_be_answered_for_too() -> None:
     roll = Roll()
     roll.sees(frozenset(), roll.now)
@@ -199,68 +181,9 @@ def test_a_goal_is_denied_for_good_after_a_long_row_of_denials() -> None:
     assert goal.lasted >= LONG
 
 
-@pytest.mark.parametrize("broken", ["silent", "another", "anew"])
-def test_denials_count_anew(broken: str) -> None:
-    goal = Denied()
-    goal.ask(1, A, times=LONG)
-    if broken == "silent":
-        goal.ask(0, A, times=int(SILENT / ASK_AGAIN))
-    elif broken == "another":
-        goal.ask(2, A, B)
-    else:
-        goal.begin()
-    goal.ask(1, A, times=LONG)
-    assert goal.lasted < LONG
-    goal.ask(1, A)
-    assert goal.lasted >= LONG
-
-
-def test_time_without_an_answer_hardly_counts() -> None:
-    """The server may have been stopped meanwhile, and have decided nothing."""
-    goal = Denied()
-    goal.ask(1, A, times=LONG - 5)
-    goal.ask(0, A, times=5)
-    goal.ask(1, A, times=4)
-    assert goal.lasted < LONG
-
-
-def test_an_answer_may_be_late() -> None:
-    """On a link that loses messages, by some seconds."""
-    goal = Denied()
-    waiting: list[int] = []
-    for _ in range(LONG + 1):
-        waiting.append(goal.question(A))
-        if len(waiting) > 4:
-            goal.denied(waiting.pop(0))
-    assert goal.lasted < LONG
-    for number in waiting:
-        goal.denied(number)
-    assert goal.lasted >= LONG
-
-
-def test_answers_that_overtake_each_other_count_once() -> None:
-    goal = Denied()
-    numbers = [goal.question(A) for _ in range(3)]
-    goal.denied(numbers[2])
-    goal.denied(numbers[0])
-    goal.denied(numbers[1])
-    goal.ask(1, A, times=LONG - 1)
-    assert goal.lasted < LONG
-
-
 def test_each_of_two_servers_has_to_deny_it() -> None:
     goal = Denied()
     goal.ask(1, A, B, times=LONG + 2)
     assert goal.lasted < LONG
     goal.ask(2, A, B, times=LONG + 1)
     assert goal.lasted >= LONG
-
-
-def test_an_answer_to_a_question_that_is_forgotten_denies_nothing() -> None:
-    goal = Denied()
-    first = goal.question(A)
-    for _ in range(QUESTIONS):
-        goal.question(A)
-    goal.denied(first)
-    goal.ask(1, A, times=LONG)
-    assert goal.lasted < LONG

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import gc
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
-import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -24,12 +20,11 @@ from rclpy.executors import SingleThreadedExecutor
 
 from bt_actions import End, MoveRobot, Outcome, TreeError, TreeRunner
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
-from bt_actions.ros import log as log_module
 from bt_actions.ros import spinning
 from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
 from tests.support.trees import Gate, Raises, in_sequence, state, together
-from tests.support.waiting import holds_for, until
+from tests.support.waiting import until
 
 
 @pytest.fixture
@@ -331,21 +326,6 @@ class TestStuckInATick:
         told = "together/Look/Stuck does not return from its tick"
         until(lambda: told in capfd.readouterr().err)
 
-    def test_nothing_is_sent_in_the_rest_of_the_tick(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        leaf = MoveRobot("m", 30.0, action_name=name)
-        stuck = Stuck(lambda: state(leaf) == "EXECUTING")
-        other = MoveRobot("other", 0.1, action_name=name)
-        with TreeRunner(together(leaf, in_sequence(stuck, other)), node=node) as runner:
-            runner.start()
-            assert stuck.entered.wait(9.0)
-            runner.interrupt()
-            until(lambda: journal.ends() == ["canceled"], 9.0)
-            stuck.may_return.set()
-            assert runner.wait(9.0) is Status.INVALID
-        assert journal.count("received") == 1
-
 
 class TestInterrupt:
     def test_drains_and_returns_invalid(
@@ -455,41 +435,6 @@ class TestStart:
         thread.join(1.0)
         assert returned == [Status.INVALID]
 
-    def test_a_behaviour_that_raises_in_shutdown_keeps_no_client_alive(
-        self,
-        name: str,
-        node: Any,
-        capfd: pytest.CaptureFixture[str],
-        monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
-        monkeypatch.setattr(log_module, "_has_room", lambda _: not time.sleep(0.2))  # a slow reader
-        leaf = MoveRobot("m", 9.0, action_name=name)
-        runner = TreeRunner(in_sequence(Raises("culprit", "shutdown"), leaf), node=node)
-        runner.interrupt()
-        runner.run()
-        assert leaf.server.startswith("/")
-        runner.shutdown()
-        with pytest.raises(RuntimeError, match="not set up"):
-            leaf.initialise()
-        assert "on purpose in shutdown" in capfd.readouterr().err
-
-    def test_a_shutdown_that_was_interrupted_leaves_nothing_spinning(self, name: str) -> None:
-        class Leaves(py_trees.behaviours.Success):
-            def shutdown(self) -> None:
-                raise KeyboardInterrupt
-
-        runner = TreeRunner(in_sequence(MoveRobot("m", 9.0, action_name=name), Leaves("leaves")))
-        runner.interrupt()
-        runner.run()
-        spin = runner._spinner._thread
-        assert spin is not None
-        with pytest.raises(KeyboardInterrupt):
-            runner.shutdown()
-        assert not spin.is_alive()
-        with pytest.raises(RuntimeError, match="has been shut down"):
-            runner.run()
-        runner.shutdown()
-
     @pytest.mark.parametrize("last", [GoalChanged, TreeFinished])
     def test_shutdown_by_an_observer_is_refused(
         self, journal: Journal, name: str, node: Any, last: type[Event]
@@ -516,22 +461,6 @@ class TestStart:
             runner.start()
             until(lambda: state(leaf) == "EXECUTING")
         assert journal.ends() == ["canceled"]
-
-
-class TestPause:
-    def test_no_new_goal_starts_and_running_ones_finish(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        first, second = (MoveRobot(n, 0.3, action_name=name) for n in ("first", "second"))
-        with TreeRunner(in_sequence(first, second), node=node) as runner:
-            runner.start()
-            until(lambda: state(first) == "EXECUTING")
-            runner.pause()
-            journal.wait_for("succeeded")
-            assert holds_for(lambda: journal.count("received") == 1, 0.3)
-            runner.resume()
-            assert runner.wait(5.0) is Status.SUCCESS
-        assert journal.count("succeeded") == 2
 
 
 class TestWhoSpins:
@@ -733,53 +662,6 @@ class TestWhoSpins:
         assert done.is_set()
         executor.shutdown()
 
-    def test_a_users_node_and_its_subscriptions_stay_usable(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        from std_msgs.msg import String
-
-        heard: list[str] = []
-        topic = f"{name}_said"
-        subscription = node.create_subscription(String, topic, lambda m: heard.append(m.data), 10)
-        publisher = node.create_publisher(String, topic, 10)
-        for _ in range(2):
-            with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
-                assert runner.run(timeout=9.0) is Status.SUCCESS
-        with spun(node):
-            until(lambda: heard, meanwhile=lambda: publisher.publish(String(data="hello")))
-        node.destroy_subscription(subscription)
-        node.destroy_publisher(publisher)
-
-
-def test_progress_may_be_read_by_any_thread(host: Host, name: str, node: Any) -> None:
-    """As a live view does, while goals come and go."""
-    host.open(name, "50%:abort")
-    leaf = MoveRobot("m", 0.0, action_name=name, timeout=5.0, retry=5)
-    errors: list[Exception] = []
-    over = threading.Event()
-
-    def look() -> None:
-        while not over.is_set():
-            try:
-                leaf.progress()
-                assert leaf.attempt >= 0
-                assert leaf.reason is not None
-            except Exception as error:  # noqa: BLE001 - whatever it is
-                errors.append(error)
-
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-    looking = threading.Thread(target=look)
-    looking.start()
-    with TreeRunner(leaf, node=node) as runner:
-        for _ in range(10):
-            runner.run(timeout=9.0)
-    over.set()
-    looking.join()
-    sys.setswitchinterval(before)
-    host.close_server(name)
-    assert errors == []
-
 
 class TestEvents:
     def test_come_in_order(self, journal: Journal, name: str, node: Any) -> None:
@@ -833,24 +715,6 @@ class TestEvents:
             assert {e.behaviour for e in events if isinstance(e, GoalChanged)} == {leaf}
         assert journal.max_live == 1
 
-    def test_a_runner_that_rests_keeps_nothing_of_others(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        rests = MoveRobot("rests", 0.1, action_name=name)
-        with spun(node), TreeRunner(rests, node=node) as resting:
-            leaf = MoveRobot("m", 0.1, action_name=name)
-            with TreeRunner(leaf, node=node) as runner:
-                assert runner.run(timeout=9.0) is Status.SUCCESS
-            goal = weakref.ref(leaf.history[0].goal)
-            del leaf, runner
-
-            def is_gone() -> bool:
-                gc.collect()
-                return goal() is None
-
-            until(is_gone, what="no thread has the goal in hand any more")
-            assert resting.run(timeout=9.0) is Status.SUCCESS
-
 
 class TestWhoWaits:
     def test_a_wait_ends_when_another_thread_shuts_down(
@@ -869,83 +733,6 @@ class TestWhoWaits:
         threading.Thread(target=shut_down).start()
         assert runner.wait(9.0) is Status.INVALID
         assert journal.ends() == ["canceled"]
-
-    @pytest.mark.chaos
-    def test_standard_error_that_nobody_reads_holds_up_nothing(
-        self, host: Host, name: str, domain: int
-    ) -> None:
-        """In a program of the user's own, with a full pipe for standard error.
-
-        What is logged there: by a leaf, of an observer and of a leaf that raise, of a goal.
-        """
-        program = f"""
-from py_trees.behaviours import Success
-from py_trees.composites import Sequence
-from bt_actions import MoveRobot, Timeouts, TreeRunner
-from bt_actions.behaviours.doing import Log
-
-class Rude(Success):
-    def shutdown(self):
-        raise RuntimeError("rude")
-
-def observer(event):
-    raise RuntimeError("rude")
-
-leaf = MoveRobot("m", 9.0, action_name={name!r}, timeout=Timeouts(result=0.2, cancel=0.3))
-root = Sequence("root", True, [Log("log", lambda: "a line"), Rude("rude"), leaf])
-with TreeRunner(root) as runner:
-    runner.observe(observer)
-    print(runner.run(timeout=20.0), runner.unaccounted[0].name, flush=True)
-"""
-        host.open(name, "1:reject_cancel")
-        read, write = os.pipe()
-        os.set_blocking(write, False)
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                os.write(write, b"x" * 4096)
-        os.set_blocking(write, True)
-        command = [sys.executable, "-c", program]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=write, text=True) as run:
-            said, _ = run.communicate(timeout=60.0)
-        os.close(read)
-        os.close(write)
-        assert said == "Status.FAILURE m\n"
-        host.cancel_all(name)
-        host.close_server(name)
-
-    def test_a_callback_that_does_not_return_is_told_of(
-        self, executor: str, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """Of a node that was added to the runner's executor; shutdown() waits for it."""
-        from rclpy.node import Node
-
-        from bt_actions.ros.log import log
-
-        entered, goes_on, told = threading.Event(), threading.Event(), threading.Event()
-
-        class Written:
-            def warning(self, _: str, text: str) -> None:
-                if "has not returned" in text:
-                    told.set()
-
-        def blocks() -> None:
-            entered.set()
-            goes_on.wait(60.0)
-
-        monkeypatch.setattr(log, "_logger", Written())
-        runner = TreeRunner(Gate(), executor=executor)
-        guest = Node("guest", context=runner.node.context)
-        guest.create_timer(0.01, blocks)
-        runner.executor.add_node(guest)
-        runner.on_close(guest.destroy_node)
-        runner.start()
-        assert entered.wait(20.0)
-        closing = threading.Thread(target=runner.shutdown)
-        closing.start()
-        assert told.wait(20.0)
-        assert closing.is_alive()
-        goes_on.set()
-        closing.join()
 
 
 def test_all_goals_end_of_a_node_that_ends_with_its_runner(journal: Journal, name: str) -> None:

@@ -296,23 +296,6 @@ def test_a_subtree_whose_input_has_no_value_fails_and_says_why(load: Load) -> No
     assert root.feedback_message == "$a has no value"
 
 
-def test_a_subtree_that_is_given_no_mapping_fails_and_says_why(load: Load) -> None:
-    root = load(
-        """
-        tree: t
-        root:
-          for_each: E
-          in: [[{home: 1.0}], [5]]     # items of items, whose types nobody follows
-          child: {subtree: inner.yaml, with: "$item[0]"}
-        """,
-        inner="tree: inner\ninputs: {home: float64}\nroot: {check: $home > 0.5}\n",
-    )
-    assert tick(root) is Status.FAILURE
-    assert root.children[0].feedback_message == (
-        "'with' needs a mapping of inputs to values, not 5"
-    )
-
-
 def test_a_subtree_that_starts_again_has_forgotten_its_values(load: Load) -> None:
     root = load(
         """
@@ -354,38 +337,6 @@ def test_whatever_writes_an_output_converts_it_to_its_type(load: Load) -> None:
     assert [(name, type(value)) for name, value in tree_outputs(root).items()] == [
         ("a", float), ("b", float)
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize("child", ["success", "failure"])
-def test_an_output_of_a_subtree_that_does_not_fit_fails_it(load: Load, child: str) -> None:
-    root = load(
-        "tree: t\noutputs: {a: int8, b: int8}\nroot: {subtree: inner.yaml, save: {a: x, b: y}}\n",
-        inner=f"""
-        tree: inner
-        outputs: {{x: int32, y: int32}}
-        root: {{sequence: S, children: [{{set: {{x: 3, y: 300}}}}, {{{child}: }}]}}
-        """,
-    )
-    assert tick(root) is Status.FAILURE
-    assert root.feedback_message.startswith("b: ")
-    assert "300" in root.feedback_message
-    assert tree_outputs(root) == {}
-
-
-@pytest.mark.parametrize(("items", "told"), [
-    ([300, 1], "item 0: n: "),
-    ([1, 300], "item 1: n: "),
-])  # fmt: skip
-def test_an_item_that_does_not_fit_its_variable_fails_the_loop(
-    load: Load, items: list[int], told: str
-) -> None:
-    root = load(
-        "tree: t\ninputs: {items: 'int64[]'}\noutputs: {n: int8}\n"
-        "root: {for_each: F, in: $items, as: n, on_failure: continue, child: {success: }}\n",
-        {"items": items},
-    )
-    assert tick(root) is Status.FAILURE
-    assert root.feedback_message.startswith(told)
 
 
 def test_what_an_action_saves_is_converted_and_fails_it_where_that_cannot_be(load: Load) -> None:
@@ -433,26 +384,6 @@ def test_a_variable_cannot_grow_without_bound(
     )
     assert tick(root, 4000) is Status.FAILURE
     assert root.children[1].children[0].feedback_message == told
-
-
-def test_inputs_of_a_subtree_and_texts_made_of_lists_are_bounded_as_well(load: Load) -> None:
-    many = ", ".join(["$x"] * 200)
-    root = load(
-        f"""
-        tree: t
-        root:
-          sequence: S
-          children:
-            - {{set: {{x: 1}}}}  # so that nobody knows its type
-            - {{set: {{x: [{", ".join(["text"] * 9000)}]}}}}
-            - {{invert: Text, child: {{log: "$(x)"}}}}
-            - {{subtree: inner.yaml, with: {{y: [{many}]}}}}
-        """,
-        inner='tree: inner\ninputs: {y: "string[]"}\nroot: {check: len($y) > 0}\n',
-    )
-    assert tick(root) is Status.FAILURE
-    assert root.children[2].children[0].feedback_message.startswith("the text would be longer")
-    assert root.children[3].feedback_message == "'with': the value is too large"
 
 
 def test_a_tree_that_includes_itself_is_an_error_that_shows_the_chain(

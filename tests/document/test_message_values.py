@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import pytest
 from py_trees.behaviour import Behaviour
@@ -173,37 +172,6 @@ def test_a_byte_is_a_number(load: Load, condition: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("shared", "own", "told"),
-    [
-        ("{yaw: 90 deg}", "{w: 1.0}", "roll, pitch and yaw stand alone: 'w' cannot be beside them"),
-        ("{w: $w}", "{yaw: $w}", "roll, pitch and yaw stand alone: 'w' cannot be beside them"),
-        ("{yaw: 90 deg}", "{pitch: $w}", None),
-        ("{x: 1.0}", "{w: 1.0}", None),
-    ],
-)
-def test_goals_that_are_merged_must_fit_together(
-    shared: str, own: str, told: str | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from geometry_msgs.msg import PoseStamped
-    from std_msgs.msg import Empty
-
-    action = SimpleNamespace(Goal=PoseStamped, Result=Empty)  # no action here wants a pose
-    monkeypatch.setattr(
-        "bt_actions.document.checking.checker.interface_of", lambda _name, _kind: action
-    )
-    text = (
-        "tree: t\ninputs: {w: float64}\nactions:\n  go: {type: a/action/B, server: s, timeout: 1 s,"
-        f" goal: {{pose: {{orientation: {shared}}}}}}}\n"
-        f"root:\n  sequence: S\n  children:\n    - check: $w > 0\n"
-        f"    - {{go: A, goal: {{pose: {{orientation: {own}}}}}}}\n"
-    )
-    found = check_source(source_of(text.encode(), "t"))
-    assert [(one.line, one.column, one.message) for one in found] == (
-        [(9, 42, told)] if told is not None else []
-    )
-
-
-@pytest.mark.parametrize(
     "node",
     [
         "{set: {u: $m.data}}",
@@ -246,31 +214,3 @@ def test_a_mapping_in_a_list_must_fit_its_message(nodes: str) -> None:
     )
     (found,) = [each for each in findings if each.code == "BT204"]
     assert "has no field 'q'" in found.message
-
-
-@pytest.mark.parametrize(
-    ("type_name", "message"),
-    [
-        ("sensor_msgs/msg/PointCloud2", "{fields: [{datatype: FLOAT32}, {datatype: 7}]}"),
-        ("nav_msgs/msg/Path", "{poses: [{header: {stamp: now}}, {header: {stamp: 3.5}}]}"),
-        (
-            "geometry_msgs/msg/PoseArray",
-            "{poses: [{orientation: {yaw: 1.0}}, {orientation: {w: 1.0}}]}",
-        ),
-        (
-            "geometry_msgs/msg/PoseArray",
-            "{poses: [{orientation: {yaw: 90 deg}}, {orientation: {yaw: 1.5}}]}",
-        ),
-    ],
-)
-def test_the_mappings_of_a_list_may_say_the_same_in_several_ways(
-    type_name: str, message: str
-) -> None:
-    findings = check_source(
-        source_of(
-            f"tree: t\nroot: {{sequence: S, children: [{{set: {{m: {message}}}}},"
-            f" {{publish: a, type: {type_name}, message: $m}}]}}\n".encode(),
-            "t",
-        )
-    )
-    assert [each.message for each in findings] == []

@@ -9,42 +9,12 @@ import pytest
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport
 from bt_actions_interfaces.srv import ControlTree
-from robot_control_interfaces.action import Gripper, MoveRobot
+from robot_control_interfaces.action import Gripper
 
 from bt_actions.goals.policy import End, Outcome
 
 INTERFACES = Path(__file__).resolve().parents[2] / "interfaces"
 PACKAGES = ["bt_actions_interfaces", "robot_control_interfaces"]
-
-
-def test_move_robot_takes_a_distance() -> None:
-    assert MoveRobot.Goal.get_fields_and_field_types() == {"distance": "double"}
-
-
-def test_move_robot_ends_with_a_pose_a_status_and_a_message() -> None:
-    assert MoveRobot.Result.get_fields_and_field_types() == {
-        "final_pose": "double",
-        "status": "uint8",
-        "message": "string",
-    }
-    statuses = ("COMPLETED", "CANCELED", "TIMEOUT", "FAULT")
-    assert [getattr(MoveRobot.Result, f"STATUS_{name}") for name in statuses] == [0, 1, 2, 3]
-
-
-def test_move_robot_reports_its_pose_on_the_way() -> None:
-    assert MoveRobot.Feedback.get_fields_and_field_types() == {
-        "current_pose": "double",
-        "status": "uint8",
-    }
-    statuses = ("READY", "MOVING", "COMPLETED")
-    assert [getattr(MoveRobot.Feedback, f"STATUS_{name}") for name in statuses] == [0, 1, 2]
-
-
-def test_gripper_takes_a_position_and_an_effort() -> None:
-    assert Gripper.Goal.get_fields_and_field_types() == {
-        "position": "double",
-        "max_effort": "double",
-    }
 
 
 @pytest.mark.parametrize("part", ["Result", "Feedback"])

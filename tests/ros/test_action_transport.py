@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import threading
 import uuid
-from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -13,16 +12,13 @@ import pytest
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
-from robot_control_interfaces.action import Gripper as GripperAction
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import Gripper, MoveRobot
 from bt_actions.ros import action_transport
-from bt_actions.ros.action_transport import ANSWERS_KEPT, GOALS_KEPT, TAKE_AT_MOST, RosTransport
-from bt_actions.ros.graph import servers
-from bt_actions.ros.node_participant import traffic_of
-from tests.support.processes import Host, HostFactory
-from tests.support.waiting import holds_for, until
+from bt_actions.ros.action_transport import RosTransport
+from tests.support.processes import Host
+from tests.support.waiting import until
 
 TIMES = 20
 KINDS = ("goal", "result", "cancel")
@@ -151,11 +147,6 @@ def single(node: Node) -> Any:
     return spinning(node, SingleThreadedExecutor(context=node.context))
 
 
-def filed(client: RosTransport) -> int:
-    """Return how many requests are kept until their answers come."""
-    return sum(map(len, (client._goal_requests, client._result_requests, client._cancel_requests)))
-
-
 def request(client: RosTransport, kind: str) -> bytes:
     """Send a request that is answered at once, and return the goal's id."""
     goal_id = uuid.uuid4().bytes
@@ -179,19 +170,6 @@ def test_an_answer_that_arrives_before_its_request_is_filed_is_not_lost(
     assert [answer[0] for answer in heard.answers(kind)] == asked
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_without_the_lock_every_such_answer_is_lost(
-    client: RosTransport, node: Node, heard: Heard, kind: str
-) -> None:
-    """Shows that the test above would see it: rclpy #1123, which the lock is there for."""
-    client._client_handle = LateFiling(client._client_handle, kind, patience=5.0)
-    client._lock = contextlib.nullcontext()  # type: ignore[assignment]
-    with single(node):
-        for _ in range(TIMES):
-            request(client, kind)
-        assert holds_for(lambda: not heard.answers(kind), 0.1)
-
-
 @pytest.mark.parametrize("executor", [SingleThreadedExecutor, MultiThreadedExecutor])
 def test_every_answer_reaches_its_goal_when_several_threads_send(
     client: RosTransport, node: Node, heard: Heard, executor: Any
@@ -211,19 +189,6 @@ def test_every_answer_reaches_its_goal_when_several_threads_send(
             thread.join()
         until(lambda: len(heard.results) == 4 * TIMES)
     assert sorted(result[0] for result in heard.results) == sorted(asked)
-
-
-def test_answers_are_taken_without_an_executor(client: RosTransport, heard: Heard) -> None:
-    goal_id = uuid.uuid4().bytes
-    client.send(goal_id, MoveRobotAction.Goal(distance=0.2))
-    until(lambda: heard.goals, meanwhile=client.pump)
-    assert heard.goals == [(goal_id, True)]
-    client.ask_result(goal_id)
-    until(lambda: heard.results, meanwhile=client.pump)
-    [(answered, status, result)] = heard.results
-    assert (answered, status, result.final_pose) == (goal_id, 4, 0.2)
-    assert heard.feedback[0][0] == goal_id
-    until(lambda: heard.statuses[-1].get(goal_id) == 4, meanwhile=client.pump)
 
 
 def test_answers_are_taken_when_the_context_is_no_longer_valid(
@@ -247,131 +212,6 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
     assert journal.ends() == ["canceled"]
     client.close()
     node.destroy_node()
-    host.close_server(name)
-
-
-def test_what_is_forgotten_is_not_told_and_not_kept(client: RosTransport, heard: Heard) -> None:
-    for kind in ("result", "cancel"):
-        client.forget(request(client, kind))
-    client.probe(7, uuid.uuid4().bytes)
-    client.forget(7)
-    last = request(client, "cancel")
-    until(lambda: heard.cancels, meanwhile=client.pump)
-    assert heard.cancels == [(last, 2)]
-    assert not heard.results
-    assert not heard.probes
-    client.forget(last)
-    assert filed(client) == 0
-
-
-def test_a_goal_that_is_forgotten_may_still_be_accepted_by_another_server(
-    client: RosTransport, heard: Heard
-) -> None:
-    """So that is told; of the newest only."""
-    for _ in range(GOALS_KEPT + 3):
-        heard.goals.clear()
-        goal = request(client, "goal")
-        client.forget(goal)
-        until(lambda: heard.goals, meanwhile=client.pump)
-        assert heard.goals == [(goal, True)]
-    assert filed(client) == 0
-    assert len(client._past_requests) == GOALS_KEPT
-
-
-def test_what_each_of_two_servers_answers_is_told(
-    client: RosTransport, new_host: HostFactory, node: Node, name: str, heard: Heard
-) -> None:
-    new_host().open(name, "*:reject")
-    until(lambda: len(servers(node, name)) == 2)
-    while len(heard.so_far) < 2:  # the second one may not know the way back to us yet
-        asked = request(client, "cancel")
-        with contextlib.suppress(AssertionError):
-            until(lambda: len(heard.so_far) == 2, 1.0, meanwhile=client.pump)
-        client.forget(asked)
-    heard.so_far = ()
-    for kind, answers in (("goal", [False, True]), ("cancel", [2, 2]), ("result", [0, 0])):
-        request(client, kind)
-        until(lambda: len(heard.so_far) == 2, meanwhile=client.pump)
-        words = [each[0] if kind == "result" else each for each in heard.so_far]
-        assert sorted(words) == answers
-        heard.so_far = ()
-
-
-def test_of_answers_without_end_to_one_question_the_first_are_kept(client: RosTransport) -> None:
-    client.ask_result(uuid.uuid4().bytes)
-    (question,) = client._result_requests.values()
-    for number in range(ANSWERS_KEPT + 5):
-        client._file("result", question, (0, number))
-    assert [each for _, each in question.answers] == list(range(ANSWERS_KEPT))
-    client.forget(question.about)
-
-
-class Endless:
-    """rclpy's low-level client, where of everything there is always more to take."""
-
-    def __init__(self) -> None:
-        self.taken: Counter[str] = Counter()
-
-    def __getattr__(self, name: str) -> Callable[[Any], Any]:
-        def take(kind: Any) -> Any:
-            self.taken[name] += 1
-            return (-1, kind()) if name.endswith("_response") else kind()
-
-        return take
-
-    def __enter__(self) -> None: ...
-
-    def __exit__(self, *error: object) -> None: ...
-
-
-def test_of_messages_without_end_so_many_are_taken_at_a_time(
-    client: RosTransport, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    endless = Endless()
-    with monkeypatch.context() as patch:
-        patch.setattr(client, "_client_handle", endless)
-        client.take_data()
-    client._inbox.clear()
-    assert set(endless.taken.values()) == {TAKE_AT_MOST}
-    assert len(endless.taken) == 5
-
-
-def test_nothing_stays_filed_for_answered_requests(client: RosTransport, heard: Heard) -> None:
-    goal_id = request(client, "goal")
-    client.ask_result(goal_id)
-    unknown = request(client, "cancel")
-    done = lambda: heard.goals and heard.cancels and any(s == 4 for _, s, _ in heard.results)  # noqa: E731
-    until(
-        done,
-        meanwhile=lambda: (client.pump(), client.ask_result(goal_id) if heard.results else None),
-    )
-    client.forget(goal_id)
-    client.forget(unknown)
-    assert filed(client) == 0
-
-
-def test_a_probe_is_answered_by_a_live_server_once(client: RosTransport, heard: Heard) -> None:
-    client.probe(3, uuid.uuid4().bytes)
-    until(lambda: heard.probes, meanwhile=client.pump)
-    request(client, "cancel")
-    until(lambda: heard.cancels, meanwhile=client.pump)
-    assert heard.probes == [3]
-
-
-def test_a_refused_cancel_is_told_as_refused(
-    node: Node, host: Host, name: str, heard: Heard
-) -> None:
-    """rclpy's servers answer "no error" with an empty list, which is read as the refusal it is."""
-    client = RosTransport(node, MoveRobotAction, name, heard)
-    host.open(name, "1:reject_cancel")
-    until(client.server_is_ready)
-    goal_id = uuid.uuid4().bytes
-    client.send(goal_id, MoveRobotAction.Goal(distance=0.5))
-    until(lambda: heard.goals, meanwhile=client.pump)
-    client.cancel(goal_id)
-    until(lambda: heard.cancels, meanwhile=client.pump)
-    assert heard.cancels == [(goal_id, 1)]
-    client.close()
     host.close_server(name)
 
 
@@ -483,13 +323,3 @@ def test_two_types_under_one_name_are_an_error_that_names_both(node: Node, name:
     first.shutdown()
     second.setup(node=node)  # the name is free again
     second.shutdown()
-
-
-def test_each_node_has_clients_of_its_own(node: Node, context: Context, name: str) -> None:
-    other = Node("other", context=context)
-    both = [traffic_of(each) for each in (node, other)]
-    endpoints = [traffic.endpoint(GripperAction, name) for traffic in both]
-    assert endpoints[0].transport is not endpoints[1].transport
-    for traffic, endpoint in zip(both, endpoints, strict=True):
-        traffic.leave(endpoint)
-    other.destroy_node()

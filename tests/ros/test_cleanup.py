@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import signal
-import time
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -21,7 +19,6 @@ from bt_actions.recovery.roll_call import RollCall
 from bt_actions.recovery.sweep import Swept, cleanup
 from bt_actions.ros import onlooker as sight
 from bt_actions.ros.onlooker import CannotStart
-from bt_actions.servers.stalls import OUT_OF_SIGHT, Stalls
 from tests.support.processes import HostFactory, Journal, Process
 
 SEND = (
@@ -143,72 +140,12 @@ def test_an_action_that_nobody_wants_is_named_where_it_is_not_known(
     assert name not in swept.known
 
 
-def test_it_ends_though_new_actions_come_in_sight(
-    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "LOOK_LONGEST", 1.0)
-    numbers = itertools.count()
-
-    class Crowded(sight.Node):  # type: ignore[misc]  # rclpy is not typed
-        def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
-            number = next(numbers)
-            assert number < 200, "it does not end"
-            return [(f"/crowd_{number}/_action/status", [])]
-
-        def count_publishers(self, topic: str) -> int:
-            return int(topic.startswith("/crowd_"))
-
-    monkeypatch.setattr(sight, "Node", Crowded)
-    told: list[str] = []
-    swept = cleanup(look=0.2, missing=lambda names, in_vain: told.extend(names if in_vain else ()))
-    assert {"/crowd_0", "/crowd_1"} <= set(swept.unknown) == set(told)
-
-
-def test_its_own_work_is_no_standstill_that_gives_it_more_time(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A server publishes thousands of goals at every change of one."""
-    monkeypatch.setattr(module, "LOOK_LONGEST", 2.0)
-    turns: list[None] = []
-
-    def slow_turn(self: Any, still: Stalls) -> None:
-        time.sleep(0.2)
-        still.lives(time.monotonic())
-        time.sleep(0.2)
-        turns.append(None)
-
-    monkeypatch.setattr(module._Sweep, "_turn", slow_turn)
-    _swept, told = sweep(["/nobody"])
-    assert told == ["/nobody"]
-    assert len(turns) < 15
-
-
 def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
     left: str, name: str, domain: int
 ) -> None:
     found: list[LeftBehind] = []
     swept = cleanup(look=60.0, found=found.append, stopped=lambda: bool(found))
     assert [goal.goal_id.hex() for goal in swept.left] == [left]
-
-
-def test_a_context_that_is_shut_down_meanwhile_hides_no_interrupt(
-    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As rclpy's handlers do at Ctrl-C, in a program that called rclpy.init()."""
-    contexts: list[Context] = []
-
-    class Kept(Context):  # type: ignore[misc]  # rclpy is not typed
-        def init(self, *args: Any, **more: Any) -> None:
-            super().init(*args, **more)
-            contexts.append(self)
-
-    def interrupted() -> bool:
-        contexts[0].shutdown()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sight, "Context", Kept)
-    with pytest.raises(KeyboardInterrupt):
-        cleanup(stopped=interrupted)
 
 
 @pytest.mark.parametrize(
@@ -307,53 +244,3 @@ def test_cleanup_sees_no_server_where_there_is_a_client_only(
     assert cleanup(look=1.0, sighted=sighted.append).left == []
     assert name not in sighted
     leaf.shutdown()
-
-
-@pytest.mark.chaos
-def test_cleanup_that_cannot_look_again_says_who_has_not_answered(
-    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What it has found by then is told."""
-
-    class Once(sight.Node):  # type: ignore[misc]  # rclpy is not typed
-        def __init__(self, name: str, **how: Any) -> None:
-            monkeypatch.setattr(sight, "Node", no_more)
-            super().__init__(name, **how)
-
-    def no_more(*_: object, **__: object) -> None:
-        raise RuntimeError("no descriptors")
-
-    monkeypatch.setattr(sight, "Node", Once)
-    host, told = new_host(short_lease=False), list[tuple[list[str], bool]]()
-    host.open(name)
-    swept = cleanup(
-        look=1.0,
-        sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
-        missing=lambda actions, in_vain: told.append((actions, in_vain)),
-    )
-    host.send(signal.SIGCONT)
-    assert swept.left == []
-    assert [(name in actions, in_vain) for actions, in_vain in told] == [
-        (True, False),
-        (True, True),
-    ]
-    with pytest.raises(CannotStart, match="no descriptors"):
-        cleanup()
-
-
-def test_cleanup_that_stood_still_while_its_node_was_made_looks_again(
-    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What announces itself just before is what may be dropped by a server for good."""
-    made = list[str]()
-
-    class Slow(sight.Node):  # type: ignore[misc]  # rclpy is not typed
-        def __init__(self, name: str, **how: Any) -> None:
-            super().__init__(name, **how)
-            if not made:
-                time.sleep(OUT_OF_SIGHT + 0.1)
-            made.append(name)
-
-    monkeypatch.setattr(sight, "Node", Slow)
-    assert cleanup(look=0.1, patience=0.1).left == []
-    assert len(made) == 2

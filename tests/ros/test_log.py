@@ -91,32 +91,6 @@ def test_where_nobody_reads_newer_lines_are_counted(log: Log, written: Written) 
     assert written.lines[-1] == "info: and on"
 
 
-def test_a_logger_of_a_node_that_is_gone_loses_nothing(log: Log, written: Written) -> None:
-    class Gone:
-        def __getattr__(self, level: str) -> Any:
-            raise RuntimeError("its node was destroyed")
-
-    log.by(Gone(), "warn", "of a node")
-    log.info("and on")
-    log.flush()
-    assert written.lines == ["warning: of a node", "info: and on"]
-
-
-@pytest.mark.parametrize("why", ["there are too many", "the interpreter is being taken down"])
-def test_where_no_thread_can_be_started_the_line_is_written_at_once(
-    log: Log, written: Written, monkeypatch: pytest.MonkeyPatch, why: str
-) -> None:
-    def refuse(self: threading.Thread) -> None:
-        assert why == "there are too many", "it would wait for ever"
-        raise RuntimeError("can't start new thread")
-
-    monkeypatch.setattr(threading.Thread, "start", refuse)
-    monkeypatch.setattr(sys, "is_finalizing", lambda: why != "there are too many")
-    log.error("a goal is not accounted for")
-    log.info("and on")
-    assert written.lines == ["error: a goal is not accounted for", "info: and on"]
-
-
 ONE_THAT_GOES_ON = """
 import os, threading, time
 from bt_actions.ros.log import log

@@ -53,21 +53,6 @@ def test_a_node_that_is_gone_need_not_fall_silent(domain: int) -> None:
     assert not participant.fall_silent(node)
 
 
-def test_another_rmw_is_left_alone(monkeypatch: pytest.MonkeyPatch, ours: Node) -> None:
-    monkeypatch.setattr(participant, "get_rmw_implementation_identifier", lambda: "rmw_other")
-    monkeypatch.setattr(participant, "_call", participant._call.__wrapped__)
-    assert not participant.fall_silent(ours)
-
-
-@pytest.mark.parametrize("missing", ["_PARTICIPANT_OF", "_SET_LISTENER"])
-def test_so_is_one_of_another_release(
-    monkeypatch: pytest.MonkeyPatch, ours: Node, missing: str
-) -> None:
-    monkeypatch.setattr(participant, missing, "not_there")
-    monkeypatch.setattr(participant, "_call", participant._call.__wrapped__)
-    assert not participant.fall_silent(ours)
-
-
 def of_a_runner(_: int) -> None:
     with TreeRunner(Gate()):
         pass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.goals.ids import Author, new_goal_id
-from bt_actions.traffic.predecessors import TOLD_AT_MOST, Predecessors
+from bt_actions.traffic.predecessors import Predecessors
 
 
 def of_the_dead() -> bytes:
@@ -54,18 +54,3 @@ def test_who_dies_later_is_found_at_the_next_status(
     monkeypatch.setattr(Author, "alive", False)
     seen.see({goal})
     assert len(said) == 1
-
-
-def test_of_each_process_it_is_asked_once_whether_it_lives(
-    said: Said, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked = list[Author]()
-    monkeypatch.setattr(Author, "alive", property(lambda author: not asked.append(author)))
-    Predecessors("/move", said).see({new_goal_id() for _ in range(100)})
-    assert len(asked) == 1
-    assert not said
-
-
-def test_of_many_some_are_named(said: Said) -> None:
-    Predecessors("/move", said).see({of_the_dead() for _ in range(3 * TOLD_AT_MOST)})
-    assert len(said) == TOLD_AT_MOST

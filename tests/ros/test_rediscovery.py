@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -17,7 +17,6 @@ from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros import node_participant, rediscovery
 from bt_actions.ros.graph import enclave
 from bt_actions.ros.host import host as process
-from bt_actions.ros.log import log
 from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.servers.stalls import Stalls
@@ -146,77 +145,8 @@ def test_nobody_looks_where_nothing_was_ever_lost(
     assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
 
 
-def test_a_look_that_cannot_be_taken_is_told_once_and_changes_nothing(
-    name: str, node: Any, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    def refused(_domain: int, _enclave: str) -> SecondParticipant:
-        raise OSError("no space left")
-
-    monkeypatch.setattr(_domain(node), "lost_sight", True)
-    for each in rediscovery._lookouts.values():
-        monkeypatch.setattr(each, "_told", False)
-    monkeypatch.setattr(rediscovery, "SecondParticipant", refused)
-    monkeypatch.setattr(rediscovery, "FIRST_AFTER", 0.01)
-    monkeypatch.setattr(rediscovery, "PAUSE", 0.01)
-    leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=1.5))
-    with TreeRunner(leaf, node=node) as runner:
-        runner.run(5.0)
-    assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
-    until(nobody_looks)
-    log.flush()
-    assert capfd.readouterr().err.count("no second look for lost servers") == 1
-
-
 def _domain(node: Any) -> Any:
     return process.domain(node.context.get_domain_id())
-
-
-class TestMoves:
-    """Lines that are moved by hand, as the rediscovery moves them."""
-
-    @pytest.fixture
-    def moved(self, serve: Any, name: str, node: Any) -> Iterator[Any]:
-        """The way of an endpoint that is in a participant of its own."""
-        serve()
-        leaf = MoveRobot("keeps the line", 0.1, action_name=name)
-        leaf.setup(node=node)
-        sight = SecondParticipant(_domain(node).number, "/")
-        sight.looking = False
-        with process.lock:
-            transport = leaf._endpoint.route.try_in(sight)
-            sight.users.add(transport)
-            leaf._endpoint.route.move_to(transport)
-        yield leaf._endpoint, sight
-        leaf.shutdown()
-        until(lambda: sight.closed)
-
-    def goes(self, name: str, node: Any) -> None:
-        """A goal succeeds."""
-        leaf = MoveRobot("goes", 0.1, action_name=name)
-        with TreeRunner(leaf, node=node) as runner:
-            runner.run(10.0)
-        assert leaf.outcome is Outcome.SUCCEEDED
-
-    def test_a_participant_that_is_used_again_is_not_closed(
-        self, moved: Any, name: str, node: Any
-    ) -> None:
-        endpoint, sight = moved
-        with process.lock:  # the thread that closes it has to wait
-            sight._left_by(endpoint.transport)
-            sight.users.add(endpoint.transport)
-        until(nobody_looks)
-        assert not sight.closed
-        self.goes(name, node)
-
-    def test_a_line_whose_participant_is_gone_goes_back_to_its_node(
-        self, moved: Any, name: str, node: Any
-    ) -> None:
-        endpoint, sight = moved
-        sight.users.clear()
-        sight.close()
-        self.goes(name, node)
-        assert not endpoint.route.elsewhere
-        assert not endpoint.orphaned
 
 
 def test_an_action_that_had_a_server_once_is_looked_for(
@@ -233,40 +163,6 @@ def test_an_action_that_had_a_server_once_is_looked_for(
         with TreeRunner(leaf, node=node) as runner:
             runner.run(30.0)
         assert leaf.outcome is Outcome.SUCCEEDED
-
-
-@pytest.mark.chaos
-def test_whoever_else_reads_goal_requests_moves_nobody(
-    name: str, node: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A server of another type, or the half of one."""
-    from rclpy.context import Context
-    from rclpy.node import Node
-    from std_srvs.srv import Trigger
-
-    monkeypatch.setattr(_domain(node), "lost_sight", True)
-    monkeypatch.setattr(rediscovery, "FIRST_AFTER", 0.1)
-    tried, try_in = list[Any](), way.Route.try_in
-    monkeypatch.setattr(
-        way.Route,
-        "try_in",
-        lambda self, sight: tried.append(self) or try_in(self, sight),
-    )
-    moved: list[Any] = []
-    monkeypatch.setattr(way.Route, "move_to", lambda *who: moved.append(who))
-    context = Context()  # within one participant, rmw_fastrtps refuses a second type
-    context.init(domain_id=_domain(node).number)
-    stranger = Node("stranger", context=context)
-    stranger.create_service(Trigger, f"{name}/_action/send_goal", print)
-    leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=4.0))
-    leaf.setup(node=node)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.run(10.0)
-        assert tried
-        assert not moved
-    assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
-    stranger.destroy_node()
-    context.shutdown()
 
 
 @pytest.mark.parametrize("flag", ["--enclave", "-e"])

@@ -86,15 +86,6 @@ def test_a_cancel_stops_the_fingers(serve: Any, world: World) -> None:
     assert not goal.result.reached_goal
 
 
-def test_a_newer_goal_aborts_the_older(serve: Any, world: World) -> None:
-    client = serve(speed=2.0)
-    older = client.send(position=100.0).until_moving()
-    newer = client.send(position=50.0)
-    assert older.until_ended().status == GoalStatus.STATUS_ABORTED
-    assert newer.until_ended().status == GoalStatus.STATUS_SUCCEEDED
-    assert world.gripper.position == 50.0
-
-
 def test_the_part_can_fall_as_soon_as_it_is_gripped(serve: Any, world: World) -> None:
     client = serve("gripper_control:2:drop_part=10")
     client.send(position=100.0).until_ended()

@@ -73,17 +73,6 @@ def test_a_goal_beyond_the_axis_is_refused_with_a_reason_in_the_log(
     assert reason in str(bench.node.log.lines)
 
 
-@pytest.mark.parametrize("distance", [10.0, -10.0])
-def test_the_ends_of_the_axis_are_reached(serve: Any, distance: float) -> None:
-    goal = serve().send(distance=distance).until_ended()
-    assert goal.status == GoalStatus.STATUS_SUCCEEDED
-
-
-def test_a_goal_where_it_stands_succeeds(serve: Any) -> None:
-    goal = serve().send(distance=0.0).until_ended()
-    assert goal.status == GoalStatus.STATUS_SUCCEEDED
-
-
 def test_a_cancel_stops_it_where_it_is(serve: Any, bench: Bench, world: World) -> None:
     goal = serve(speed=5.0).send(distance=9.0).until_moving()
     goal.cancel()
@@ -113,18 +102,6 @@ def test_a_newer_goal_aborts_the_older(serve: Any, bench: Bench, world: World) -
     assert bench.events() == [
         "received", "accepted", "received", "accepted", "aborted", "succeeded",
     ], "the journal shows a client that sent two at once"  # fmt: skip
-
-
-def test_a_burst_of_goals_leaves_one_moving(serve: Any, bench: Bench) -> None:
-    client = serve(speed=5.0)
-    goals = [client.send(distance=float(n)) for n in range(1, 9)]
-    for goal in goals:
-        goal.until_accepted()
-    bench.until(bench.happened("aborted", 7))
-    for goal in goals[:-1]:
-        assert goal.until_ended().status == GoalStatus.STATUS_ABORTED
-    goals[-1].cancel()
-    assert goals[-1].until_ended().status == GoalStatus.STATUS_CANCELED
 
 
 def test_it_gives_up_after_thirty_simulated_seconds(serve: Any, bench: Bench) -> None:

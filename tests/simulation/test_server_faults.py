@@ -8,9 +8,8 @@ import pytest
 from action_msgs.msg import GoalStatus
 from test_msgs.action import Fibonacci
 
-from bt_actions.simulation import FaultError, FaultPlan, Script, ScriptedServer
+from bt_actions.simulation import Script, ScriptedServer
 from bt_actions.simulation import journal as j
-from bt_actions.simulation.execution import FLOOD_AT_ONCE
 from tests.simulation.conftest import Bench, Client
 
 SUCCEEDED = GoalStatus.STATUS_SUCCEEDED
@@ -43,17 +42,6 @@ def received(bench: Bench) -> list[j.Entry]:
     return [entry for entry in bench.entries() if entry.event is j.Event.RECEIVED]
 
 
-def test_without_a_fault_it_succeeds(serve: Any, bench: Bench) -> None:
-    goal = serve().send(order=7).until_ended()
-    assert goal.status == SUCCEEDED
-    assert list(goal.result.sequence) == [7]
-    assert [message.sequence[0] for message in goal.all_feedback(10)] == list(range(10, 101, 10))
-    assert bench.events() == ["received", "accepted", "succeeded"]
-    steps = [entry for entry in bench.entries() if entry.event is j.Event.STEP]
-    assert len(steps) == 10
-    assert {entry.goal for entry in steps} == {goal.goal_id}
-
-
 def test_reject(serve: Any, bench: Bench) -> None:
     client = serve("1:reject")
     first, second = client.send(), client.send()
@@ -74,15 +62,6 @@ def test_delay_accept_holds_up_that_goal_alone(serve: Any, bench: Bench) -> None
     assert first.until_ended().status == SUCCEEDED
 
 
-def test_delay_accept_holds_up_no_cancel_and_no_result_of_another(serve: Any, bench: Bench) -> None:
-    client = serve("2:delay_accept=1", script=Script(duration=30.0))
-    running = client.send().until_moving()
-    late = client.send()
-    running.cancel()
-    assert running.until_ended().status == CANCELED
-    assert late.accepted is None
-
-
 def test_drop_goal_is_never_answered_nor_executed(serve: Any, bench: Bench) -> None:
     client = serve("1:drop_goal")
     lost, next_one = client.send(), client.send()
@@ -101,26 +80,11 @@ def test_drop_accept_executes_what_it_never_answered(serve: Any, bench: Bench) -
     assert bench.events() == ["received", "accepted", "succeeded"]
 
 
-def test_drop_accept_can_be_canceled_by_its_id(serve: Any, bench: Bench) -> None:
-    goal = serve("1:drop_accept", script=Script(duration=30.0)).send()
-    bench.until(bench.happened("accepted"))
-    goal.cancel()
-    bench.until(bench.happened("canceled"))
-    bench.until(lambda: goal.cancels == [0])
-
-
 def test_abort_half_way(serve: Any, bench: Bench) -> None:
     goal = serve("1:abort").send().until_ended()
     assert goal.status == ABORTED
     assert goal.feedback[-1].sequence[0] == 40
     assert bench.entries()[-1].reason == "fault: abort"
-
-
-@pytest.mark.parametrize(("seconds", "at"), [(0.1, 50), (9, 100)], ids=["then", "at the end"])
-def test_abort_after_seconds(serve: Any, seconds: float, at: int) -> None:
-    goal = serve(f"1:abort={seconds}").send().until_ended()
-    assert goal.status == ABORTED
-    assert at - 30 <= goal.feedback[-1].sequence[0] < at
 
 
 def test_a_goal_that_is_done_at_once_still_meets_its_fault(serve: Any) -> None:
@@ -160,12 +124,6 @@ def test_flood(serve: Any, bench: Bench) -> None:
     bench.until(lambda: len(goal.feedback) > 200, 2.0)
     goal.cancel()
     assert goal.until_ended().status == CANCELED
-
-
-def test_a_flood_is_never_endless_in_one_step(serve: Any, bench: Bench) -> None:
-    goal = serve("1:flood=1000000").send().until_ended()
-    bench.go_on_for(0.1)
-    assert len(goal.feedback) <= 10 * FLOOD_AT_ONCE
 
 
 def test_reject_cancel(serve: Any, bench: Bench) -> None:
@@ -300,27 +258,3 @@ def test_restart_forgets_its_goals(serve: Any, bench: Bench) -> None:
     goal.cancel()
     bench.until(lambda: goal.cancels == [2], what="unknown goal")
     assert client.send().until_ended().status == SUCCEEDED
-
-
-def test_faults_of_one_goal_add_up(serve: Any, bench: Bench) -> None:
-    goal = serve("1:delay_accept=0.2", "1:abort").send().until_ended()
-    assert goal.status == ABORTED
-    received, accepted = bench.entries()[1:3]
-    assert accepted.t - received.t >= 0.2
-    assert received.more["faults"] == "delay_accept=0.2, abort"
-
-
-def test_faults_by_chance_strike_the_same_goals_again(serve: Any, bench: Bench) -> None:
-    client = serve("50%:reject", seed=3, script=Script(duration=0.0))
-    goals = [client.send() for _ in range(8)]
-    bench.until(lambda: all(goal.accepted is not None for goal in goals))
-    again = FaultPlan.of(["fibonacci:50%:reject"], seed=3)
-    struck = [bool(again.strike(entry.server, n + 1)) for n, entry in enumerate(received(bench))]
-    assert [entry.goal for entry, hit in zip(received(bench), struck, strict=True) if hit] == [
-        goal.goal_id for goal in goals if not goal.accepted
-    ]
-
-
-def test_a_fault_for_another_server_is_an_error(bench: Bench) -> None:
-    with pytest.raises(FaultError, match="no server 'fibonaci'"):
-        ScriptedServer(bench.node, Fibonacci, "fibonacci", faults=["fibonaci:1:abort"])

@@ -46,8 +46,7 @@ def start_sim(bench: Bench, space: str, tmp_path: Path) -> Iterator[Callable[...
         each.close()
 
 
-@pytest.mark.parametrize("kind", ["multi", "single"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("kind", "number"), [("multi", signal.SIGINT), ("single", signal.SIGTERM)])
 def test_a_signal_ends_it_cleanly(
     start_sim: Any, kind: str, number: signal.Signals, space: str
 ) -> None:
@@ -59,7 +58,7 @@ def test_a_signal_ends_it_cleanly(
     assert process.errors == []
 
 
-@pytest.mark.parametrize("kind", ["multi", "single"])
+@pytest.mark.parametrize("kind", ["multi", pytest.param("single", marks=pytest.mark.chaos)])
 def test_it_serves_another_process_and_says_what_becomes_of_the_part(
     start_sim: Any, bench: Bench, space: str, kind: str
 ) -> None:

@@ -12,7 +12,7 @@ from sensor_msgs.msg import BatteryState
 
 from bt_actions.simulation import FaultError, Simulation, WorldEvent
 from bt_actions.simulation import journal as j
-from tests.simulation.conftest import Bench, Client, RosBench
+from tests.simulation.conftest import Bench, RosBench
 from tests.support.waiting import until
 
 IN_VIRTUAL_TIME = pytest.mark.parametrize("stands_on", ["virtual"])
@@ -207,25 +207,6 @@ def test_it_closes_under_running_goals_while_the_executor_spins(
     ros_bench.go_on_for(0.1)
 
 
-def test_it_closes_after_the_executor_has_stopped(own_bench: RosBench, space: str) -> None:
-    robot = Robot(own_bench, space)
-    simulation = Simulation(own_bench.node, namespaces=(space,), journal=own_bench.path)
-    goal = robot.until_ready().move.send(distance=9.0).until_moving()
-    own_bench.spun.stop()
-    simulation.close()
-    died = [entry for entry in own_bench.entries() if entry.event is j.Event.DIED]
-    assert [(entry.goal, entry.reason) for entry in died] == [(goal.goal_id, "closed")]
-
-
-def test_it_closes_after_its_node_was_destroyed(contexts: tuple[Any, Any]) -> None:
-    from rclpy.node import Node
-
-    node = Node("short_lived", context=contexts[0])
-    simulation = Simulation(node)
-    node.destroy_node()
-    simulation.close()
-
-
 def test_a_client_in_the_same_executor_is_served(own_bench: RosBench, space: str) -> None:
     from rclpy.action import ActionClient
     from rclpy.node import Node
@@ -256,15 +237,3 @@ def test_a_client_in_the_same_executor_is_served(own_bench: RosBench, space: str
     own_bench.spun.stop()  # rclpy's own clients must not be destroyed before
     client.destroy()
     node.destroy_node()
-
-
-@IN_VIRTUAL_TIME
-def test_servers_count_their_goals_apart(bench: Bench, space: str) -> None:
-    robot = Robot(bench, space)
-    bench.serve(Simulation(bench.node, namespaces=(space,), speed=20.0, faults=["*:2:reject"]))
-    robot.until_ready()
-    clients: tuple[Client, ...] = (robot.move, robot.gripper)
-    for client in clients:
-        first, second, third = client.send(), client.send(), client.send()
-        third.until_accepted()
-        assert (first.accepted, second.accepted) == (True, False)

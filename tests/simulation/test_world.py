@@ -67,22 +67,6 @@ def test_closing_elsewhere_grips_nothing(world: World, events: list[WorldEvent])
     assert events == []
 
 
-def test_a_gripper_that_comes_closed_cannot_grip(world: World) -> None:
-    drive(world, PICK.position)
-    grip(world, 0.0)
-    assert world.part.held_by is None
-    grip(world, PART_WIDTH / 2)
-    grip(world, 0.0)
-    assert world.part.held_by is None
-
-
-def test_closing_half_way_does_not_grip(world: World) -> None:
-    grip(world, 100.0)
-    drive(world, PICK.position)
-    grip(world, 60.0)
-    assert world.part.held_by is None
-
-
 def test_a_part_let_go_between_stations_is_dropped(world: World, events: list[WorldEvent]) -> None:
     pick(world)
     drive(world, 3.5)
@@ -90,16 +74,6 @@ def test_a_part_let_go_between_stations_is_dropped(world: World, events: list[Wo
     assert [event.kind for event in events] == ["picked", "dropped"]
     assert world.part.station is None
     assert world.describe() == "The part lies at 3.49 m, at no station."
-
-
-def test_a_part_that_falls_stays_where_it_fell(world: World) -> None:
-    pick(world)
-    drive(world, 3.0)
-    assert world.drop()
-    fell_at = world.part.position
-    drive(world, 5.0)
-    assert world.part.position == fell_at
-    assert not world.drop()
 
 
 def test_a_fallen_part_can_be_picked_up_again(world: World, events: list[WorldEvent]) -> None:
