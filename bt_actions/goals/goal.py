@@ -21,7 +21,7 @@ from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.facts import PATIENCE, Facts
-from bt_actions.goals.policy import Busy, End, Outcome
+from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
 from bt_actions.goals.steps.canceling import NEVER_DONE, cancel_said
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import (
@@ -159,12 +159,22 @@ class Goal(Facts):
         """What its server has said of the request to cancel it, to follow a reason; or ""."""
         return cancel_said(self)
 
-    def turns_up_again(self) -> None:
-        """Let a new one stand for a goal of this id that has ended, and that a second server runs.
 
-        It counts as lost, and is canceled at SERVER_RETURNED.
-        """
-        self.deadlines.clear()
-        self.holding, self.end = False, End.SERVER_GONE
-        self.state, self.before = State.LOST, State.CANCELING
-        self.settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
+def turned_up_again(
+    goal_id: bytes,
+    server: str,
+    timeouts: Timeouts,
+    resources: frozenset[str],
+    busy: Busy,
+    now: Now,
+) -> Goal:
+    """Return what stands for a goal of this id that has ended, and that a second server runs.
+
+    It counts as lost, and is canceled at SERVER_RETURNED.
+    """
+    goal = Goal(goal_id, server, timeouts, now, resources=resources, busy=busy)
+    goal.deadlines.clear()
+    goal.holding, goal.end = False, End.SERVER_GONE
+    goal.state, goal.before = State.LOST, State.CANCELING
+    goal.settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
+    return goal

@@ -10,11 +10,9 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
-from bt_actions.goals.goal import Goal
-from bt_actions.goals.policy import Busy, Timeouts
+from bt_actions.goals.goal import turned_up_again
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, Event
 from bt_actions.servers.presence import GID
 from bt_actions.traffic.handle import NEVER, Endpoint, GoalHandle
@@ -24,16 +22,10 @@ from bt_actions.traffic.transport import GOALS_KEPT
 
 @dataclass(slots=True)
 class Ended:
-    """What is kept of a goal that is DONE."""
+    """What is kept of a goal that is DONE; not the goal itself, which has its result."""
 
-    owner: Callable[[], Any]
-    """A weak reference to the leaf."""
-    name: str
-    begun_in: object
-    attempt: int
-    timeouts: Timeouts
-    resources: frozenset[str]
-    busy: Busy
+    again: Callable[[], GoalHandle]
+    """Makes a goal that stands for it, should it turn up."""
     accepted: bool
     servers: frozenset[GID]
     """Who may have had it."""
@@ -50,25 +42,24 @@ class Past:
 
     def keep(self, handle: GoalHandle) -> None:
         """Keep a goal that is DONE in mind."""
-        goal, owner = handle.goal, handle.owner
+        goal, endpoint = handle.goal, self._endpoint
+        what = goal.id, goal.server, goal.timeouts, goal.resources, goal.busy
+        owner = (lambda: None) if handle.owner is None else weakref.ref(handle.owner)
+        whose = handle.name, handle.begun_in, handle.attempt
+
+        def again() -> GoalHandle:
+            new = turned_up_again(*what, endpoint.participant.now())
+            return GoalHandle(new, endpoint, endpoint.reporter, owner(), *whose)
+
         self._ended[goal.id] = Ended(
-            (lambda: None) if owner is None else weakref.ref(owner),
-            handle.name,
-            handle.begun_in,
-            handle.attempt,
-            goal.timeouts,
-            goal.resources,
-            goal.busy,
-            goal.accepted,
-            handle.replies.sent_to,
-            self._host.steady(),
+            again, goal.accepted, handle.replies.sent_to, self._host.steady()
         )
         if len(self._ended) > GOALS_KEPT:
             oldest = next(iter(self._ended))
             del self._ended[oldest]
             self._endpoint.transport.forget(oldest)
 
-    def accepted(self, goal_id: bytes, answers: Sequence[bool] = (True,)) -> None:
+    def accepted(self, goal_id: bytes, answers: Sequence[bool]) -> None:
         """Take an acceptance: it may have been overtaken by the result, or have come twice."""
         ended = self._get(goal_id)
         if ended is None:
@@ -109,24 +100,7 @@ class Past:
         """A second server runs it: cancel it, and account for it like for any goal."""
         endpoint = self._endpoint
         del self._ended[goal_id]
-        goal = Goal(
-            goal_id,
-            endpoint.name,
-            ended.timeouts,
-            endpoint.participant.now(),
-            resources=ended.resources,
-            busy=ended.busy,
-        )
-        goal.turns_up_again()
-        handle = GoalHandle(
-            goal,
-            endpoint,
-            endpoint.reporter,
-            ended.owner(),
-            ended.name,
-            ended.begun_in,
-            ended.attempt,
-        )
+        handle = ended.again()
         endpoint.watch.two_answered()
         handle.replies.taken_by_two(ended.servers | endpoint.watch.gids, self._host.steady())
         endpoint.take_in(handle)
