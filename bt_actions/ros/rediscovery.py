@@ -33,13 +33,12 @@ from bt_actions.traffic.transport import ActionTransport, Listener, Seeker
 from bt_actions.utilities.plain_text import raised
 
 FIRST_AFTER = 1.5
-"""Seconds out of sight until the first look; a server that was restarted is seen before."""
-PAUSE = 1.0
-"""Seconds between two looks for a while after somebody begins to wait, or a look found a server;"""
-URGENT_FOR = 30.0
-"""so long;"""
+"""Seconds until a look after somebody begins to wait; a server that was restarted is seen before.
+Also after a look that found one;"""
 LONGEST_PAUSE = 60.0
-"""later, each pause is twice the last, up to this."""
+"""else each pause is twice the last, up to this."""
+GOES_ON = 1.0
+"""Seconds between two questions whether anything is still missed."""
 LASTS = 5.0
 """Seconds that a look lasts; what is there comes in sight in 0.1 to 1.0, or when Fast DDS announces
 the next time, which is after 3 s (both measured)."""
@@ -138,15 +137,15 @@ class Rediscovery:
         self._missing: dict[Seeker, str] = {}  # and the action's name
         self._bell = threading.Condition(host.lock)
         self._thread: threading.Thread | None = None
-        self._urgent_since: float | None = None
+        self._waiting: set[Seeker] = set()
         self._told = False
-        self._begins_anew = False
+        self._is_urgent = False
 
     def add(self, seeker: Seeker, action: str, *, at_once: bool = False) -> None:
         """Look for what this one misses, too."""
         if seeker not in self._missing:
             self._missing[seeker] = action
-            self._begins_anew |= at_once
+            self._is_urgent |= at_once
             self._bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             self._thread = _start(self._run)
@@ -161,21 +160,14 @@ class Rediscovery:
                 self._bell.wait_for(lambda: self._missing or _closing)
                 if _closing:
                     return
-                self._begins_anew = False  # that is what follows
             self._search()
 
     def _search(self) -> None:
         """Look now and then, until nothing is missed."""
         pause = FIRST_AFTER
-        while True:
-            with host.lock:
-                self._wait(pause)
-                if self._begins_anew:
-                    pause, self._begins_anew, self._urgent_since = FIRST_AFTER, False, None
-                    self._wait(pause)
-                if not self._still_missing():
-                    self._urgent_since = None
-                    return
+        while self._waits(pause):
+            if self._is_urgent:
+                pause, self._is_urgent = FIRST_AFTER, False
             try:
                 found = self._look()
             except Exception as error:  # noqa: BLE001 - no resources, no permission, rclpy's
@@ -183,24 +175,23 @@ class Rediscovery:
                 if not self._told:
                     self._told = True
                     log.warning(f"no second look for lost servers: {raised(error)}")
-            pause = PAUSE if found else min(2 * pause, LONGEST_PAUSE)
+            pause = FIRST_AFTER if found else min(2 * pause, LONGEST_PAUSE)
 
-    def _wait(self, pause: float) -> None:
-        """Wait for the next look; no longer than a moment when somebody begins to wait."""
-        started = time.monotonic()
-        while self._still_missing():
-            left = started + (min(pause, PAUSE) if self._is_urgent() else pause) - time.monotonic()
-            if left <= 0.0 or (self._begins_anew and pause > FIRST_AFTER):
-                return
-            self._bell.wait(min(left, PAUSE))
-
-    def _is_urgent(self) -> bool:
-        now = time.monotonic()
-        if not any(seeker.is_waited_for() for seeker in self._missing):
-            self._urgent_since = None
-        elif self._urgent_since is None:
-            self._urgent_since = now
-        return self._urgent_since is not None and now - self._urgent_since < URGENT_FOR
+    def _waits(self, pause: float) -> bool:
+        """Wait for the next look, less long when somebody begins to wait; is anything missed?"""
+        with host.lock:
+            until = time.monotonic() + pause
+            while self._still_missing():
+                waiting = {seeker for seeker in self._missing if seeker.is_waited_for()}
+                self._is_urgent |= bool(waiting - self._waiting)
+                self._waiting = waiting
+                if self._is_urgent:
+                    until = min(until, time.monotonic() + FIRST_AFTER)
+                left = until - time.monotonic()
+                if left <= 0.0:
+                    return True
+                self._bell.wait(min(left, GOES_ON))
+        return False
 
     def _still_missing(self) -> bool:
         self._missing = {
