@@ -38,7 +38,6 @@ def sent(watch: ServerWatch) -> replies.Replies:
         goal.on(event, Now(0.0, 0.0))
     said = replies.Replies(goal)
     said.sent(watch)
-    said.looked(watch, 0.0)  # which completes who may have got it
     return said
 
 

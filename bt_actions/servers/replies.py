@@ -58,13 +58,11 @@ class Replies:
         self._crowd: frozenset[GID] = frozenset()  # the same, where it is not known who lives
         self._one_left = self._one_came = False  # since the last look
         self._told_of_two = self._runs_anew = False
-        self._just_sent = False
         self._fresh_since = NEVER
         """What was asked before may have been answered by who is gone, or did not have it yet."""
 
     def sent(self, watch: ServerWatch) -> None:
-        """Take note of who is shown when the request goes out; the next look completes that."""
-        self._just_sent = True
+        """Take note of who is shown when the request goes out, just before and just after."""
         self.sent_to |= watch.gids
         self._in_sight = watch.gids
         if _is_crowded(watch):
@@ -180,9 +178,6 @@ class Replies:
 
     def looked(self, watch: ServerWatch, now: float) -> Told:
         """Take what discovery shows now."""
-        if self._just_sent:  # who has opened since may have got it, too
-            self._just_sent = False
-            self.sent_to |= watch.gids
         goal, name = self._goal, self._goal.server
         gone = watch.gone(now, self.sent_to)
         returned = self._was_gone and not gone and watch.state(now) is not Server.ABSENT

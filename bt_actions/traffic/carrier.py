@@ -52,8 +52,13 @@ class Carrier:
         handle, endpoint = effect.handle, self._endpoint
         try:
             handle.replies.sent(endpoint.watch)
-            self.put_on_record(handle)
+            self._put_on_record(handle)
             endpoint.transport.send(handle.goal.id, effect.message)
+            known = handle.replies.sent_to
+            endpoint.see()
+            handle.replies.sent(endpoint.watch)  # who opened since got it, too
+            if handle.replies.sent_to != known:
+                self._put_on_record(handle)
         except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
             endpoint.tell(handle, Event.SEND_FAILED, error)
 
@@ -92,15 +97,14 @@ class Carrier:
                 break
             older.endpoint.tell(older, Event.REPLACED, handle.goal.server)
 
-    def put_on_record(self, handle: GoalHandle) -> None:
-        """Have on record where it may be."""
+    def _put_on_record(self, handle: GoalHandle) -> None:
         goal, sent_to = handle.goal, handle.replies.sent_to
         name, number, accept = self._endpoint.name, self._domain.number, goal.timeouts.accept
         self._host.record.enter(goal.id, name, number, sent_to, accept=accept, lost=goal.lost)
 
     def _record_again(self, handle: GoalHandle) -> None:
         if handle.goal.id in self._host.record:
-            self.put_on_record(handle)
+            self._put_on_record(handle)
 
     def _let_go_on(self, _: GoalHandle) -> None:
         """Wake those of all nodes whose goals wait: there may be room, or nothing in the way."""

@@ -280,10 +280,6 @@ class ActionEndpoint:
         """Ask the server to cancel a goal, as soon as its queue has room."""
         self._carrier.ask_to_cancel(goal_id)
 
-    def put_on_record(self, handle: GoalHandle) -> None:
-        """Have on record where it may be."""
-        self._carrier.put_on_record(handle)
-
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
         probe = next(self._probes)

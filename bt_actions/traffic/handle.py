@@ -80,9 +80,6 @@ class Endpoint(Protocol):
     def retire(self, handle: GoalHandle) -> None:
         """See to it no more."""
 
-    def put_on_record(self, handle: GoalHandle) -> None:
-        """Have on record where it may be."""
-
     def pump(self) -> None:
         """Take what has arrived."""
 

@@ -111,11 +111,7 @@ class Watcher:
             if handle.goal.sent:
                 if gone and not handle.goal.lost:
                     endpoint.pump()  # its last words
-                known = handle.replies.sent_to
-                told = handle.replies.looked(watch, now)
-                if handle.replies.sent_to != known:
-                    endpoint.put_on_record(handle)
-                endpoint.pass_on(handle, told)
+                endpoint.pass_on(handle, handle.replies.looked(watch, now))
         state = self._looked_like = watch.state(now)
         if before is Server.ABSENT or self._was_away:
             endpoint.in_sight_since = now
