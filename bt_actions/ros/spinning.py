@@ -72,17 +72,19 @@ class Spinner:
         self._stopping = False
         self._alive = threading.Event()
         self._asked_at = 0.0
-        self._own_node = node is None
+        self.owns_node = node is None
+        """Whether the node was made here."""
         if executor not in (None, "multi", "single") and not isinstance(executor, Executor):
             raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {executor!r}")
         given = executor if isinstance(executor, Executor) else None
-        if node is not None and node.executor is not None and node not in node.executor.get_nodes():
-            node.executor = None  # left behind by an executor that was shut down
-        if node is not None and node.executor is not None:  # whose owner spins it
-            if given not in (None, node.executor):
+        if node is not None and node.executor is not None:
+            if node not in node.executor.get_nodes():
+                node.executor = None  # left behind by an executor that was shut down
+            elif given not in (None, node.executor):
                 name = node.get_fully_qualified_name()
                 raise ValueError(f"node {name} is in another executor than the one given")
-            given = node.executor
+            else:
+                given = node.executor  # whose owner spins it
         self.spins = given is None or not given.get_nodes()
         if context is not None:
             self._context = context
@@ -101,16 +103,9 @@ class Spinner:
         self._traffic = traffic_of(self.node)
         self._own_executor = given is None
         self.executor: Executor = given or _make(executor, context)
-        if self.node.executor is None:
+        self._added = self.node.executor is None
+        if self._added:
             self.executor.add_node(self.node)
-            self._added = True
-        else:
-            self._added = False
-
-    @property
-    def owns_node(self) -> bool:
-        """Whether the node was made here."""
-        return self._own_node
 
     def start(self, give_up: Callable[[], bool] = lambda: False) -> None:
         """Begin to spin; where somebody else should be spinning, make sure that they do.
@@ -253,7 +248,7 @@ class Spinner:
         if self._added and self.node.executor is self.executor:
             self.node.executor = None  # takes it out of the executor, and lets another have it
         before_nodes()
-        if self._own_node:
+        if self.owns_node:
             self._traffic.destroy()
             if self._context is not None:
                 participant.close(self.node, self._context)
