@@ -177,14 +177,6 @@ def test_without_resources_of_its_own_a_goal_needs_its_servers_name() -> None:
 # The row of the outcome table
 
 
-def test_a_goal_succeeds() -> None:
-    life = executing()
-    life.on(Event.RESULT, SUCCEEDED)
-    life.ended(Outcome.SUCCEEDED, End.SUCCEEDED)
-    assert life.goal.result == "the result"
-    assert life.sent == [SEND, ASK, RELEASE]
-
-
 def test_an_aborted_goal_keeps_its_result() -> None:
     life = executing()
     life.on(Event.RESULT, ABORTED)
@@ -226,14 +218,6 @@ def test_what_two_servers_may_have_taken_is_canceled() -> None:
     life.on(Event.RESULT, SUCCEEDED)
     life.ended(Outcome.SERVER_AMBIGUOUS, End.SUCCEEDED)
     assert not life.goal.late
-
-
-def test_what_two_servers_may_have_taken_unanswered_is_asked_for_and_canceled() -> None:
-    life = sending()
-    assert life.on(Event.SERVER_AMBIGUOUS) == [CANCEL]
-    assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
-    life.on(Event.RESULT, CANCELED)
-    life.ended(Outcome.SERVER_AMBIGUOUS, End.CANCELED)
 
 
 @pytest.mark.parametrize("why", [Event.INTERRUPTED, Event.RESULT_DUE])
@@ -513,16 +497,6 @@ def test_a_server_that_says_nothing_is_asked_less_often_until_it_speaks() -> Non
     assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
 
 
-def test_who_is_asked_less_often_is_asked_when_somebody_waits_for_the_answer() -> None:
-    life = executing(Timeouts(cancel=2.0))
-    life.on(Event.INTERRUPTED)
-    for _ in range(UNHEARD):
-        life.pass_time(ASK_AGAIN)
-    life.pass_time(2.0)
-    assert life.on(Event.INTERRUPTED) == [CANCEL, ASK], "a drain begins"
-    assert life.on(Event.INTERRUPTED) == []
-
-
 def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_server() -> None:
     life = unconfirmed()
     for _ in range(int(DENIED_FOR_GOOD) + 5):
@@ -621,16 +595,6 @@ def test_without_deadlines_the_server_is_still_asked_now_and_then() -> None:
         assert life.pass_time(ASK_IN_ANY_CASE - 0.1) == []
         assert life.pass_time(0.1) == [Command.ASK_RESULT]
     assert life.goal.state is State.EXECUTING
-
-
-def test_the_deadline_shown_is_the_earliest_that_means_something() -> None:
-    life = executing()
-    assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, 2.0)
-    life.on(Event.INTERRUPTED)
-    assert life.goal.deadline(life.now) == (Event.CANCEL_DUE, 4.0), "not the next question"
-    assert life.due_in == ASK_AGAIN
-    life.on(Event.RESULT, CANCELED)
-    assert life.goal.deadline(life.now) is None
 
 
 def test_what_is_held_falls_due_later_and_nothing_else_does() -> None:
@@ -765,13 +729,6 @@ def test_feedback_clears_the_doubt() -> None:
     assert life.goal.state is State.EXECUTING
 
 
-def test_a_goal_that_its_server_denies_is_canceled_all_the_same() -> None:
-    life = executing()
-    assert [life.on(Event.RESULT_UNKNOWN) for _ in range(DOUBTS - 1)] == [[]] * (DOUBTS - 1)
-    assert life.on(Event.RESULT_UNKNOWN) == [CANCEL, RELEASE]
-    life.ended(Outcome.SERVER_LOST, End.UNKNOWN)
-
-
 @pytest.mark.parametrize("make", [sending, executing, unconfirmed])
 def test_what_its_node_leaves_is_canceled_where_its_server_is_seen_again(make: Any) -> None:
     life = make()
@@ -787,14 +744,6 @@ def test_what_its_node_leaves_is_canceled_where_its_server_is_seen_again(make: A
     assert (life.goal.state, life.goal.end) == (State.DONE, End.CANCELED)
 
 
-def test_a_canceled_goal_that_the_server_has_forgotten_ends() -> None:
-    life = executing()
-    life.on(Event.INTERRUPTED)
-    for _ in range(DOUBTS):
-        life.on(Event.RESULT_UNKNOWN)
-    life.ended(Outcome.CANCELED, End.UNKNOWN)
-
-
 def test_where_the_result_is_lost_the_status_topic_says_how_it_ended() -> None:
     life = executing(Timeouts(result=None))
     life.on(Event.STATUS, STATUS_ABORTED)
@@ -802,29 +751,6 @@ def test_where_the_result_is_lost_the_status_topic_says_how_it_ended() -> None:
         assert life.pass_time(ASK_AGAIN) == [ASK]
     life.pass_time(ASK_AGAIN)
     life.ended(Outcome.SERVER_LOST, End.ABORTED)
-
-
-@pytest.mark.parametrize(
-    ("status", "end"), [(STATUS_ABORTED, End.UNKNOWN), (STATUS_CANCELED, End.CANCELED)]
-)
-def test_where_a_lost_result_alone_could_have_said_that_nothing_goes_on_an_abort_does_not(
-    status: int, end: End
-) -> None:
-    life = executing(Timeouts(result=None), settles=lambda result: result is not None)
-    life.on(Event.STATUS, status)
-    for _ in range(RESULT_QUESTIONS + 1):
-        life.pass_time(ASK_AGAIN)
-    assert (life.goal.state, life.goal.end) == (State.DONE, end)
-
-
-def test_a_goal_that_has_ended_is_not_stalled_because_it_is_silent() -> None:
-    life = executing(Timeouts(result=30.0, feedback=2.0))
-    life.on(Event.STATUS, STATUS_SUCCEEDED)
-    life.on(Event.FEEDBACK, "overtaken by the status")
-    for _ in range(RESULT_QUESTIONS):
-        assert life.pass_time(ASK_AGAIN) == [ASK]
-    life.pass_time(ASK_AGAIN)
-    life.ended(Outcome.SERVER_LOST, End.SUCCEEDED)
 
 
 def test_a_result_that_is_lost_until_the_deadline_leaves_its_end_known() -> None:
@@ -853,12 +779,6 @@ def test_a_process_that_ends_says_which_goal_it_cannot_account_for(make: Any) ->
     assert life.goal.state is State.DONE
     assert life.goal.end is End.UNKNOWN
     assert life.goal.outcome is not None
-
-
-def test_a_process_that_ends_before_sending_has_nothing_to_account_for() -> None:
-    life = waiting()
-    life.on(Event.PROCESS_EXITING)
-    life.ended(Outcome.CANCELED, End.NEVER_STARTED)
 
 
 # Somebody else's word
@@ -902,13 +822,6 @@ def test_what_was_replaced_is_canceled_whatever_it_ended_with() -> None:
         life.ended(Outcome.CANCELED, end)
 
 
-def test_what_was_replaced_is_canceled_when_it_does_not_end_in_time() -> None:
-    life = replaced()
-    assert life.pass_time(4.0) == [CANCEL, ASK]
-    life.on(Event.RESULT, CANCELED)
-    life.ended(Outcome.CANCELED, End.CANCELED)
-
-
 @pytest.mark.parametrize("already", [False, True])
 def test_what_was_replaced_on_another_server_is_canceled_at_once(already: bool) -> None:
     life = replaced() if already else executing()
@@ -948,14 +861,6 @@ def test_replaced_before_acceptance_it_is_canceled_when_it_turns_up() -> None:
     assert life.on(Event.REPLACED) == []
     assert life.goal.reason == "replaced by a newer goal before it was accepted"
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK]
-
-
-def test_a_cancel_without_a_deadline_has_an_outcome_when_nobody_waits_any_more() -> None:
-    life = executing(Timeouts(cancel=None))
-    life.on(Event.INTERRUPTED)
-    assert life.goal.outcome is None
-    life.on(Event.DRAINED)
-    assert (life.goal.outcome, life.goal.end) == (Outcome.CANCELED, End.UNKNOWN)
 
 
 def test_what_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_up() -> None:
@@ -1003,13 +908,6 @@ def test_only_denials_count_towards_denied_for_good() -> None:
     assert life.goal.unconfirmed, "silence is no denial"
     denied(life)
     assert not life.goal.unconfirmed
-
-
-def test_a_server_that_refuses_to_cancel_it_has_accepted_it() -> None:
-    life = denied_unconfirmed()
-    assert life.on(Event.CANCEL_ANSWERED, CANCEL_REJECTED) == [CANCEL, ASK]
-    assert life.goal.accepted
-    assert life.goal.end is End.UNKNOWN
 
 
 def test_what_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_good() -> None:

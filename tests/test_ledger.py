@@ -18,7 +18,6 @@ from bt_actions.recovery import ledger as module
 from bt_actions.recovery.ledger import (
     KEPT_FOR,
     LENGTH,
-    SERVERS_AT_MOST,
     Ledger,
     Sent,
     left_behind,
@@ -153,17 +152,6 @@ def test_the_child_of_a_fork_leaves_its_parents_file_alone(ledger: Ledger, direc
     assert not on_record(directory)
 
 
-def test_a_goal_of_the_child_has_a_file_of_its_own(ledger: Ledger, directory: Path) -> None:
-    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
-    child = os.fork()
-    if not child:
-        ledger.disown()
-        ledger.enter(new_goal_id(), "/child", 0, SERVERS)
-        os._exit(0)
-    os.waitpid(child, 0)
-    assert [sent.action for sent in found()] == ["/child"]
-
-
 def test_without_room_it_complains_once_and_the_goal_goes_on(
     ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -210,19 +198,6 @@ def test_where_nobody_has_sent_anything_there_is_nothing_to_read(directory: Path
     assert found() == []
 
 
-def test_what_cannot_be_opened_once_is_tried_again(
-    ledger: Ledger, complaints: list[str], directory: Path
-) -> None:
-    directory.parent.mkdir()
-    directory.touch()
-    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
-    assert len(complaints) == 1
-    directory.unlink()
-    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
-    assert len(on_record(directory)) == 1
-    assert len(complaints) == 1
-
-
 def test_a_directory_that_depends_on_where_one_stands_is_refused(
     ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -231,14 +206,6 @@ def test_a_directory_that_depends_on_where_one_stands_is_refused(
     assert "no absolute path" in complaints[0]
     assert found() == []
     assert [trouble.filename for trouble in troubles] == ["records"]
-
-
-def test_of_many_servers_none_is_on_record(ledger: Ledger, directory: Path) -> None:
-    many = [bytes([number]) * 16 for number in range(SERVERS_AT_MOST + 1)]
-    ledger.enter(new_goal_id(), "/" + "m" * 254, 0, many[:-1])
-    ledger.enter(new_goal_id(), "/" + "m" * 254, 0, many)
-    assert sorted(len(each["servers"]) for each in on_record(directory)) == [0, SERVERS_AT_MOST]
-    assert {path.stat().st_size for path in directory.iterdir()} == {LENGTH}
 
 
 ENTRY: dict[str, object] = {
@@ -270,35 +237,6 @@ def test_what_makes_no_sense_is_told_and_hides_no_other(text: bytes, directory: 
     assert [sent.goal_id.hex() for sent in found()] == [good]
     [trouble] = troubles
     assert "damaged" in str(trouble)
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("domain", "0"),
-        ("domain", True),
-        ("action", "/" + "a" * 255),
-        ("action", "relative"),
-        ("action", "/a\n"),
-        ("action", "/\x1b[2J"),
-        ("action", ["/a"]),
-        ("servers", 3),
-        ("servers", ["x"]),
-        ("lost", 0),
-        ("accept", "no"),
-        ("accept", -1.0),
-        ("accept", float("nan")),
-        ("accept", 1e6),
-        *((key, None) for key in ("domain", "action", "servers", "lost", "accept")),
-    ],
-)
-def test_a_wrong_field_makes_no_sense(key: str, value: object, directory: Path) -> None:
-    entry = ENTRY | {key: value}
-    if value is None:
-        del entry[key]
-    put(directory, json.dumps(entry).encode())
-    assert found() == []
-    assert len(troubles) == 1
 
 
 def test_what_cannot_be_read_is_told(directory: Path) -> None:

@@ -20,7 +20,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.composites import Sequence
 
-from bt_actions import ActionBehaviour, MoveRobot, Retry, Timeouts, load_tree
+from bt_actions import MoveRobot, Retry, Timeouts, load_tree
 from bt_actions.behaviours.variables import Var
 from bt_actions.render.graphviz import RenderError
 from bt_actions.render.look import rows
@@ -157,26 +157,6 @@ def test_a_card_shows_every_policy_as_it_is_in_effect(tree: Path) -> None:
     assert tables["Retry"]["when"] == "result.final_pose > 0.0"
 
 
-def test_a_card_shows_the_types_of_an_action_with_fields_and_constants(tree: Path) -> None:
-    tables = card(page(load_tree(tree)), "To the part").tables
-    assert tables["MoveRobot.Goal"] == {"distance": "float64"}
-    assert tables["MoveRobot.Result"]["final_pose"] == "float64"
-    assert tables["MoveRobot.Feedback"]["STATUS_MOVING"].startswith("= ")
-
-
-def test_the_root_and_a_subtree_show_their_inputs_and_outputs(tree: Path) -> None:
-    outer = tree.with_name("outer.yaml")
-    inside = "{subtree: fetch.yaml, name: In, with: {at: 1.0}}"
-    outer.write_text(f"tree: outer\nroot: {{sequence: Out, children: [{inside}]}}\n")
-    for text, name in ((page(load_tree(tree)), "Fetch"), (page(load_tree(outer)), "In")):
-        tables = card(text, name).tables
-        assert tables["Inputs"] == {"at": "float64, 2.0 m"}
-        assert tables["Outputs"] == {"pose": "float64"}
-    inner = card(page(load_tree(outer)), "To the part")
-    assert inner.yaml.startswith("move: To the part")
-    assert inner.place.startswith(str(tree))
-
-
 def test_a_tree_made_in_python_shows_what_there_is() -> None:
     def near(result: Any) -> bool:
         return bool(result)
@@ -199,18 +179,6 @@ def test_a_behaviour_of_somebody_else_shows_its_class() -> None:
 
     assert card(page(Mine("mine")), "mine").tables["Behaviour"]["class"].endswith(".Mine")
     assert card(page(py_trees.behaviours.Success("ours")), "ours").tables == {}
-
-
-@pytest.mark.parametrize("name", ["no_such_package/action/X", "nonsense", "std_msgs/action/X"])
-def test_a_type_that_cannot_be_read_is_said_and_the_rest_is_shown(name: str) -> None:
-    tables = card(page(ActionBehaviour("a", name, "server", {})), "a").tables
-    assert tables["Action"]["type"] == name
-    assert list(tables["Type"]) == ["cannot be read here"]
-
-
-def test_a_value_of_any_length_is_cut(tmp_path: Path) -> None:
-    (path := tmp_path / "t.yaml").write_text(f"tree: t\nroot: {{log: {'x' * 100_000}}}\n")
-    assert len(page(load_tree(path))) - len(page(py_trees.behaviours.Success("s"))) < 10_000
 
 
 NASTY = (
@@ -327,11 +295,6 @@ def test_a_large_tree_starts_folded_where_it_can_be_taken_in(
             parent.add_children(nodes)
         level = [node for nodes in below for node in nodes]
     assert open_depth(list(rows(root)), 40) == depth
-
-
-@pytest.mark.parametrize(("direction", "down"), [(None, True), ("down", True), ("right", False)])
-def test_direction_is_respected(direction: str | None, down: bool, tree: Path) -> None:
-    assert _Reader(page(load_tree(tree), direction=direction)).data["down"] is down
 
 
 def test_a_node_that_another_is_merged_into_shows_its_own_lines(tmp_path: Path) -> None:

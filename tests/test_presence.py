@@ -8,7 +8,6 @@ from bt_actions.servers.presence import (
     LEASE,
     NOT_READY_FOR,
     PROBE_EVERY,
-    PROBES_KEPT,
     SETTLED_AFTER,
     SLOWEST_START,
     Server,
@@ -139,12 +138,6 @@ def test_it_is_probed_now_and_then_while_the_question_is_open(watch: ServerWatch
     assert watch.wants_probe(1.0 + PROBE_EVERY)
 
 
-def test_where_two_have_answered_it_is_not_probed_any_more(watch: ServerWatch) -> None:
-    crowd(watch).probe_answered(1.1, 1)
-    watch.probe_answered(1.1, 1)
-    assert not watch.wants_probe(9.0)
-
-
 def test_it_is_gone_when_nobody_a_goal_was_sent_to_is_shown(watch: ServerWatch) -> None:
     assert not watch.gone(0.0, gids(OLD))
     watch.observe(1.0, True, gids(NEW))
@@ -186,37 +179,11 @@ def test_a_second_server_that_is_discovered_in_part_does_not_make_the_first_gone
     assert watch.gone(61.0, gids(OLD))
 
 
-def test_who_has_answered_is_alone_also_when_its_probe_is_long_past(watch: ServerWatch) -> None:
-    """It is busy since, and answers no newer one."""
-    settle(watch)
-    for probe in range(2, 2 * PROBES_KEPT):
-        watch.probe_sent(5.0 + probe / 2, probe)
-    watch.observe(30.0, True, gids(OLD, NEW))
-    assert watch.alone
-
-
-def test_who_only_sees_concludes_nothing_from_silence(watch: ServerWatch) -> None:
-    crowd(watch).probe_answered(1.1, 1)
-    late = 1.1 + SLOWEST_START
-    watch.observe(late, True, gids(OLD, NEW), concludes=False)
-    assert not watch.alone
-    watch.observe(late, True, gids(OLD, NEW))
-    assert watch.alone
-
-
 def test_a_newcomer_is_a_change_and_a_departure_is_not(watch: ServerWatch) -> None:
     assert not watch.changed(gids(OLD))
     assert crowd(watch).changed(gids(OLD))
     watch.observe(2.0, True, gids(NEW))
     assert not watch.changed(gids(OLD, NEW))
-
-
-def test_looking_seldom_is_not_being_away(watch: ServerWatch) -> None:
-    """Nobody looked for a minute; the first look finds it not ready, for how long nobody knows."""
-    watch.observe(60.0, False, gids(OLD))
-    assert not watch.gone(60.0, gids(OLD))
-    watch.observe(60.0 + NOT_READY_FOR, False, gids(OLD))
-    assert watch.gone(60.0 + NOT_READY_FOR, gids(OLD))
 
 
 def test_after_a_standstill_of_ours_answers_have_time_to_come_in(watch: ServerWatch) -> None:
@@ -229,19 +196,3 @@ def test_after_a_standstill_of_ours_answers_have_time_to_come_in(watch: ServerWa
         assert watch.state(now) is Server.SETTLING
     watch.observe(late + SETTLED_AFTER, True, gids(OLD, NEW))
     assert watch.state(late + SETTLED_AFTER) is Server.READY
-
-
-def test_a_ghost_that_a_standstill_has_hidden_has_a_moment_to_go(watch: ServerWatch) -> None:
-    crowd(watch)
-    late = 1.0 + LEASE + 10.0
-    watch.stood_still(late)
-    watch.observe(late, True, gids(OLD, NEW))
-    assert watch.state(late) is Server.SETTLING
-    assert watch.state(late + SETTLED_AFTER) is Server.AMBIGUOUS
-
-
-def test_who_is_not_ready_is_not_alone(watch: ServerWatch) -> None:
-    settle(watch).probe_sent(5.0, 2)
-    watch.probe_answered(5.0, 2)
-    watch.observe(7.0, False, gids(OLD, NEW))
-    assert not watch.alone_since(7.0, 4.9)

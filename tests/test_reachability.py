@@ -5,13 +5,11 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.servers.reachability import (
-    AT_ONCE,
     DOUBT_LASTS,
     MUTE_AFTER,
     TRIES,
     TRY_AGAIN,
     TRY_LASTS,
-    TWICE,
     Reachability,
 )
 
@@ -59,45 +57,6 @@ def test_an_answer_of_before_the_standstill_proves_nothing(reachability: Reachab
     reachability.answered(30.0)
     assert not reachability.in_doubt(31.0)
     assert not reachability.is_unresponsive(99.0)
-
-
-@pytest.mark.parametrize("ask_after", [AT_ONCE, TWICE])
-def test_in_a_doubt_it_is_asked_so_often(
-    reachability: Reachability, ask_after: tuple[float, ...]
-) -> None:
-    reachability.doubt(30.0, ask_after)
-    asked = [now / 10 for now in range(300, 1000) if reachability.take_question(now / 10)]
-    assert asked == [30.0 + seconds for seconds in ask_after]
-    reachability.doubt(100.0)
-    reachability.answered(100.0)
-    assert not reachability.take_question(199.0), "it was answered"
-
-
-def test_standstills_that_follow_each_other_are_one_doubt(reachability: Reachability) -> None:
-    for now in (30.0, 36.0, 42.0):
-        reachability.doubt(now)
-        assert reachability.take_question(now) is (now == 30.0)
-        assert reachability.in_doubt(now) == DOUBT_LASTS
-        assert reachability.is_unresponsive(now + MUTE_AFTER) is (now < 42.0)
-        reachability.tried(now + MUTE_AFTER)
-
-
-def test_an_answer_to_what_was_asked_before_is_no_proof_but_a_reason_to_ask(
-    reachability: Reachability,
-) -> None:
-    """A stall after the first question, and before its answer was taken."""
-    reachability.doubt(30.0)
-    assert reachability.take_question(30.0)
-    reachability.asked(30.0)
-    reachability.doubt(32.0)
-    assert not reachability.take_question(33.0), "a busy server is not asked twice"
-    reachability.answered(30.0)
-    assert reachability.in_doubt(33.0)
-    assert reachability.take_question(33.0)
-    reachability.answered(33.0)
-    assert not reachability.in_doubt(33.0)
-    reachability.answered(30.0)
-    assert not reachability.take_question(34.0)
 
 
 def test_another_way_is_looked_for_now_and_then(reachability: Reachability) -> None:

@@ -135,11 +135,6 @@ def test_dot_gives_py_trees_shapes_and_shows_server_and_type_of_an_action(root: 
     assert dot.count(" -> ") == 9
 
 
-def test_nodes_of_one_name_stay_two_nodes() -> None:
-    root = Sequence("same", memory=True, children=[Action("same"), Action("same")])
-    assert render.dot(root).count("[shape=") == 3
-
-
 @pytest.mark.parametrize(
     "name", ['a "b" <c> & d', "back\\slash", "bell\x07 and\nbreak", "ünï 日本"]
 )
@@ -223,26 +218,6 @@ def test_an_unknown_suffix_is_an_error_that_names_the_known_ones(name: str, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_cannot_be_written_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(render.RenderError, match="No such file or directory"):
-        render.write(Sequence("s", memory=True), tmp_path / "missing" / "tree.txt")
-    (tmp_path / "tree.txt").mkdir()
-    with pytest.raises(render.RenderError, match="cannot be written"):
-        render.write(Sequence("s", memory=True), tmp_path / "tree.txt")
-    assert [path.name for path in tmp_path.iterdir()] == ["tree.txt"]
-
-
-def test_writing_replaces_the_file_behind_a_link_and_keeps_its_permissions(tmp_path: Path) -> None:
-    target, link = tmp_path / "target.txt", tmp_path / "tree.txt"
-    target.write_text("old")
-    target.chmod(0o640)
-    link.symlink_to(target)
-    render.write(Sequence("new", memory=True), link)
-    assert link.is_symlink()
-    assert target.read_text() == "{-} new\n"
-    assert target.stat().st_mode & 0o777 == 0o640
-
-
 def test_without_pygraphviz_text_and_dot_still_work(
     root: Behaviour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -251,10 +226,3 @@ def test_without_pygraphviz_text_and_dot_still_work(
         render.content(root, "svg")
     assert render.content(root, "txt")
     assert render.content(root, "dot")
-
-
-def test_what_graphviz_says_on_standard_error_is_not_shown(
-    root: Behaviour, capfd: pytest.CaptureFixture[str]
-) -> None:
-    render.content(root, "png")
-    assert capfd.readouterr().err == ""

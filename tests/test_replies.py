@@ -68,15 +68,6 @@ def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
     assert said.finished(watch, 0.0, 0.0, [(2, None)]) == [(Event.STATUS, 2)]
 
 
-def test_what_was_asked_before_one_has_left_may_be_its_word(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    watch.observe(1.0, True, frozenset({ONE}))
-    assert said.finished(watch, 1.1, 0.9, [SUCCEEDED]) == []
-    assert events(said.looked(watch, 1.2)) == [Event.SERVER_CHANGED], "ask who is left"
-    assert said.finished(watch, 1.3, 1.2, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
-
-
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
@@ -119,16 +110,6 @@ def test_what_both_have_ended_was_at_two_servers(said: replies.Replies, watch: S
     assert watch.both_live
 
 
-def test_a_denial_by_a_newcomer_is_no_word_of_the_other(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    watch.observe(0.0, True, BOTH | {b"newcomer"})
-    assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == []
-    answers = [ABORTED, UNKNOWN, SUCCEEDED]
-    told = said.finished(watch, 0.0, 0.0, answers)
-    assert told == [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, SUCCEEDED)]
-
-
 def test_an_end_counts_when_the_other_is_a_ghost(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
     assert said.looked(watch, 0.0) == []
@@ -156,16 +137,6 @@ def test_a_refusal_may_be_that_of_the_one_that_has_gone_since(
     assert events(said.answered(watch, 1.1, [False])) == [Event.SERVER_AMBIGUOUS]
 
 
-def test_what_was_asked_before_both_had_it_does_not_count(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    said.answered(watch, 1.0, [True])
-    said.answered(watch, 2.0, [True, True])
-    assert said.finished(watch, 2.1, 1.5, [ABORTED, UNKNOWN]) == [], "it was still deciding"
-    assert said.finished(watch, 2.2, 2.1, [ABORTED]) == []
-    assert said.finished(watch, 2.2, 2.1, [ABORTED, CANCELED_END]) == [(Event.RESULT, CANCELED_END)]
-
-
 def test_what_one_denies_the_other_may_have(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.canceled(watch, 0.0, 0.0, [DENIED]) == []
     assert said.canceled(watch, 0.0, 0.0, [DENIED, CANCELED]) == [(Event.CANCEL_ANSWERED, CANCELED)]
@@ -183,17 +154,6 @@ def test_two_that_live_are_told_of_where_both_may_have_it(
     assert events(said.looked(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
     said.sent_to = frozenset({ONE})
     assert Event.SERVER_AMBIGUOUS not in events(said.looked(watch, 0.0)), "it came later"
-
-
-def test_what_a_newcomer_denied_may_arrive_when_it_is_gone(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    said.sent_to = frozenset({ONE})
-    said.looked(watch, 1.0)
-    watch.observe(1.1, True, frozenset({ONE}))
-    assert events(said.looked(watch, 1.1)) == [Event.SERVER_CHANGED]
-    assert said.finished(watch, 1.2, 1.0, [UNKNOWN]) == []
-    assert events(said.finished(watch, 1.3, 1.2, [UNKNOWN])) == [Event.RESULT_UNKNOWN]
 
 
 def test_a_lost_server_is_back_only_when_it_can_be_talked_to(
@@ -262,17 +222,6 @@ def test_the_status_of_one_of_two_shows_no_end(said: replies.Replies, watch: Ser
     assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 5)]
 
 
-def test_who_gives_feedback_lives_whoever_denies_the_goal(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    said.sent_to = frozenset({ONE})
-    said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
-    said.looked(watch, 0.0)
-    said.finished(watch, 0.0, 0.0, [UNKNOWN])
-    said.lives(watch, 0.2)
-    assert events(said.looked(watch, alone(watch))) == [Event.SERVER_CHANGED]
-
-
 @pytest.mark.parametrize(
     ("word", "told"),
     [
@@ -288,16 +237,6 @@ def test_what_comes_when_one_has_just_left_may_be_its_word(
 ) -> None:
     watch.observe(1.0, True, frozenset({ONE}))
     assert events(word(said, watch)) == told
-
-
-def test_a_newcomer_is_not_one_that_is_back(watch: ServerWatch) -> None:
-    said = sent(watch)
-    said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
-    said.looked(watch, 0.5)
-    watch.observe(1.0, True, BOTH)
-    assert said.finished(watch, 1.0, 0.5, [UNKNOWN]) == []
-    watch.observe(1.1, True, frozenset({OTHER}))
-    assert events(said.looked(watch, 1.1)) == [Event.SERVER_LOST]
 
 
 def told(said: replies.Replies, what: replies.Told, now: float) -> list[Event]:
@@ -333,41 +272,6 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
     assert told(said, said.looked(watch, later), later) == [Event.SERVER_LOST]
 
 
-@pytest.mark.parametrize("word", ["feedback", "status", "answer to a cancel request"])
-def test_any_word_of_the_server_tells_it_from_who_was_in_sight(
-    watch: ServerWatch, word: str
-) -> None:
-    said = beside_a_newcomer(watch)
-    told(said, said.answered(watch, 0.1, [True]), 0.1)
-    now = alone(watch)
-    said.finished(watch, now, now, [UNKNOWN])
-    if word == "feedback":
-        said.lives(watch, now)
-    elif word == "status":
-        said.shown(watch, now, 2)
-    else:
-        said.canceled(watch, now, now, [CANCELED])
-    said.finished(watch, now, now, [UNKNOWN])
-    watch.probe_sent(now, 2)
-    watch.probe_answered(now, 2)
-    assert said.looked(watch, now + SETTLED_AFTER) == []
-    third = BOTH | {b"third"}
-    watch.observe(now + 1.0, True, third)
-    assert events(said.looked(watch, now + 1.0)) == [Event.SERVER_CHANGED], "this one may have"
-
-
-def test_a_word_may_be_older_than_the_newcomer_that_it_comes_in_beside(watch: ServerWatch) -> None:
-    said = beside_a_newcomer(watch)
-    told(said, said.answered(watch, 0.1, [True]), 0.1)
-    said.lives(watch, replies.OVERTAKEN / 2)
-    said.finished(watch, 1.0, 1.0, [UNKNOWN])
-    watch.probe_sent(1.0, 1)
-    watch.probe_answered(1.0, 1)
-    now = 1.0 + SLOWEST_START + SETTLED_AFTER
-    watch.observe(now, True, BOTH)
-    assert events(said.looked(watch, now)) == [Event.SERVER_LOST]
-
-
 def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -> None:
     said = beside_a_newcomer(watch)
     told(said, [(Event.INTERRUPTED, None)], 0.0)
@@ -380,15 +284,6 @@ def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -
     now += SETTLED_AFTER
     assert told(said, said.looked(watch, now), now) == [Event.SERVER_LOST]
     assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"
-
-
-def test_where_one_says_that_it_runs_it_has_not_ended(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    assert said.finished(watch, 0.1, 0.0, [ABORTED]) == []
-    for answers in ([ABORTED, (2, None)], [(2, None), ABORTED]):
-        assert said.finished(watch, 0.1, 0.0, answers) == [(Event.STATUS, 2)]
-    assert said.looked(watch, alone(watch)) == [], "and not what was said before"
 
 
 def test_two_that_accepted_it_both_have_to_tell_also_where_one_came_later(

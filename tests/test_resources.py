@@ -42,13 +42,6 @@ def test_there_are_four_ways_to_meet_a_taken_resource(busy: Busy, answer: Answer
     assert held_by("a").request("b", BASE, busy) is answer
 
 
-def test_who_fails_leaves_no_trace() -> None:
-    table = held_by("a")
-    table.request("b", BASE, Busy.FAIL)
-    assert len(table) == 1
-    assert table.request("b", BASE, Busy.WAIT) is Answer.QUEUED
-
-
 def test_a_release_grants_to_who_waits_longest() -> None:
     table = held_by("a")
     for waiter in ("b", "c"):
@@ -84,22 +77,6 @@ def test_who_gives_up_waiting_lets_those_behind_it_through() -> None:
     table.request("b", BOTH, Busy.WAIT)
     table.request("c", ARM, Busy.WAIT)
     assert table.release("b") == ["c"]
-
-
-def test_releasing_twice_does_no_harm() -> None:
-    table = held_by("a")
-    table.request("b", BASE, Busy.WAIT)
-    assert table.release("a") == ["b"]
-    assert table.release("a") == []
-    assert table.holders(BASE) == ["b"]
-
-
-def test_nobody_asks_twice() -> None:
-    table = held_by("a")
-    table.request("b", BASE, Busy.WAIT)
-    for holder in ("a", "b"):
-        with pytest.raises(ValueError, match="holds or waits already"):
-            table.request(holder, ARM, Busy.WAIT)
 
 
 class AnyOrder(RuleBasedStateMachine):

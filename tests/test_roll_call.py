@@ -91,27 +91,6 @@ def test_each_server_has_to_answer() -> None:
     assert roll.known
 
 
-def test_one_that_went_away_untold_stays_unknown_in_every_participant() -> None:
-    """Closed, killed, or frozen beyond its lease: nobody can tell."""
-    roll = Roll()
-    roll.shows(A, B)
-    roll.ask(1)
-    roll.shows(A)
-    for _ in range(10):
-        roll.ask(1)
-    assert not roll.known
-    roll.begin(roll.now)
-    roll.shows(A)
-    for _ in range(10):
-        roll.ask(1)
-    assert not roll.known
-    assert roll.trouble == "a server of {} went away meanwhile"
-    assert roll.servers == {A, B}, "either may run what was found"
-    roll.shows(A, B)
-    roll.settle(answers=2)
-    assert roll.known, "it is back"
-
-
 def test_one_that_was_known_may_go() -> None:
     roll = Roll()
     roll.shows(A)
@@ -130,20 +109,6 @@ def test_one_that_comes_newly_begins_anew() -> None:
     assert not roll.known
     assert not roll.overdue(roll.now), "it is on the way"
     roll.settle(answers=2)
-    assert roll.known
-
-
-def test_a_status_without_a_server_has_to_be_answered_for_too() -> None:
-    roll = Roll()
-    roll.sees(frozenset(), roll.now)
-    assert not roll.sighted
-    assert roll.overdue(roll.now), "there is nothing on the way"
-    roll.sees(frozenset(), roll.now, published=True)
-    assert roll.sighted
-    for _ in range(10):
-        roll.ask(0)
-    assert not roll.known
-    roll.settle()
     assert roll.known
 
 

@@ -105,13 +105,6 @@ class TestRun:
         with TreeRunner(Gate(), node=node) as runner, pytest.raises(ValueError, match="seconds"):
             runner.run(timeout=float("nan"))
 
-    def test_a_wait_may_be_longer_than_a_thread_can_wait(self, node: Any) -> None:
-        with TreeRunner(py_trees.behaviours.Success("s"), node=node) as runner:
-            runner.start()
-            with pytest.raises(ValueError, match="number of seconds"):
-                runner.wait(float("nan"))
-            assert runner.wait(1e300) is Status.SUCCESS
-
     def test_after_shutdown_it_raises(self, node: Any) -> None:
         runner = TreeRunner(Gate(), node=node)
         runner.shutdown()
@@ -368,20 +361,6 @@ class TestStart:
             runner.start()
             assert runner.wait(5.0) is Status.SUCCESS
 
-    def test_from_a_callback_of_that_node(self, journal: Journal, name: str, node: Any) -> None:
-        runners: list[TreeRunner] = []
-
-        def callback() -> None:
-            runner = TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node)
-            runner.start()
-            runners.append(runner)
-
-        with spun(node) as executor:
-            executor.create_task(callback)
-            until(lambda: runners)
-            assert runners[0].wait(5.0) is Status.SUCCESS
-            runners[0].shutdown()
-
     def test_wait_gives_up_and_the_tree_goes_on(self, node: Any) -> None:
         gate = Gate()
         with TreeRunner(gate, node=node) as runner:
@@ -390,17 +369,6 @@ class TestStart:
                 runner.wait(0.05)
             gate.passed = True
             assert runner.wait(5.0) is Status.SUCCESS
-
-    def test_who_gave_up_waiting_is_told_what_the_goals_do(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        told = list[str]()
-        with TreeRunner(MoveRobot("m", 9.0, action_name=name), node=node) as runner:
-            runner.observe(lambda e: told.append(e.state) if isinstance(e, GoalChanged) else None)
-            runner.start()
-            until(lambda: "EXECUTING" in told)
-            with pytest.raises(TimeoutError, match=f"0.05 s; m on {name} is EXECUTING$"):
-                runner.wait(0.05)
 
     def test_wait_without_start_raises(self, node: Any) -> None:
         with TreeRunner(Gate(), node=node) as runner, pytest.raises(RuntimeError, match="started"):
@@ -420,20 +388,6 @@ class TestStart:
         until(lambda: not runner._running.locked())
         runner.shutdown()
         assert "the tree that was started raised TreeError: culprit: tick" in capfd.readouterr().err
-
-    def test_shutdown_ends_a_run_on_another_thread(
-        self, journal: Journal, name: str, node: Any
-    ) -> None:
-        leaf = MoveRobot("m", 9.0, action_name=name)
-        runner = TreeRunner(leaf, node=node)
-        returned: list[Status] = []
-        thread = threading.Thread(target=lambda: returned.append(runner.run()))
-        thread.start()
-        until(lambda: state(leaf) == "EXECUTING")
-        runner.shutdown()
-        assert journal.ends() == ["canceled"]
-        thread.join(1.0)
-        assert returned == [Status.INVALID]
 
     @pytest.mark.parametrize("last", [GoalChanged, TreeFinished])
     def test_shutdown_by_an_observer_is_refused(
@@ -455,13 +409,6 @@ class TestStart:
             assert runner.wait(5.0) is Status.SUCCESS
         assert "interrupt()" in told[0]
 
-    def test_leaving_the_context_drains(self, journal: Journal, name: str, node: Any) -> None:
-        leaf = MoveRobot("m", 9.0, action_name=name)
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
-            until(lambda: state(leaf) == "EXECUTING")
-        assert journal.ends() == ["canceled"]
-
 
 class TestWhoSpins:
     def test_a_node_in_an_executor_that_nobody_spins_is_an_error(
@@ -480,21 +427,6 @@ class TestWhoSpins:
         executor.shutdown()
         node.executor = None
 
-    def test_an_interrupt_and_a_timeout_are_heard_while_it_waits_for_somebody_to_spin(
-        self, node: Any, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(spinning, "PATIENCE_SPUN", 60.0)
-        executor = SingleThreadedExecutor(context=node.context)
-        executor.add_node(node)
-        with TreeRunner(Gate(), node=node) as runner:
-            with pytest.raises(TimeoutError):
-                runner.run(timeout=0.1)
-            runner.start()
-            runner.interrupt()
-            assert runner.wait(9.0) is Status.INVALID
-        executor.shutdown()
-        node.executor = None
-
     def test_an_executor_of_the_users_that_is_shut_down_ends_the_run_at_once(
         self, journal: Journal, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -510,23 +442,6 @@ class TestWhoSpins:
             with pytest.raises(RuntimeError, match="was shut down"):
                 runner.wait(9.0)
         assert journal.ends() in (["succeeded"], ["canceled"])
-
-    @pytest.mark.chaos
-    def test_an_executor_that_stands_still_is_an_error_as_well(
-        self, journal: Journal, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(spinning, "PATIENCE_SPUN", 1.0)
-        leaf = MoveRobot("m", 9.0, action_name=name)
-        free, held = threading.Event(), threading.Event()
-        with spun(node) as executor, TreeRunner(leaf, node=node) as runner:
-            runner.start()
-            until(lambda: state(leaf) == "EXECUTING")
-            executor.create_task(lambda: (held.set(), free.wait(20.0)))
-            held.wait(5.0)
-            with pytest.raises(RuntimeError, match="have not returned for 1 s"):
-                runner.wait(15.0)
-            assert journal.ends() == ["canceled"]
-            free.set()
 
     @pytest.mark.parametrize(
         "whose", ["the executor's", pytest.param("rclpy's", marks=pytest.mark.chaos)]
@@ -597,19 +512,6 @@ class TestWhoSpins:
             assert runner.unaccounted == []
             with pytest.raises(TreeError, match="was taken out of its executor, or that was shut"):
                 runner.run(timeout=5.0)
-
-    def test_a_node_that_the_user_moves_to_another_executor_stays_there(self, node: Any) -> None:
-        another = SingleThreadedExecutor(context=node.context)
-        with TreeRunner(Gate(), node=node) as runner:
-            runner.start()
-            until(lambda: runner.tree.root.status is Status.RUNNING)
-            another.add_node(node)
-            with pytest.raises(TreeError, match="was taken out of its executor"):
-                runner.wait(5.0)
-        assert node in another.get_nodes()
-        assert node.executor is another
-        another.shutdown()
-        node.executor = None
 
     def test_a_context_that_is_shut_down_under_the_tree_ends_it(
         self, journal: Journal, name: str, executor: str

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import array
-import time
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -72,18 +70,6 @@ def test_what_is_longer_than_the_limit_ends_with_an_ellipsis() -> None:
     assert shorten("a" * 1000, 10) == "'aaaaaaaa…"
     assert shorten({"a": "b" * 10, "c": "d" * 10}, 25) == "{a: 'bbbbbbbbbb', c: 'dd…"
     assert shorten([1, 2, 3], 9) == "[1, 2, 3]"
-
-
-def test_no_value_takes_long_however_much_it_holds() -> None:
-    doubled: list[Any] = [1]
-    for _ in range(5000):
-        doubled = [doubled, doubled]
-    itself: list[Any] = []
-    itself.append(itself)
-    for value in (doubled, itself, "a" * 100_000_000, array.array("d", [0.5]) * 10_000_000):
-        started = time.thread_time()
-        assert len(shorten(value)) <= 300
-        assert time.thread_time() - started < 0.05
 
 
 VALUES = st.recursive(

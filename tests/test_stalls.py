@@ -37,16 +37,6 @@ def test_whoever_asks_first_notices(stalls: Stalls) -> None:
     assert stalls.long_times == 0
 
 
-def test_who_is_asked_before_it_wakes_may_sleep_on(stalls: Stalls) -> None:
-    assert stalls.answers_take(10.1) == 0.0
-    assert stalls.answers_take(10.1 + STOOD_STILL) == 0.0
-
-
-def test_who_works_means_to_be_done_at_once(stalls: Stalls) -> None:
-    stalls.lives(10.2)
-    assert stalls.answers_take(10.3 + STOOD_STILL)
-
-
 def test_servers_are_out_of_sight_where_a_lease_may_have_run_out(stalls: Stalls) -> None:
     end = 10.3 + OUT_OF_SIGHT
     assert stalls.servers_take(end)
@@ -57,12 +47,6 @@ def test_servers_are_out_of_sight_where_a_lease_may_have_run_out(stalls: Stalls)
         assert stalls.servers_take(moment)
         assert bool(stalls.answers_take(moment)) == (moment < end + ANSWERS_TAKE)
     assert not stalls.servers_take(end + BACK_IN_SIGHT)
-
-
-def test_a_rest_is_no_standstill(stalls: Stalls) -> None:
-    stalls.rests(10.0)
-    assert stalls.answers_take(99.0) == 0.0
-    assert not stalls.servers_take(99.0)
 
 
 def test_after_a_rest_nobody_knows_whether_this_process_is_still_heard(
@@ -122,11 +106,3 @@ def test_stalls_in_a_row_are_borne_with_and_no_more_until_it_is_calm(
     calm = stand_still(stalls, moment + DOUBT_LASTS, seconds, 0.0)
     assert stalls.answers_take(calm)
     assert bool(stalls.servers_take(calm)) is is_long
-
-
-def test_short_ones_use_up_nothing_of_what_a_long_one_is_granted(stalls: Stalls) -> None:
-    moment = 10.3
-    for _ in range(100):
-        moment = stand_still(stalls, moment, 0.5, 0.0)
-    moment = stand_still(stalls, moment, OUT_OF_SIGHT + 0.1, 0.0)
-    assert stalls.servers_take(moment) == pytest.approx(BACK_IN_SIGHT)

@@ -64,24 +64,3 @@ def test_a_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
     reader.join(10.0)
     assert got == [b"data"]
     assert pipe.is_fifo()
-
-
-def test_a_link_to_a_pipe_without_a_name_is_written_to(tmp_path: Path) -> None:
-    """As /dev/stdout is one, where that is a pipe."""
-    read, write = os.pipe()
-    (tmp_path / "out").symlink_to(f"/proc/self/fd/{write}")
-    replace_file(tmp_path / "out", b"data")
-    os.close(write)
-    assert os.read(read, 10) == b"data"
-    os.close(read)
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give a file away")
-def test_root_leaves_a_file_to_its_owner(tmp_path: Path) -> None:
-    file = tmp_path / "file"
-    file.write_bytes(b"before")
-    os.chown(file, 1234, 4321)
-    file.chmod(0o4755)
-    replace_file(file, b"after")
-    now = file.stat()
-    assert (now.st_uid, now.st_gid, stat.S_IMODE(now.st_mode)) == (1234, 4321, 0o755)

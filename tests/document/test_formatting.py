@@ -164,57 +164,6 @@ def test_anchors_and_aliases_stay_where_they_are() -> None:
     )
 
 
-def test_comments_behind_dashes_and_between_a_key_and_its_value_stay_with_them() -> None:
-    text = """\
-    tree: t
-    root:
-      sequence: S
-      children:
-      - # c
-        log: a
-      # above
-      -
-        # below
-        log:  # c1
-          b  # c2
-        level:   # c3
-          # c4
-          info
-      - set:
-          a:
-          - - 1  # one
-            # two
-            - 2
-          -
-            # three
-            - {x: 1}
-    """
-    assert squeezed(textwrap.dedent(text)) == textwrap.dedent(
-        """\
-        tree: t
-        root:
-          sequence: S
-          children:
-            # c
-            - log: a
-            # above
-            # below
-            # c1
-            - log: b  # c2
-              # c3
-              # c4
-              level: info
-            - set:
-                a:
-                  - - 1  # one
-                    # two
-                    - 2
-                  # three
-                  - - {x: 1}
-        """
-    )
-
-
 def test_texts_over_several_lines_and_braces_with_comments_keep_their_lines() -> None:
     text = """\
     tree: t
@@ -266,39 +215,6 @@ def test_texts_over_several_lines_and_braces_with_comments_keep_their_lines() ->
           z: plain
             text  # c
         """.replace("\\x20", " ")
-    )
-
-
-def test_a_comment_at_the_end_of_a_block_stays_in_it_when_keys_move() -> None:
-    text = """\
-    root:
-      children:
-        - log: a
-          # in a
-        # - log: b
-
-        # and
-      # before
-      sequence: S
-      # in the root
-    # top
-    tree: t
-    """
-    assert formatted(textwrap.dedent(text)) == textwrap.dedent(
-        """\
-        # top
-        tree: t
-        root:
-          # before
-          sequence: S
-          children:
-            - log: a
-              # in a
-            # - log: b
-
-            # and
-          # in the root
-        """
     )
 
 

@@ -6,7 +6,6 @@ import os
 import time
 import tracemalloc
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -30,7 +29,6 @@ from bt_actions.document.yaml.source import MAX_BYTES, MAX_ERRORS
 from tests.document.test_wrong_documents import CASES
 
 EMPTY = '""'
-TREES = Path(__file__).parents[2] / "trees"
 
 
 def check_bytes(data: bytes) -> list[Finding]:
@@ -99,21 +97,6 @@ def test_a_path_without_a_name_of_its_own_is_answered_as_any_other(path: str) ->
     assert said.startswith(f"{path or EMPTY}:1:1: error[BT100]: ")
     with pytest.raises(DocumentError):
         load_tree(path)
-
-
-def test_a_tree_in_a_pipe_is_read_however_long_its_writer_thinks(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("bt_actions.document.yaml.source.PIPE_PATIENCE", 0.0)
-    reader, writer = os.pipe()
-    with ThreadPoolExecutor() as pool:
-        found = pool.submit(check_file, f"/dev/fd/{reader}")
-        with pytest.raises(TimeoutError):
-            found.result(timeout=0.2)
-        os.write(writer, (TREES / "recover.yaml").read_bytes())
-        os.close(writer)
-        assert found.result(timeout=60) == []
-    os.close(reader)
 
 
 def test_a_pipe_that_nobody_writes_to_is_not_waited_for(
@@ -463,21 +446,6 @@ ALIASES = "a0: &a0 [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]\n" + "".join(
 """Some 110,000 items, once its aliases are unfolded."""
 
 
-def test_data_in_files_is_bounded_however_often_it_is_named(tmp_path: Path) -> None:
-    (tmp_path / "data.yaml").write_text(ALIASES)
-    path = tmp_path / "tree.yaml"
-    path.write_text(f"tree: t\nroot: {{set: {{x: [{', '.join(['@data.yaml'] * 100)}]}}}}\n")
-    path.write_text(path.read_text().replace("@data.yaml", "'@data.yaml'"))
-    tracemalloc.start()
-    findings = check_file(path)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    refused = [found for found in findings if found.code == "BT209"]
-    assert 90 <= len(refused) < 100
-    assert "of data in files, a tree takes 1,000,000 items" in refused[0].message
-    assert peak < 50e6
-
-
 def test_a_value_in_a_file_is_no_larger_than_any_other(tmp_path: Path) -> None:
     (tmp_path / "data.yaml").write_text(ALIASES + f"more: [{', '.join(['*a4'] * 10)}]\n")
     path = tmp_path / "tree.yaml"
@@ -494,24 +462,3 @@ def test_a_number_in_a_file_that_no_float_can_be_is_refused(tmp_path: Path) -> N
     path.write_text("tree: t\nroot: {set: {x: '@data.yaml'}}\n")
     with pytest.raises(DocumentError, match=r"data\.yaml: 1e999 does not fit a float64"):
         load_tree(path)
-
-
-def test_what_trees_inside_each_other_hold_is_looked_at_once(tmp_path: Path) -> None:
-    """Unfolded, it is half a million nodes, below each of thirty others."""
-    below = "move: M, goal: {distance: 1.0}"
-    names = ["c.yaml", "b.yaml", "a.yaml"]
-    declared = "actions: {move: {type: robot_control_interfaces/action/MoveRobot, server: m}}"
-    for name, inner in zip(names, [below, "subtree: c.yaml", "subtree: b.yaml"], strict=True):
-        children = f"    - {{{inner}}}\n" * 80
-        (tmp_path / name).write_text(
-            f"tree: t\n{declared}\nroot:\n  sequence: S\n  children:\n{children}"
-        )
-    root = "{subtree: a.yaml}"
-    for _ in range(10):
-        root = f"{{timeout: T, after: 5 s, child: {root}}}"
-        root = f"{{parallel: P, children: [{root}, {{success: A}}]}}"
-        root = f"{{sequence: R, memory: false, children: [{root}, {{success: B}}]}}"
-    (tmp_path / "tree.yaml").write_text(f"tree: t\nroot: {root}\n")
-    started = time.process_time()
-    check_file(tmp_path / "tree.yaml")
-    assert time.process_time() - started < 5

@@ -96,23 +96,6 @@ def test_what_an_imported_action_reads_is_read(tmp_path: Path) -> None:
     assert check_file(tmp_path / "main.yaml") == []
 
 
-@pytest.mark.parametrize(
-    ("when", "expected"),
-    [
-        ("$most > 1", "BT202 the imported defaults: there is no variable $most"),
-        ("$far > 1", "BT206 the imported defaults: a string is never compared with an int64"),
-        ("result.final_pose > 1",
-         "BT203 the imported defaults: Gripper.Result has no field 'final_pose'; it has "),
-    ],
-)  # fmt: skip
-def test_imported_defaults_that_do_not_fit_the_tree_are_told_at_the_import(
-    tmp_path: Path, when: str, expected: str
-) -> None:
-    library = f"defaults: {{retry: {{when: {when}}}}}\nactions:\n  move: {MOVE.format('')}\n"
-    (told,) = found(tmp_path, library, "string")
-    assert told.startswith(f"main.yaml:2 {expected}")
-
-
 def test_a_whole_tree_may_be_imported_for_its_words(tmp_path: Path) -> None:
     """What is written below its root is its own: names are read with those of the importer."""
     (tmp_path / "a.yaml").write_text(

@@ -283,19 +283,6 @@ def test_a_subtree_sees_only_what_it_is_given_and_gives_back_what_is_asked(load:
     assert tree_outputs(root) == {"b": 12}
 
 
-def test_a_subtree_whose_input_has_no_value_fails_and_says_why(load: Load) -> None:
-    root = load(
-        """
-        tree: outer
-        outputs: {a: int32}
-        root: {subtree: inner.yaml, with: {x: $a}}
-        """,
-        inner="tree: inner\ninputs: {x: int32}\nroot: {check: $x == 1}\n",
-    )
-    assert tick(root) is Status.FAILURE
-    assert root.feedback_message == "$a has no value"
-
-
 def test_a_subtree_that_starts_again_has_forgotten_its_values(load: Load) -> None:
     root = load(
         """
@@ -337,27 +324,6 @@ def test_whatever_writes_an_output_converts_it_to_its_type(load: Load) -> None:
     assert [(name, type(value)) for name, value in tree_outputs(root).items()] == [
         ("a", float), ("b", float)
     ]  # fmt: skip
-
-
-def test_what_an_action_saves_is_converted_and_fails_it_where_that_cannot_be(load: Load) -> None:
-    from test_msgs.action import Fibonacci
-
-    leaf = load(
-        """
-        tree: t
-        outputs: {wide: float64, narrow: int8}
-        root:
-          action: A
-          type: test_msgs/action/Fibonacci
-          server: fibonacci
-          timeout: 1 s
-          save: {wide: "result.sequence[0]", narrow: "result.sequence[1]"}
-        """
-    )
-    assert isinstance(leaf, ActionBehaviour)
-    assert leaf._read_result(Fibonacci.Result(sequence=[7, 8])) == ""
-    assert sorted(map(repr, leaf._reading.to_save.values())) == ["7.0", "8"]
-    assert leaf._read_result(Fibonacci.Result(sequence=[7, 300])).startswith("narrow: ")
 
 
 @pytest.mark.parametrize(("first", "again", "told"), [
@@ -532,20 +498,3 @@ def test_a_large_value_may_stand_in_a_file_of_its_own(load: Load, tmp_path: Path
     assert tick(root) is Status.SUCCESS
     points = parse_input(f"@{tmp_path}/points.yaml", "geometry_msgs/msg/Point[]")
     assert points[1].x == 3.5  # type: ignore[index]
-
-
-@pytest.mark.parametrize(
-    ("points", "message"),
-    [
-        ("[{x: 1}, {y: far}]",
-         "@points.yaml: 1.y: a number (float64) is needed, not 'far'"),
-        ("[{x: 1},", "points.yaml:1:9: did not find expected node content"),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_in_a_file_of_values_is_told_where_it_is_named(
-    load: Load, points: str, message: str
-) -> None:
-    with pytest.raises(DocumentError) as caught:
-        load(POINTS, points=points)
-    (finding,) = caught.value.findings
-    assert (finding.message, finding.line, finding.column) == (message, 4, 56)

@@ -7,15 +7,12 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 import pytest
-from action_msgs.msg import GoalStatus, GoalStatusArray
 from rclpy.context import Context
-from unique_identifier_msgs.msg import UUID
 
 from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.left_behind import LeftBehind
-from bt_actions.recovery.roll_call import RollCall
 from bt_actions.recovery.sweep import Swept, cleanup
 from bt_actions.ros import onlooker as sight
 from bt_actions.ros.onlooker import CannotStart
@@ -81,27 +78,6 @@ def test_of_two_servers_each_has_to_answer(
     hosts[0].send(signal.SIGCONT)
     assert told == [name]
     assert name not in swept.known
-
-
-@pytest.mark.chaos
-def test_an_answer_does_not_show_that_the_status_has_come(
-    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The server is stopped after its first answer."""
-    monkeypatch.setattr(module, "LOOK_LONGEST", 6.0)
-    host = new_host(short_lease=False)
-    host.open(name)
-    real = RollCall.answered
-
-    def stopping(call: RollCall, number: int, now: float) -> None:
-        host.send(signal.SIGSTOP)
-        real(call, number, now)
-
-    monkeypatch.setattr(RollCall, "answered", stopping)
-    swept, told = sweep([name])
-    host.send(signal.SIGCONT)
-    assert told == [name]
-    assert swept.unknown[name] == "no server of {} answers"
 
 
 def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
@@ -170,23 +146,6 @@ def test_what_is_no_time_and_what_is_no_name_is_refused(
 def test_a_context_that_is_not_initialised_is_refused(domain: int, no_leaks: None) -> None:
     with pytest.raises(CannotStart):
         cleanup(context=Context())
-
-
-def test_a_goal_that_has_ended_at_one_server_of_two_is_kept_in_mind(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found: list[LeftBehind] = []
-    told = module._Sweep(0.0, 0.0, 0.0, found.append, print, print, print, lambda: False)
-    told._calls["/move"] = call = RollCall(0.0)
-    call.sees(frozenset({b"a", b"b"}), 0.0)
-    author = module.Author(here=True, pid=2**22 + 1, started=b"ab")
-    monkeypatch.setattr(module, "author_of", lambda _: author)
-    for status in (GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_ABORTED):
-        message = GoalStatusArray(status_list=[GoalStatus(status=status)])
-        message.status_list[0].goal_info.goal_id = UUID(uuid=[7] * 16)
-        told._read("/move", message)
-    told._find()
-    assert [(goal.servers, goal.end) for goal in found] == [(2, End.UNKNOWN)]
 
 
 def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import pytest
 from py_trees.trees import BehaviourTree
 
 from bt_actions import End, MoveRobot, Outcome
-from bt_actions.ros.host import host as process
 from tests.support.processes import Host
 from tests.support.waiting import until
 
@@ -45,19 +41,4 @@ def test_a_goal_of_a_node_whose_context_has_gone_is_never_sent(
     assert journal.count("received") == 1
     for tree in trees:
         tree.shutdown()
-    host.close_server(name)
-
-
-def test_a_process_that_ends_begins_nothing_any_more(
-    host: Host, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    journal = host.open(name)
-    leaf = MoveRobot("m", 0.1, action_name=name)
-    tree = BehaviourTree(leaf)
-    tree.setup(node=node)
-    monkeypatch.setattr(process, "closing", True)
-    until(lambda: bool(tree.tick() or leaf.outcome), what="the leaf ends")
-    assert (leaf.outcome, leaf.end) == (Outcome.CANCELED, End.NEVER_STARTED)
-    assert journal.count("received") == 0
-    tree.shutdown()
     host.close_server(name)

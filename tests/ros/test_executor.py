@@ -71,25 +71,3 @@ def test_what_a_callback_raises_is_raised_by_who_spins(executor: Any) -> None:
     executor.create_task(fail)
     with pytest.raises(ValueError, match="a callback's"):
         spin_on()
-
-
-def test_who_spins_can_be_told_to_stop_while_all_threads_are_busy(executor: Any) -> None:
-    go_on, over = threading.Event(), threading.Event()
-    blocked = [executor.create_task(go_on.wait) for _ in range(THREADS)]
-    until(lambda: all(task.executing() for task in blocked), meanwhile=lambda: spin(executor, 1))
-    executor.create_task(str)
-
-    def spin_until_over() -> None:
-        while not over.is_set():
-            executor.spin_once()
-
-    thread = threading.Thread(target=spin_until_over)
-    thread.start()
-    until(lambda: len(executor._futures) > THREADS)
-    over.set()
-    thread.join(10.0)
-    stopped = not thread.is_alive()
-    go_on.set()
-    thread.join()
-    assert stopped
-    until(lambda: all(task.done() for task in blocked))

@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 from rclpy.node import Node
-from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import (
     ActionBehaviour,
@@ -20,11 +19,9 @@ from bt_actions import (
     Gripper,
     MoveRobot,
     Outcome,
-    Retry,
     Timeouts,
     TreeRunner,
 )
-from bt_actions.events import GoalChanged
 from bt_actions.ros.host import host as process
 from tests.support.trees import in_turn
 from tests.support.waiting import until
@@ -161,36 +158,6 @@ class TestFeedback:
         assert told[-1] is latest[0], "the last one that came"
 
 
-class TestDeadlines:
-    def test_a_request_that_was_denied_for_long_is_accounted_for(
-        self, serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("bt_actions.goals.asking.DENIED_FOR_GOOD", 2.0)  # not 30 s
-        serve("1:drop_goal")
-        retry = Retry(2, outcomes={Outcome.ACCEPT_TIMEOUT})
-        leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(accept=0.5), retry=retry)
-        with TreeRunner(leaf, node=node) as runner:
-            assert runner.run(timeout=20.0) is Status.SUCCESS
-            assert runner.unaccounted == []
-        assert [record.end for record in leaf.history] == [End.NEVER_STARTED, End.SUCCEEDED]
-
-    def test_who_ends_the_program_at_news_in_shutdown_is_heard(self, serve: Any, name: str) -> None:
-        serve("1:delay_cancel=1.5", "1:drop_result=1000")
-        leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(result=0.5, cancel=0.3))
-        runner = TreeRunner(leaf)
-
-        def leave(event: object) -> None:
-            if isinstance(event, GoalChanged) and event.end is End.CANCELED:
-                raise SystemExit(9)
-
-        runner.observe(leave)
-        runner.run(timeout=20.0)
-        until(lambda: leaf.history[0].goal.lost_result.status)
-        with pytest.raises(SystemExit):
-            runner.shutdown()
-        runner.shutdown()
-
-
 class TestServersOfAnotherKind:
     @pytest.mark.parametrize(
         "answer",
@@ -220,24 +187,3 @@ class TestServersOfAnotherKind:
         ] * 2
         assert list(server.statuses.values()) == [CANCELED] * 2
         assert server.most_live == 1
-
-
-class TestInvalidGoal:
-    def test_what_an_error_says_is_asked_without_the_lock(
-        self, serve: Any, name: str, run: Run
-    ) -> None:
-        """It may ask a leaf on another thread for something."""
-        under_the_lock = list[bool]()
-
-        class Mine(Exception):
-            def __str__(self) -> str:
-                under_the_lock.append(process.lock._is_owned())  # type: ignore[attr-defined]
-                return "no such place"
-
-        def goal() -> None:
-            raise Mine
-
-        serve()
-        leaf = run(ActionBehaviour("m", MoveRobotAction, name, goal))
-        assert leaf.reason == "Mine: no such place"
-        assert set(under_the_lock) == {False}

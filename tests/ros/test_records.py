@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bt_actions import MoveRobot, TreeRunner
-from bt_actions.goals.policy import End
 from bt_actions.goals.terms import Event
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.host import host as process
 from bt_actions.ros.node_participant import traffic_of
-from bt_actions.traffic import effects as module
-from bt_actions.traffic import handover
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import state
 from tests.support.waiting import until
@@ -147,44 +143,3 @@ def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
             handle.endpoint.tell(handle, Event.SERVER_RETURNED)
             [(*_, lost)] = ledger.open.values()
             assert not lost
-
-
-@pytest.mark.parametrize(
-    ("servers", "accepted", "accounted_for", "lost", "is_answered"),
-    [
-        (1, False, False, False, False),
-        (1, True, False, False, True),
-        (2, True, False, False, False),  # the second one may accept it later
-        (2, True, True, False, True),
-        (1, False, True, False, True),  # denied for good, and kept in mind
-        (1, False, True, True, False),  # it may only have stood still
-    ],
-)
-def test_when_it_need_not_be_on_record(
-    servers: int, accepted: bool, accounted_for: bool, lost: bool, is_answered: bool
-) -> None:
-    end = End.SERVER_GONE if lost else End.NEVER_STARTED if accounted_for else End.UNKNOWN
-    handle: Any = SimpleNamespace(
-        goal=SimpleNamespace(accepted=accepted, end=end),
-        replies=SimpleNamespace(sent_to=[b"gid"] * servers),
-        accounted_for=accounted_for,
-    )
-    assert module._is_answered(handle) is is_answered
-
-
-def test_when_the_node_goes_what_is_not_accounted_for_stays(
-    serve: Any, name: str, node: Any, ledger: Recorder
-) -> None:
-    """As a foreign loop leaves it that does not wait: Traffic.destroy sends LEFT, and CLOSED."""
-    journal = serve("1:delay_accept=60")
-    leaf = MoveRobot("m", 0.1, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
-        goal = journal.wait_for("received").goal
-        with process.lock:
-            line = traffic_of(node).endpoint(leaf.action_type, name)
-            [handle] = line.goals.values()
-            domain = process.domain(node.context.get_domain_id())
-            handover.park(line, process, domain, all_of_them=True)
-            handle.endpoint.tell(handle, Event.PROCESS_EXITING)
-        assert [goal_id.hex() for goal_id in ledger.open] == [goal]

@@ -118,21 +118,6 @@ def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
     until(nobody_looks)
 
 
-@pytest.mark.chaos
-def test_a_server_whose_goals_are_all_done_is_found_too(
-    serve: Any, name: str, node: Any, blind: Blind, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    serve()
-    monkeypatch.setattr(_domain(node), "lost_sight", True)
-    leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=20.0))
-    leaf.setup(node=node)
-    blind(leaf)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.run(30.0)
-    assert leaf.outcome is Outcome.SUCCEEDED
-    until(nobody_looks)
-
-
 def test_nobody_looks_where_nothing_was_ever_lost(
     name: str, node: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -111,52 +111,6 @@ def test_what_is_on_record_and_in_a_status_is_one_goal(
     assert list(records.iterdir()) == []
 
 
-@pytest.mark.chaos
-def test_one_that_has_ended_since_is_told_with_its_end(
-    serve: Callable[..., Journal], leave: Leave, records: Path
-) -> None:
-    journal = serve()
-    leave(0.1, journal=journal)
-    journal.wait_for("succeeded")
-    swept, _, _ = sweep()
-    assert [left.end for left in swept.left] == [End.SUCCEEDED]
-    assert list(records.iterdir()) == []
-
-
-@pytest.mark.chaos
-def test_one_of_another_domain_is_left_alone(
-    serve: Callable[..., Journal], leave: Leave, records: Path
-) -> None:
-    serve()
-    leave(0.0, elsewhere=1)
-    swept, found, missing = sweep()
-    assert (swept.left, found, missing) == ([], [], [])
-    assert len(list(records.iterdir())) == 1
-
-
-@pytest.mark.chaos
-def test_one_whose_server_was_known_to_be_gone_is_not_awaited(
-    serve: Callable[..., Journal], leave: Leave, records: Path
-) -> None:
-    serve()
-    leave(0.0, servers="another's", lost=True)
-    swept, found, missing = sweep()
-    assert (swept.left, found, missing) == ([], [], [])
-
-
-@pytest.mark.chaos
-def test_one_whose_server_is_not_in_sight_is_looked_for_and_told_once(
-    leave: Leave, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "LOOK_LONGEST", 3.0)
-    leave(0.0, servers="another's")
-    first, _, missing = sweep()
-    assert [left.is_over for left in first.left] == [False]
-    assert missing == [name]
-    swept, found, missing = sweep()
-    assert (swept.left, found, missing) == ([], [], [])
-
-
 @pytest.mark.parametrize(
     ("given", "on_record", "takes"),
     [(0.0, "0", 2.0), pytest.param(1.0, "3.0", 3.0, marks=pytest.mark.chaos)],

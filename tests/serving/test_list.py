@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import json
-import threading
 from collections.abc import Callable
-from typing import Any
 
-import pytest
 from bt_actions_interfaces.msg import TreeInfo, TreeInput
-from bt_actions_interfaces.srv import ListTrees
-from rclpy.node import Node
 
-from bt_actions.cli import main
 from bt_actions.cli.commands.list_trees import text_of, tree_data
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Process
@@ -45,31 +39,6 @@ def test_where_no_server_is_in_sight_it_says_what_to_look_for(
     process = start_program("-c", MAIN, "list", "--namespace", space, short_lease=True)
     assert process.wait(30.0) == 1, process
     assert "is `bt-actions serve` running" in "\n".join(process.errors)
-
-
-@pytest.mark.chaos
-def test_a_server_that_comes_in_sight_late_and_does_not_answer_is_named_beside_the_others(
-    serve_trees: Serve, fresh_context: Any, space: str, capfd: pytest.CaptureFixture[str]
-) -> None:
-    serve_trees()
-    silent: list[Node] = []
-
-    def come() -> None:
-        node = Node("silent", namespace=space, context=fresh_context)
-        node.create_service(ListTrees, "~/list_trees", lambda _, answer: answer)  # nobody spins it
-        silent.append(node)
-
-    timer = threading.Timer(2.0, come)
-    timer.start()
-    try:
-        code = main(["list", "--namespace", space])
-    finally:
-        timer.join()
-        silent[0].destroy_node()
-    out, errors = capfd.readouterr()
-    assert "  move  Move, and say where it ended." in out.splitlines()
-    assert f"{space}/silent does not answer" in errors
-    assert code == 1
 
 
 def test_what_a_server_says_cannot_command_the_terminal() -> None:

@@ -12,11 +12,11 @@ import pytest
 from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import TreeInfo
-from bt_actions_interfaces.srv import ControlTree, ListTrees
+from bt_actions_interfaces.srv import ListTrees
 
 from bt_actions.simulation import journal as journals
 from tests.serving.conftest import MOVE, Serve
-from tests.support.processes import Journal, Process
+from tests.support.processes import Journal
 from tests.support.tree_client import TreeClient
 from tests.support.waiting import until
 
@@ -136,42 +136,6 @@ def test_a_goal_can_be_canceled_as_soon_as_it_is_accepted(
     assert None not in journal.ends()
 
 
-SLOW = """
-import sys, time, rclpy
-from rclpy.executors import MultiThreadedExecutor
-from bt_actions.serving import TreeServer
-begin = TreeServer._on_accepted
-def slow(server, *goal):
-    time.sleep(1.0)
-    begin(server, *goal)
-TreeServer._on_accepted = slow
-rclpy.init()
-node = rclpy.create_node("bt_actions_serve", namespace=sys.argv[2])
-server = TreeServer(node, trees=sys.argv[1])
-executor = MultiThreadedExecutor(4)
-executor.add_node(node)
-print("ready: ", flush=True)
-executor.spin()
-"""
-
-
-@pytest.mark.chaos
-def test_a_goal_can_be_canceled_while_its_server_is_about_to_begin_it(
-    serve: Callable[..., Journal],
-    start_program: Callable[..., Process],
-    client: TreeClient,
-    folder: Path,
-    space: str,
-) -> None:
-    journal = serve()
-    start_program("-c", SLOW, str(folder), space, short_lease=True).line("ready: ")
-    sent = client.send("move", LONG)
-    assert client.cancel(sent) == 1
-    assert client.told(sent) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
-    assert journal.count("received") == 0
-    assert client.send("empty").accepted
-
-
 @pytest.mark.chaos
 def test_a_goal_that_waits_for_the_one_it_replaces_can_be_canceled(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
@@ -185,21 +149,6 @@ def test_a_goal_that_waits_for_the_one_it_replaces_can_be_canceled(
     assert client.told(newer) == (GoalStatus.STATUS_CANCELED, R.CANCELED, True)
     assert client.told(older) == (GoalStatus.STATUS_ABORTED, R.REPLACED, True)
     assert journal.count("accepted") == 1
-
-
-@pytest.mark.chaos
-def test_a_cancel_of_a_goal_that_is_halted_already_changes_nothing(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
-) -> None:
-    journal = serve("1:delay_cancel=0.7")
-    serve_trees()
-    sent = client.send("move", LONG)
-    journal.wait_for("accepted")
-    halt = ControlTree.Request.HALT
-    assert client.call(ControlTree, goal_id=sent.handle.goal_id, command=halt).accepted
-    assert client.cancel(sent) == 1
-    assert client.told(sent) == (GoalStatus.STATUS_ABORTED, R.HALTED, True)
-    assert journal.ends() == ["canceled"]
 
 
 def test_a_goal_that_has_ended_cannot_be_canceled(serve_trees: Serve, client: TreeClient) -> None:

@@ -16,7 +16,7 @@ from bt_actions.cli.driving.signals import SAME_WISH
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Journal, Process
 from tests.support.tree_client import TreeClient
-from tests.support.waiting import holds_for, until
+from tests.support.waiting import until
 
 NODE = "bt_actions_serve"
 FILE = """\
@@ -86,19 +86,6 @@ def test_options_are_read_only_parameters_and_the_command_line_wins(
 def test_ready_counts_the_trees_that_can_be_run_and_names_the_others(serve_trees: Serve) -> None:
     server = serve_trees()
     assert server.lines[0].endswith("/run_tree, 2 trees, 1 broken: broken")
-
-
-@pytest.mark.chaos
-def test_a_ctrl_c_that_comes_twice_within_a_moment_counts_once(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
-) -> None:
-    journal = serve("1:delay_cancel=1.0")
-    server = serve_trees()
-    client.send("move", "{distance: 20.0}")
-    journal.wait_for("accepted")
-    assert holds_for(lambda: server.send(signal.SIGINT) > 0.0, 0.4 * SAME_WISH)
-    assert server.wait() == 0
-    assert journal.ends() == ["canceled"]
 
 
 def test_a_second_ctrl_c_waits_for_no_goal_and_names_what_may_still_run(

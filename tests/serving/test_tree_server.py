@@ -12,8 +12,6 @@ from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport, TreeInfo
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
-from rcl_interfaces.msg import Log
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from tests.serving.conftest import MOVE, Serve
 from tests.support.processes import Journal, Process
@@ -22,21 +20,6 @@ from tests.support.waiting import until
 
 R = RunTree.Result
 LONG = "{distance: 20.0}"
-LEAVES = """\
-tree: move
-root:
-  parallel: Both
-  children:
-    - action: Go
-      type: robot_control_interfaces/action/MoveRobot
-      server: {server}
-      goal: {{distance: 20.0}}
-      timeout: {{cancel: 500 ms}}
-    - sequence: Later
-      children:
-        - wait: 4 s
-        - {{python: tests.support.trees.LeavesLate}}
-"""
 
 
 def test_a_tree_runs_to_its_end_and_tells_what_it_did(
@@ -55,21 +38,6 @@ def test_a_tree_runs_to_its_end_and_tells_what_it_did(
     assert (action.path, action.server, action.attempts) == ("Move / Go", name, 1)
     assert (action.outcome, action.end) == (ActionReport.SUCCEEDED, ActionReport.END_SUCCEEDED)
     assert action.place.startswith(str(folder / "move.yaml"))
-
-
-@pytest.mark.chaos
-def test_a_run_is_told_on_rosout(serve_trees: Serve, client: TreeClient, space: str) -> None:
-    heard: list[Log] = []
-    latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    client.node.create_subscription(Log, "/rosout", heard.append, latched)
-    serve_trees()
-    name = f"{space[1:]}.bt_actions_serve"
-
-    def told() -> list[str]:
-        return [each.msg for each in heard if each.name == name]
-
-    client.result(client.send("empty"))
-    client.until(lambda: told()[-2:] == ["empty: begins", "empty: ends"], "it is told")
 
 
 def test_feedback_names_what_runs_and_counts_what_has_ended(
@@ -111,38 +79,6 @@ def test_a_goal_that_cannot_be_run_is_rejected_and_the_reason_is_told_to_all(
     ]
 
 
-@pytest.mark.chaos
-def test_reject_runs_one_tree_at_a_time(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
-) -> None:
-    journal = serve()
-    serve_trees()
-    first = client.send("move", LONG)
-    journal.wait_for("accepted")
-    assert not client.send("move", LONG).accepted
-    client.until(lambda: client.rejections, "the rejection is published")
-    assert client.rejections[0].code == "BUSY"
-    assert not client.call(CheckTree, tree="move", inputs=LONG).accepted
-    client.cancel(first)
-    client.result(first)
-    assert client.send("empty").accepted
-    assert journal.max_live == 1
-
-
-@pytest.mark.chaos
-def test_a_queued_goal_runs_the_version_of_the_tree_that_it_was_checked_against(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path
-) -> None:
-    serve()
-    serve_trees("--policy", "queue")
-    first, second = client.send("move", "{distance: 1.0}"), client.send("empty")
-    (folder / "empty.yaml").write_text("tree: empty\nroot: {failure: }\n")
-    third = client.send("empty")
-    statuses = [client.result(each)[0] for each in (first, second, third)]
-    assert statuses == [GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_SUCCEEDED,
-                        GoalStatus.STATUS_ABORTED]  # fmt: skip
-
-
 def test_a_queue_that_is_full_rejects_and_a_goal_in_it_can_be_canceled(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
 ) -> None:
@@ -172,18 +108,6 @@ def test_replace_begins_the_newer_tree_when_all_goals_of_the_older_have_ended(
     newer = client.send("move", "{distance: 0.2}")
     assert client.told(older) == (GoalStatus.STATUS_ABORTED, R.REPLACED, True)
     assert client.result(newer)[0] == GoalStatus.STATUS_SUCCEEDED
-    assert journal.max_live == 1
-
-
-@pytest.mark.chaos
-def test_parallel_trees_share_resources_as_trees_of_one_process_do(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
-) -> None:
-    journal = serve()
-    serve_trees("--policy", "parallel", "--max", "2")
-    both = [client.send("move", "{distance: 0.5}") for _ in range(2)]
-    assert not client.send("empty").accepted
-    assert [client.result(each)[0] for each in both] == [GoalStatus.STATUS_SUCCEEDED] * 2
     assert journal.max_live == 1
 
 
@@ -254,21 +178,6 @@ def test_a_behaviour_that_raises_is_named(
     status, result = client.result(client.send("empty"))
     assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.EXCEPTION)
     assert result.error_msg.startswith("Raises: tick raised ")
-    assert client.send("empty").accepted, "the server goes on"
-
-
-@pytest.mark.chaos
-def test_a_behaviour_that_wants_to_end_the_program_leaves_no_goal_below_unsaid(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, folder: Path, name: str
-) -> None:
-    (folder / "move.yaml").write_text(LEAVES.format(server=name))
-    journal = serve("1:ignore_cancel")
-    serve_trees("--python", "tests")
-    status, result = client.result(client.send("move"))
-    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.EXCEPTION)
-    assert not result.settled
-    assert [action.end for action in result.actions] == [ActionReport.END_UNKNOWN]
-    assert journal.count("accepted") == 1
     assert client.send("empty").accepted, "the server goes on"
 
 
@@ -351,42 +260,6 @@ def test_a_tick_that_does_not_return_does_not_hold_the_process_at_the_second_sig
     )
     assert server.wait() == 3
     assert "hangs: a behaviour does not return from its tick" in server.errors[-1]
-
-
-ASKED_LAST = """
-import rclpy, sys, threading, time
-from rclpy.executors import MultiThreadedExecutor
-from bt_actions.serving import TreeServer
-rclpy.init()
-node = rclpy.create_node("bt_actions_serve", namespace=sys.argv[2])
-executor = MultiThreadedExecutor()
-executor.add_node(node)
-server = TreeServer(node, trees=sys.argv[1], managed=True)
-threading.Thread(target=executor.spin, daemon=True).start()
-begun, goes_on = threading.Event(), threading.Event()
-entries = server.catalog.entries
-def slow():
-    begun.set()
-    goes_on.wait(10.0)
-    return entries()
-server.catalog.entries = slow
-print("ready: ", flush=True)
-begun.wait()
-threading.Thread(target=lambda: (time.sleep(0.5), goes_on.set())).start()
-server.close()
-spun = threading.Event()
-executor.create_task(spun.set)
-print("spun" if spun.wait(5.0) else "died", flush=True)
-"""
-
-
-def test_who_asks_as_the_server_closes_is_answered_and_the_executor_lives(
-    start_program: Callable[..., Process], client: TreeClient, folder: Path, space: str
-) -> None:
-    server = start_program("-c", ASKED_LAST, str(folder), space, short_lease=True)
-    server.line("ready: ")
-    assert client.call(ListTrees).trees is not None
-    assert server.line() == "spun"
 
 
 OWN_NODE = """

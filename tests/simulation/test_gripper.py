@@ -31,20 +31,6 @@ def test_closing_it_stalls_on_what_is_between_the_fingers() -> None:
     assert not gripper.reached
 
 
-def test_pressing_again_stalls_at_once() -> None:
-    gripper = GripperSimulator(40.0)
-    gripper.set_goal(0.0)
-    assert gripper.move_step(between=40.0) == 40.0
-    assert gripper.stalled
-
-
-def test_opening_from_a_part_does_not_stall() -> None:
-    gripper = GripperSimulator(40.0)
-    gripper.set_goal(100.0)
-    assert gripper.move_step(between=40.0) == 50.0
-    assert not gripper.stalled
-
-
 def test_closing_to_exactly_the_part_reaches_it_without_force() -> None:
     gripper = GripperSimulator(45.0)
     gripper.set_goal(40.0)

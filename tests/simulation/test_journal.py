@@ -110,37 +110,6 @@ def test_a_goal_is_live_from_its_acceptance_to_its_end() -> None:
     assert journal.ends(entries) == {"a": Event.CANCELED, "b": Event.REJECTED}
 
 
-def test_two_goals_at_once_are_counted_as_two() -> None:
-    entries = [
-        entry(1, "a", Event.ACCEPTED),
-        entry(2, "b", Event.ACCEPTED),
-        entry(3, "a", Event.ABORTED),
-        entry(4, "b", Event.SUCCEEDED),
-    ]
-    assert journal.max_live(entries) == 2
-    assert journal.max_live(entries, "/other") == 0
-
-
-def test_one_goal_after_another_is_one_at_once() -> None:
-    entries = [
-        entry(1, "a", Event.ACCEPTED),
-        entry(2, "a", Event.SUCCEEDED),
-        entry(2, "b", Event.ACCEPTED),
-        entry(3, "b", Event.SUCCEEDED),
-    ]
-    assert journal.max_live(entries) == 1
-
-
-def test_a_goal_without_an_end_is_live_for_ever_unless_its_process_was_killed() -> None:
-    entries = [entry(1, "a", Event.ACCEPTED, pid=7), entry(5, "b", Event.ACCEPTED, pid=8)]
-    assert journal.max_live(entries) == 2
-    assert journal.max_live(entries, killed={7: 3.0}) == 1
-    first, second = journal.live_intervals(entries, killed={7: 3.0})
-    assert (first.end, first.how) == (3.0, Event.DIED)
-    assert (second.end, second.how) == (None, None)
-    assert journal.ends(entries) == {"a": None, "b": None}
-
-
 def test_a_goal_that_two_servers_accept_is_executed_twice() -> None:
     entries = [
         entry(1, "a", Event.ACCEPTED, pid=7),

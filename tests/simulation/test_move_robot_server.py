@@ -118,11 +118,3 @@ def test_an_aborted_goal_says_that_it_was_a_fault(serve: Any) -> None:
     assert goal.status == GoalStatus.STATUS_ABORTED
     assert goal.result.status == MoveRobot.Result.STATUS_FAULT
     assert goal.result.final_pose >= 1.0
-
-
-def test_speed_makes_the_same_steps_in_less_time(serve: Any, bench: Bench) -> None:
-    serve(speed=50.0).send(distance=2.0).until_ended()
-    entries = bench.entries()
-    steps = [entry for entry in entries if entry.event is j.Event.STEP]
-    assert len(steps) == 51
-    assert entries[-1].t - entries[1].t < 4.0

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_actions.simulation.robot import LIMIT, TOLERANCE, RobotSimulator, RobotStatus, refusal
+from bt_actions.simulation.robot import LIMIT, TOLERANCE, RobotSimulator, RobotStatus
 
 targets = st.floats(-LIMIT, LIMIT)
 
@@ -28,22 +28,6 @@ def test_it_is_ready_then_moving_then_completed() -> None:
     assert robot.get_status() is RobotStatus.COMPLETED
 
 
-def test_two_metres_take_fifty_one_steps() -> None:
-    robot = RobotSimulator()
-    robot.set_goal(2.0)
-    steps = 0
-    while robot.get_status() is RobotStatus.MOVING:
-        robot.move_step()
-        steps += 1
-    assert steps == 51  # 2 m * 0.9**51 is the first under a centimetre
-
-
-def test_a_goal_where_it_stands_is_completed_without_a_step() -> None:
-    robot = RobotSimulator(3.0)
-    robot.set_goal(3.0)
-    assert robot.get_status() is RobotStatus.COMPLETED
-
-
 def test_it_does_not_move_before_a_goal_nor_after_it_was_stopped() -> None:
     robot = RobotSimulator(1.0)
     assert robot.move_step() == 1.0
@@ -62,11 +46,6 @@ def test_a_goal_beyond_the_axis_is_refused_and_changes_nothing(distance: float) 
     with pytest.raises(ValueError, match=r"finite|axis"):
         robot.set_goal(distance)
     assert robot.target_pose == 1.0
-
-
-@pytest.mark.parametrize("distance", [10.0, -10.0, 0.0, -0.0, 5e-324])
-def test_the_ends_of_the_axis_belong_to_it(distance: float) -> None:
-    assert refusal(distance) is None
 
 
 @given(start=targets, target=targets)

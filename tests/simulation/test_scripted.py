@@ -43,14 +43,6 @@ def test_without_a_script_it_succeeds_with_empty_messages(serve: Any) -> None:
     assert len(goal.all_feedback(10)) == 10
 
 
-def test_the_duration_may_depend_on_the_goal(serve: Any, bench: Bench) -> None:
-    client = serve(Script(duration=lambda goal: goal.order * 0.1))
-    goals = [client.send(order=order) for order in (1, 3)]
-    assert [len(goal.until_ended().all_feedback(n)) for goal, n in zip(goals, (2, 6), strict=True)]
-    bench.go_on_for(0.05)
-    assert [len(goal.feedback) for goal in goals] == [2, 6]
-
-
 def test_goals_run_beside_each_other_unless_the_server_preempts(serve: Any, bench: Bench) -> None:
     client = serve(Script(duration=0.2))
     goals = [client.send() for _ in range(3)]
@@ -102,27 +94,9 @@ def test_a_wrong_script_aborts_the_goal(
     assert says in bench.entries()[-1].reason
 
 
-def test_a_wrong_refusal_refuses(serve: Any, bench: Bench) -> None:
-    goal = serve(Script(refuse=wrong)).send()
-    bench.until(lambda: goal.accepted is False)
-    assert "could not be checked" in bench.entries()[-1].reason
-
-
 def test_a_result_of_the_wrong_type_does_not_end_the_server(serve: Any, bench: Bench) -> None:
     client = serve(Script(duration=0.0, result=lambda goal: "text" if goal.order == 1 else None))
     client.send(order=1).until_accepted()
     bench.until(bench.happened("aborted"))
     assert client.send().until_ended().status == GoalStatus.STATUS_ABORTED
     assert bench.events().count("received") == 2
-
-
-def test_finished_goals_are_forgotten_soon(serve: Any, bench: Bench) -> None:
-    goal = serve(Script(duration=0.0), result_timeout=0.2).send().until_ended()
-
-    def forgotten() -> bool:
-        goal.status = None
-        goal.ask_for_result()
-        goal.until_ended()
-        return goal.status == GoalStatus.STATUS_UNKNOWN
-
-    bench.until(forgotten)

@@ -145,20 +145,6 @@ def test_the_battery_is_published_and_empties_on_the_way(ros_bench: RosBench, sp
 
 
 @IN_VIRTUAL_TIME
-def test_a_listener_that_raises_is_told_no_more_and_ends_no_goal(bench: Bench, space: str) -> None:
-    told: list[WorldEvent] = []
-
-    def listen(namespace: str, event: WorldEvent) -> None:
-        told.append(event)
-        raise RuntimeError("a bug")
-
-    robot = Robot(bench, space)
-    bench.serve(Simulation(bench.node, namespaces=(space,), speed=20.0, on_event=listen))
-    robot.until_ready().carry(to=5.0)
-    assert len(told) == 1
-
-
-@IN_VIRTUAL_TIME
 def test_a_relative_namespace_is_the_nodes_own(bench: Bench) -> None:
     with Simulation(bench.node, namespaces=("", "r1", "/r2", "r3/")) as simulation:
         names = [server.name for server in simulation.servers]
