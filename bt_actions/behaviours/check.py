@@ -10,8 +10,6 @@ from py_trees.common import Status
 from bt_actions.behaviours.variables import read
 from bt_actions.expressions.expression import Expression, ExpressionError
 
-__all__ = ["Check"]
-
 
 class Check(Behaviour):
     """Succeeds when an expression is true; fails when it is not, or cannot be computed.

@@ -12,8 +12,6 @@ from py_trees.behaviour import Behaviour
 from bt_actions.traffic.backend import Backend, Clock
 from bt_actions.wiring import backend_of
 
-__all__ = ["Connected", "Countdown", "backend_in", "limit"]
-
 
 def backend_in(arguments: Mapping[str, Any], leaf: Behaviour) -> Backend:
     """Return what the node among the arguments of `leaf.setup` gives. Raises TypeError without."""

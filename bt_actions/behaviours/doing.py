@@ -12,8 +12,6 @@ from py_trees.common import Status
 from bt_actions.traffic.backend import Backend
 from bt_actions.wiring import backend_of
 
-__all__ = ["LEVELS", "Log", "SetValues"]
-
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 
 

@@ -8,8 +8,6 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
-__all__ = ["Gate"]
-
 
 class Gate(Decorator):
     """Like py_trees' Decorator, with a question asked first.

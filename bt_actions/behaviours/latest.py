@@ -9,8 +9,6 @@ from typing import Any
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
 
-__all__ = ["Latest"]
-
 KEPT = 100
 """Messages kept for who waits for one of them; older ones are dropped."""
 

@@ -14,8 +14,6 @@ from bt_actions.behaviours.gate import Gate
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.utilities.units import parse_duration
 
-__all__ = ["Deadline", "While"]
-
 
 class Deadline(Gate):
     """Stops its child after some seconds, and fails when what it stopped has ended.

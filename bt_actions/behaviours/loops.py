@@ -14,8 +14,6 @@ from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["ForEach", "Repeat", "RetryChild"]
-
 Number = Callable[[], object]
 
 

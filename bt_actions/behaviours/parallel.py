@@ -8,8 +8,6 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy, Status
 from py_trees.composites import Parallel as PyTreesParallel
 
-__all__ = ["Parallel"]
-
 
 class Parallel(PyTreesParallel):
     """Succeeds when enough children have; fails as soon as that cannot happen any more.

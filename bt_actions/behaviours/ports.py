@@ -15,8 +15,6 @@ from py_trees.ports import PortInformation, PortsMixin
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.utilities.units import parse_duration
 
-__all__ = ["GripperWithPorts", "MoveRobotWithPorts"]
-
 Ports = dict[str, PortInformation]
 
 

@@ -15,8 +15,6 @@ from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = ["Reading", "condition_of"]
-
 Names = Callable[[Any], Mapping[str, object]]
 """From a result to what an expression over it may name; called with None, what it could name."""
 Given = Callable[[Any], Any] | str

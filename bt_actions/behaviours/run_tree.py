@@ -19,8 +19,6 @@ from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
 
-__all__ = ["CANCEL", "TYPE", "RunTree", "roots_of"]
-
 TYPE = "bt_actions_interfaces/action/RunTree"
 CANCEL = 15.0
 """Seconds for a run to end when it is canceled: it sees its own goals to their ends first, within

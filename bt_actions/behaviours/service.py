@@ -15,8 +15,6 @@ from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend, Service
 
-__all__ = ["CallService"]
-
 
 class CallService(Connected[Service]):
     """Calls a service once, and again as `retry` says.

@@ -13,8 +13,6 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.gate import Gate
 
-__all__ = ["Subtree"]
-
 
 class Subtree(Gate):
     """Ticks another tree with inputs of its own.

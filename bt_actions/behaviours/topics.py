@@ -16,8 +16,6 @@ from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend, Publisher
 from bt_actions.wiring import backend_of
 
-__all__ = ["Publish", "TopicValue", "WaitForMessage", "patient"]
-
 LOOKS = 0.05
 """Seconds between two looks for somebody who listens: nothing announces that."""
 

@@ -12,8 +12,6 @@ from bt_actions.behaviours.connected import Countdown, limit
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.utilities.units import parse_duration
 
-__all__ = ["Wait", "WaitUntil"]
-
 
 class Wait(Behaviour):
     """Succeeds after some seconds on the node's clock; `duration` may raise ValueError: failure."""

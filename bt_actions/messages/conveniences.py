@@ -17,8 +17,6 @@ from bt_actions.messages.interfaces import Kind, UnknownInterface, installed, in
 from bt_actions.utilities.suggest import did_you_mean
 from bt_actions.utilities.units import parse_angle, parse_duration
 
-__all__ = ["ANGLES", "UnknownClass", "constant", "duration_of", "quaternion_of", "time_of"]
-
 _BILLION = 1_000_000_000
 _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
 _PARTS = ("Goal", "Result", "Feedback", "Request", "Response")

@@ -30,8 +30,6 @@ from bt_actions.utilities.plain_data import numbers_only, plain, scalar
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = ["MessageError", "Problem", "examine", "fill", "fill_value", "to_plain"]
-
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")

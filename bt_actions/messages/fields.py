@@ -15,20 +15,6 @@ from typing import Any
 from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.plain_data import scalar
 
-__all__ = [
-    "FLOATS",
-    "INTEGERS",
-    "Either",
-    "FieldType",
-    "Listing",
-    "Message",
-    "Record",
-    "Scalar",
-    "constants",
-    "describe",
-    "is_message_class",
-]
-
 INTEGERS = MappingProxyType(
     {
         "int8": (-(2**7), 2**7 - 1),

@@ -14,16 +14,6 @@ from typing import Literal
 
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = [
-    "UnknownInterface",
-    "find_action",
-    "installed",
-    "interface",
-    "interface_name",
-    "packages",
-    "short_name",
-]
-
 Kind = Literal["action", "srv", "msg"]
 _WORDS: dict[str, str] = {"action": "action", "srv": "service", "msg": "message"}
 _PACKAGE = re.compile(r"[a-z][a-z0-9_]*")

@@ -8,8 +8,6 @@ from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.policy import End
 from bt_actions.recovery.roll_call import Denial
 
-__all__ = ["LeftBehind"]
-
 
 @dataclass(slots=True)
 class LeftBehind:
@@ -48,6 +46,11 @@ class LeftBehind:
     def is_nowhere(self, why: str) -> None:
         """No server has it, nor will."""
         self.awaited, self.nothing_left = False, why
+
+    def turns_up(self) -> None:
+        """A server has it: it tells the end in a status."""
+        self.awaited, self.nothing_left, self.server_is_gone = False, "", False
+        self.asked_at = float("-inf")
 
     def is_awaited_again(self) -> None:
         """A server that may have it is in sight after all."""

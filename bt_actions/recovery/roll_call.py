@@ -14,10 +14,8 @@ ASK_AGAIN = 1.0
 """Seconds between two questions;"""
 LATE = 1.5
 """so many, and the server may have been stopped in between."""
-SILENT = 10.0
-"""Seconds without an answer to any question, after which denials count anew;"""
 QUESTIONS = 10
-"""and how many questions may be under way: over a bad link an answer takes seconds."""
+"""How many questions may be under way: over a bad link an answer takes seconds."""
 SETTLE = 4.0
 """Seconds of answers within which a server's status must have been received; where a client was
 just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
@@ -152,10 +150,8 @@ class Denial:
         at, of = self._asked[number]
         if self._denials[number] != max(1, len(of)) or (self._last and at <= self._last[0]):
             return
-        if self._last is None or self._last[1] != of or at - self._last[0] > SILENT:
+        if self._last is None or self._last[1] != of:
             self.lasted = 0.0
-        else:
-            missed = any(self._last[0] < other < at for other, _ in self._asked.values())
-            passed = at - self._last[0]  # and it may have been stopped meanwhile
-            self.lasted += min(passed, LATE) if missed else passed
+        else:  # for the rest of a longer time it may have been stopped
+            self.lasted += min(at - self._last[0], LATE)
         self._last = at, of

@@ -114,28 +114,20 @@ def cleanup(
     return sweep.ends()
 
 
+@dataclass
 class _Sweep:
     """What was found, in one participant after another."""
 
-    def __init__(
-        self,
-        look: float,
-        patience: float,
-        accept: float,
-        found: Callable[[LeftBehind], None],
-        sighted: Callable[[str], None],
-        elsewhere: Callable[[str, bytes], None],
-        missing: Callable[[list[str], bool], None],
-        stopped: Callable[[], bool],
-    ) -> None:
-        self._look = look
-        self._patience = patience
-        self._accept = accept
-        self._found = found
-        self._sighted = sighted
-        self._elsewhere = elsewhere
-        self._missing = missing
-        self._stopped = stopped
+    _look: float
+    _patience: float
+    _accept: float
+    _found: Callable[[LeftBehind], None]
+    _sighted: Callable[[str], None]
+    _elsewhere: Callable[[str, bytes], None]
+    _missing: Callable[[list[str], bool], None]
+    _stopped: Callable[[], bool]
+
+    def __post_init__(self) -> None:
         self._deadline = 0.0
         self.has_begun = False
         self._waits = False
@@ -199,18 +191,14 @@ class _Sweep:
                 looked = now
             if looking:
                 overdue = [name for name in lacks if self._calls[name].overdue(now)]
-                if now >= until:
-                    self._says_that_it_waits_for(overdue)
+                if overdue and now >= until and not self._waits:
+                    self._waits = True
+                    self._missing(overdue, False)
                 silent = any(self._calls[name].sighted for name in overdue)
                 if silent and breaks_off and now >= min(until, began + LOOK_AGAIN):
                     return False  # it may not hear this participant
             time.sleep(TURN)
         return True
-
-    def _says_that_it_waits_for(self, actions: list[str]) -> None:
-        if actions and not self._waits:
-            self._waits = True
-            self._missing(actions, False)
 
     def ends(self) -> Swept:
         """Return all that was seen; what is still looked for is missing, in vain."""
@@ -269,10 +257,9 @@ class _Sweep:
             self._find()
         for action, view in self._views.items():
             call = self._calls[action]
-            if call.due(now):  # of a goal that is nobody's: any answer shows that a server lives
-                question = view.cancel(uuid.uuid4().bytes)
-                if question is not None:
-                    call.asked(question, now)
+            # of a goal that is nobody's: any answer shows that a server lives
+            if call.due(now) and (question := view.cancel(uuid.uuid4().bytes)) is not None:
+                call.asked(question, now)
         self._cancel(now)
 
     def _hear(self, action: str, view: ActionView) -> None:
@@ -310,20 +297,14 @@ class _Sweep:
             if left is not None:
                 left.shown = ENDS.get(entry.status, End.UNKNOWN)
                 self._turns_up(left)
-            elif not ended:
-                self._meet(action, goal_id)
-            elif one_server:
-                self._minded.pop(goal_id, None)
-
-    def _meet(self, action: str, goal_id: bytes) -> None:
-        """See whose goal it is that runs there."""
-        author = author_of(goal_id)
-        if author is None:
-            return
-        if author.here:
-            self._minded[goal_id] = action, author
-        else:
-            self._meet_elsewhere(action, goal_id)
+            elif ended:
+                if one_server:
+                    self._minded.pop(goal_id, None)
+            elif (author := author_of(goal_id)) is not None:
+                if author.here:
+                    self._minded[goal_id] = action, author
+                else:
+                    self._meet_elsewhere(action, goal_id)
 
     def _meet_elsewhere(self, action: str, goal_id: bytes) -> None:
         if goal_id not in self._foreign:
@@ -361,22 +342,21 @@ class _Sweep:
     def _turns_up(self, left: LeftBehind) -> None:
         """A server has it: it tells the end in a status."""
         if left.awaited or left.nothing_left:
-            left.awaited, left.nothing_left, left.asked_at = False, "", float("-inf")
-            left.server_is_gone = False
+            left.turns_up()
             if left.end is End.UNKNOWN:
                 self._found(left)
 
     def _cancel(self, now: float) -> None:
         """Ask the servers to cancel what has not ended, again every second."""
-        due: dict[str, list[LeftBehind]] = {}
-        for left in self._left.values():
-            if not left.is_over and now - left.asked_at >= ASK_AGAIN:
-                due.setdefault(left.action, []).append(left)
-        for action, goals in due.items():
-            view = self._views.get(action)
-            for left in sorted(goals, key=lambda goal: goal.asked_at)[:CANCELS_A_TURN]:
-                question = None if view is None else view.cancel(left.goal_id)
-                if question is not None:
+        goals = sorted(self._left.values(), key=lambda goal: goal.asked_at)
+        for action, view in self._views.items():
+            due = [
+                left
+                for left in goals
+                if left.action == action and not left.is_over and now - left.asked_at >= ASK_AGAIN
+            ]
+            for left in due[:CANCELS_A_TURN]:
+                if (question := view.cancel(left.goal_id)) is not None:
                     left.asked_at = now
                     if left.awaited:
                         self._questions[action, question] = left

@@ -6,16 +6,13 @@ one of the same type in another namespace. The texts follow a name and go on as 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from bt_actions.utilities.suggest import did_you_mean, listing
-
-__all__ = ["Ends", "elsewhere", "without_service", "without_topic"]
 
 NAMED = 3
 """Names of one type in other namespaces that are told, at most."""
@@ -24,32 +21,23 @@ ALIKE = 0.75
 """How alike two full names must be: they share their namespaces."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ends:
-    """What the publishers, or the subscriptions, of a topic have in common with ours."""
-
-    type: str
-    reliable: bool = True
-    durable: bool = False
-    """Whether what was published before is kept, or asked for."""
-
-
-def mismatch(ours: Ends, others: Iterable[Ends], *, publish: bool) -> str:
+def mismatch(
+    kind: str, qos: QoSProfile, others: Sequence[TopicEndpointInfo], *, publish: bool
+) -> str:
     """Say why the others on our topic, who `publish` or else subscribe, do not match; or ""."""
-    others = list(others)
     theirs = "what is published there" if publish else "what is asked for there"
     if not others:
         return "nobody publishes on it" if publish else ""
-    same = [each for each in others if each.type == ours.type]
+    same = [each.qos_profile for each in others if each.topic_type == kind]
     if not same:
-        return f"{theirs} is {listing(sorted({each.type for each in others}))}, not {ours.type}"
-    offers, wants = (same, [ours]) if publish else ([ours], same)
-    if all(each.reliable for each in wants) and not any(each.reliable for each in offers):
-        word = "best effort, write 'qos: best_effort'" if publish else "reliable, not best effort"
-        return f"{theirs} is {word}"
-    if all(each.durable for each in wants) and not any(each.durable for each in offers):
-        word = "not latched, write 'qos: default'" if publish else "latched, write 'qos: latched'"
-        return f"{theirs} is {word}"
+        return f"{theirs} is {listing(sorted({each.topic_type for each in others}))}, not {kind}"
+    offers, wants = (same, [qos]) if publish else ([qos], same)
+    for keeps, published, asked in (
+        (_reliable, "best effort, write 'qos: best_effort'", "reliable, not best effort"),
+        (_latched, "not latched, write 'qos: default'", "latched, write 'qos: latched'"),
+    ):
+        if all(map(keeps, wants)) and not any(map(keeps, offers)):
+            return f"{theirs} is {published if publish else asked}"
     return ""
 
 
@@ -70,8 +58,8 @@ def without_topic(node: Node, topic: str, kind: str, qos: QoSProfile, *, publish
     """Say, behind a colon, why nobody is heard on a topic (or, without `publish`, hears us)."""
     look = node.get_publishers_info_by_topic if publish else node.get_subscriptions_info_by_topic
     try:
-        others = [_ends(info.topic_type, info.qos_profile) for info in look(topic)]
-        why = mismatch(_ends(kind, qos), others, publish=publish)
+        others = look(topic)
+        why = mismatch(kind, qos, others, publish=publish)
         known = {} if others else dict(node.get_topic_names_and_types())
     except Exception:  # noqa: BLE001 - our node was destroyed
         return ""
@@ -96,9 +84,9 @@ def without_service(node: Node, service: str, kind: str) -> str:
     return f": nobody offers it{elsewhere(service, kind, known)}"
 
 
-def _ends(kind: str, qos: Any) -> Ends:
-    return Ends(
-        kind,
-        qos.reliability is not ReliabilityPolicy.BEST_EFFORT,
-        qos.durability is DurabilityPolicy.TRANSIENT_LOCAL,
-    )
+def _reliable(qos: QoSProfile) -> bool:
+    return bool(qos.reliability is not ReliabilityPolicy.BEST_EFFORT)
+
+
+def _latched(qos: QoSProfile) -> bool:
+    return bool(qos.durability is DurabilityPolicy.TRANSIENT_LOCAL)

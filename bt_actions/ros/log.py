@@ -13,7 +13,6 @@ import logging
 import os
 import queue
 import select
-import sys
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -52,7 +51,7 @@ class _StandardError(logging.Handler):
             try:
                 left = left[os.write(STDERR, left) :]
             except BlockingIOError:  # whoever shares the terminal has made it so
-                _has_room(None)
+                _has_room()
             except OSError:  # nobody will ever read it
                 return
 
@@ -78,19 +77,19 @@ class Log:
 
     def info(self, text: str) -> None:
         """Log something worth knowing."""
-        self._put(partial(self._logger.info, "%s", _fit(text)))
+        self._put(self._logger.info, text)
 
     def warning(self, text: str) -> None:
         """Log something that may need attention."""
-        self._put(partial(self._logger.warning, "%s", _fit(text)))
+        self._put(self._logger.warning, text)
 
     def error(self, text: str) -> None:
         """Log something that needs attention."""
-        self._put(partial(self._logger.error, "%s", _fit(text)))
+        self._put(self._logger.error, text)
 
     def by(self, logger: Any, level: str, text: str) -> None:
         """Log a line of a tree by one of rclpy's loggers; `level` is one of `LEVELS`."""
-        self._put(partial(self._write_by, logger, level, _fit(text)))
+        self._put(partial(self._write_by, logger, level), text)
 
     def flush(self) -> None:
         """Wait until all that was said is written; not for long, and in vain only once."""
@@ -99,57 +98,44 @@ class Log:
             if not done.wait_for(lambda: not self._lines.unfinished_tasks, self._patience):
                 self._patience = 0.0
 
-    def _put(self, write: Callable[[], object]) -> None:
+    def _put(self, write: Callable[[str], object], text: str) -> None:
         with self._guard:
             try:
-                self._lines.put_nowait(write)
+                self._lines.put_nowait(partial(write, _fit(text)))
             except queue.Full:
                 self._dropped += 1
-            if not self._is_written():
-                while _has_room(0) and not self._lines.empty():
-                    self._write_next()
-
-    def _is_written(self) -> bool:
-        """Whether a thread does it; there may be too many, and at the very end none runs."""
-        if sys.is_finalizing():
-            return False
-        if self._thread is None:
-            thread = threading.Thread(target=self._write, name="bt_actions-log", daemon=True)
-            with contextlib.suppress(RuntimeError):
-                thread.start()
-                self._thread = thread
-        return self._thread is not None
+            if self._thread is None:
+                thread = threading.Thread(target=self._write, name="bt_actions-log", daemon=True)
+                with contextlib.suppress(RuntimeError):  # too many: with the next line, then
+                    thread.start()
+                    self._thread = thread
 
     def _write(self) -> None:
         while True:
-            self._write_next()
-
-    def _write_next(self) -> None:
-        write = self._lines.get()
-        _has_room(None)  # rclpy waits for it with the interpreter's lock held
-        write()
-        with self._guard:
-            dropped = self._dropped if self._lines.empty() else 0
-            self._dropped -= dropped
-        if dropped:
-            self._logger.warning("%s lines were not logged", dropped)
-        self._patience = WITHIN
-        self._lines.task_done()
+            write = self._lines.get()
+            _has_room()  # rclpy waits for it with the interpreter's lock held
+            write()
+            with self._guard:
+                dropped = self._dropped if self._lines.empty() else 0
+                self._dropped -= dropped
+            if dropped:
+                self._logger.warning("%s lines were not logged", dropped)
+            self._patience = WITHIN
+            self._lines.task_done()
 
     def _write_by(self, logger: Any, level: str, text: str) -> None:
         try:
             BY_RCLPY[level](logger, text)
         except Exception:  # noqa: BLE001 - its node is gone, say; the line is not lost
-            self._logger.log(LEVELS[level], "%s", text)
+            self._logger.log(LEVELS[level], text)
 
 
-def _has_room(patience: int | None) -> bool:
+def _has_room() -> None:
     """Wait until standard error takes a line, if it is a pipe."""
     poll = select.poll()
     poll.register(STDERR, select.POLLOUT)
     with contextlib.suppress(OSError):
-        return bool(poll.poll(patience))
-    return True
+        poll.poll()
 
 
 def _fit(text: str) -> str:

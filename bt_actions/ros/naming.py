@@ -17,8 +17,6 @@ from rclpy.node import Node
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds import participant
 
-__all__ = ["LONGEST", "Outlook", "named_node", "node_name"]
-
 LONGEST = 100
 """Characters of a node's name, which the names of its services begin with."""
 

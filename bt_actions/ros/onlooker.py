@@ -23,8 +23,6 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions.ros.graph import servers
 from bt_actions.ros.workarounds import participant
 
-__all__ = ["ActionView", "CannotStart", "Onlooker", "onlooker"]
-
 STATUS = "/_action/status"
 """What the name of an action's status topic ends with."""
 DEPTH = 100

@@ -30,8 +30,6 @@ from bt_actions.messages.fields import (
 from bt_actions.ros.workarounds import participant
 from bt_actions.utilities.plain_text import as_json
 
-__all__ = ["declare_input", "parameters_in"]
-
 _OF_EVERY_NODE = frozenset({"use_sim_time", "start_type_description_service"})
 
 

@@ -15,8 +15,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from bt_actions.utilities.plain_text import clean_lines
 
-__all__ = ["Rosout"]
-
 LEVELS = {"info": 20, "error": 40}
 LINGER = 0.5
 """Seconds, at most, for the last line to be acknowledged by those who listen."""

@@ -14,8 +14,6 @@ from rclpy.node import Node
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.in_sight import without_service
 
-__all__ = ["ServiceClient"]
-
 
 class ServiceClient:
     """A client of one service on a node; the Service of traffic/backend.py."""

@@ -13,20 +13,14 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from types import FrameType
-from typing import Any
 
 from rclpy.context import Context
-from rclpy.executors import (
-    Executor,
-    ExternalShutdownException,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Task
 
-from bt_actions.ros.log import log
 from bt_actions.ros.naming import named_node
 from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.workarounds import participant
@@ -35,8 +29,7 @@ from bt_actions.ros.workarounds.once_executor import OnceExecutor
 THREADS = 2
 """Of the multi-threaded executor; the interpreter lock does the work, more are no faster."""
 PATIENCE = 1.0
-"""Seconds between two questions to an executor of somebody else's; at shutdown, those after which
-it is told that a callback does not return."""
+"""Seconds between two questions to an executor of somebody else's."""
 PATIENCE_SPUN = 5.0
 """Seconds without any sign that somebody else spins our node, where a loop of theirs may call
 spin_once now and then, and a slow callback must be no false alarm."""
@@ -68,7 +61,6 @@ class Spinner:
     ) -> None:
         self._died = died
         self._thread: threading.Thread | None = None
-        self._context: Context | None = None
         self._stopping = False
         self._alive = threading.Event()
         self._asked_at = 0.0
@@ -86,11 +78,10 @@ class Spinner:
             else:
                 given = node.executor  # whose owner spins it
         self.spins = given is None or not given.get_nodes()
-        if context is not None:
-            self._context = context
-        else:
-            context = node.context if node is not None else given.context if given else None
-        if context is None:
+        self._context = context  # to be shut down here
+        if context is None and (brought := node or given):
+            context = brought.context
+        elif context is None:
             context = self._context = Context()
             context.init()
         unique = name or f"bt_actions_{os.getpid()}_{next(_number)}"
@@ -151,10 +142,12 @@ class Spinner:
 
         This thread spins it, or, where it is spun by us, was called by the executor.
         """
-        frames = list(_frames(sys._getframe()))  # noqa: SLF001 - documented
-        return any(_spins(self.executor, each) for each in frames) or (
-            self.spins and any(_calls(self.executor, each) for each in frames)
-        )
+        frame: FrameType | None = sys._getframe()  # noqa: SLF001 - documented
+        while frame is not None:
+            if _spins(self.executor, frame) or (self.spins and _calls(self.executor, frame)):
+                return True
+            frame = frame.f_back
+        return False
 
     def _check(self) -> None:
         if self._moved() or getattr(self.executor, "_is_shutdown", False):  # rclpy's name of it
@@ -193,9 +186,6 @@ class Spinner:
             "(rclpy.spin(node) takes it, too), and shut the runner down first"
         )
 
-    def _spinning(self) -> bool:
-        return self._thread is not None and self._thread.is_alive()
-
     def _spin(self) -> None:
         """Spin until told to stop; an executor that was given must stay usable, so no shutdown."""
         try:
@@ -210,18 +200,6 @@ class Spinner:
             if not self._stopping:
                 self._died(self._gone())
 
-    def _await(self, threads: Iterable[threading.Thread]) -> None:
-        """Wait for threads that run callbacks, and tell it where one takes long to return."""
-        until = time.monotonic() + PATIENCE
-        for thread in list(threads):
-            thread.join(max(0.0, until - time.monotonic()))
-            if thread.is_alive():
-                log.warning(
-                    f"shutdown waits for a callback that {self.node.get_fully_qualified_name()}'s "
-                    "executor is in, of a node that was added to it: it has not returned yet"
-                )
-                return
-
     def stop(self, before_nodes: Callable[[], None]) -> None:
         """Shut down what is ours, in the clean order; goals must be drained before.
 
@@ -231,20 +209,12 @@ class Spinner:
             self._stopping = True
             if self._thread is not None:
                 with contextlib.suppress(Exception):  # of a guard whose context is gone
-                    self.executor.create_task(_nothing)  # so that spin_once returns
-                self._await([self._thread])
-            pool: Any = getattr(self.executor, "_executor", None)
-            if self._own_executor:
-                if pool is not None and not self._spinning():
-                    pool.shutdown(wait=False)
-                    self._await(pool._threads)  # noqa: SLF001
-                    pool.shutdown(wait=True)  # what it still runs needs the executor's guard
-                self.executor.shutdown()
-            if self._thread is not None:
+                    self.executor.create_task(int)  # does nothing: spin_once returns after it
                 self._thread.join()
-                self._thread = None
-            if self._own_executor and pool is not None:
-                pool.shutdown(wait=True)
+            if self._own_executor:
+                if isinstance(self.executor, OnceExecutor):
+                    self.executor.finish()  # what it still runs needs the executor's guard
+                self.executor.shutdown()
         if self._added and self.node.executor is self.executor:
             self.node.executor = None  # takes it out of the executor, and lets another have it
         before_nodes()
@@ -254,10 +224,6 @@ class Spinner:
                 participant.close(self.node, self._context)
             else:
                 self.node.destroy_node()
-
-
-def _nothing() -> None:
-    pass
 
 
 def _make(kind: Executor | str | None, context: Context) -> Executor:
@@ -272,12 +238,6 @@ def node_beside(node: Node, name: str) -> Node:
     What `--ros-args` says is about the other one, whose name it may not get too.
     """
     return Node(name, context=node.context, use_global_arguments=False)
-
-
-def _frames(top: FrameType | None) -> Iterator[FrameType]:
-    while top is not None:
-        yield top
-        top = top.f_back
 
 
 def _spins(executor: Executor, frame: FrameType) -> bool:

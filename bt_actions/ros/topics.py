@@ -25,8 +25,6 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.in_sight import without_topic
 from bt_actions.ros.workarounds.closable import closable
 
-__all__ = ["Publisher", "Subscription", "qos_profile"]
-
 DISCOVERS = 3.5
 """Seconds that a new participant takes, at most, to discover who was there before it.
 

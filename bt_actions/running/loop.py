@@ -20,7 +20,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.running.goals import RunGoals
-from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, tick_once
+from bt_actions.running.ticking import ChangeVisitor, Misbehaviour
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain
 from bt_actions.utilities.places import culprit_of, path_of
@@ -199,7 +199,7 @@ class TickLoop:
         """Tick once, and tell whether that changed a status."""
         try:
             with self.goals.begun_here():
-                self._guarded(lambda: tick_once(self.tree))
+                self._guarded(self.tree.tick)
         except _Abandoned:
             pass
         finally:
@@ -233,11 +233,10 @@ class TickLoop:
             step()
         except Exception as error:
             culprit = culprit_of(error)
-            where = f"{'/'.join(path_of(culprit))}" if culprit is not None else self.tree.root.name
+            where = "/".join(path_of(culprit or self.tree.root))
             if isinstance(error, Misbehaviour):
                 raise TreeError(f"{where}: {error}") from None
-            what = f"{self._doing} raised {type(error).__name__}: {error}"
-            raise TreeError(f"{where}: {what}") from error
+            raise TreeError(f"{where}: {self._doing} raised {raised(error)}") from error
 
     # Its end
 

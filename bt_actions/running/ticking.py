@@ -1,4 +1,4 @@
-"""One tick of a tree: done, watched, and traced back to a behaviour where it raised. No ROS."""
+"""What a tick has changed, and what a behaviour did wrong in it. No ROS."""
 
 from __future__ import annotations
 
@@ -7,27 +7,7 @@ from collections.abc import Callable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
-
-
-def tick_once(tree: BehaviourTree) -> None:
-    """Tick as `BehaviourTree.tick` does, which walks the whole tree even for no visitor."""
-    if type(tree).tick is not BehaviourTree.tick or any(v.full for v in tree.visitors):
-        tree.tick()
-        return
-    for handler in tree.pre_tick_handlers:
-        handler(tree)
-    for visitor in tree.visitors:
-        visitor.initialise()
-    for node in tree.root.tick():
-        for visitor in tree.visitors:
-            node.visit(visitor)
-    for visitor in tree.visitors:
-        visitor.finalise()
-    for handler in tree.post_tick_handlers:
-        handler(tree)
-    tree.count += 1
 
 
 class Misbehaviour(Exception):

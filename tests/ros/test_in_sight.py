@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import pytest
+from rclpy.topic_endpoint_info import TopicEndpointInfo as Ends
 
-from bt_actions.ros.in_sight import Ends, elsewhere, mismatch
+from bt_actions.ros.in_sight import elsewhere, mismatch
+from bt_actions.ros.topics import qos_profile
 
 BOOL = "std_msgs/msg/Bool"
-OURS = Ends(BOOL)
-BEST_EFFORT = Ends(BOOL, reliable=False)
-LATCHED = Ends(BOOL, durable=True)
-OTHER = Ends("std_msgs/msg/String")
+OURS = Ends(topic_type=BOOL, qos_profile=qos_profile("default"))
+BEST_EFFORT = Ends(topic_type=BOOL, qos_profile=qos_profile("best_effort"))
+LATCHED = Ends(topic_type=BOOL, qos_profile=qos_profile("latched"))
+OTHER = Ends(topic_type="std_msgs/msg/String", qos_profile=qos_profile("default"))
 
 
 @pytest.mark.parametrize(
@@ -39,8 +41,9 @@ OTHER = Ends("std_msgs/msg/String")
 def test_what_is_there_in_vain_is_said_of_publishers_and_of_subscriptions(
     ours: Ends, others: list[Ends], heard: str, unheard: str
 ) -> None:
-    assert mismatch(ours, others, publish=True) == heard
-    assert mismatch(ours, others, publish=False) == unheard
+    kind, qos = ours.topic_type, ours.qos_profile
+    assert mismatch(kind, qos, others, publish=True) == heard
+    assert mismatch(kind, qos, others, publish=False) == unheard
 
 
 @pytest.mark.parametrize(

@@ -44,9 +44,7 @@ class Written(logging.Handler):
 @pytest.fixture
 def written(monkeypatch: pytest.MonkeyPatch) -> Iterator[Written]:
     each = Written()
-    monkeypatch.setattr(
-        module, "_has_room", lambda patience: each.reads.wait(60.0 if patience is None else 0)
-    )
+    monkeypatch.setattr(module, "_has_room", lambda: each.reads.wait(60.0))
     yield each
     each.reads.set()
 

@@ -24,8 +24,6 @@ from rclpy.action.server import (
 
 from bt_actions.ros.serving.endpoints import Endpoints
 
-__all__ = ["AcceptedGoal", "DeferredActionServer"]
-
 _SENT = 0.25
 """Seconds in which an executor that is spun sends a result, once that is set."""
 _NUDGE = 0.01

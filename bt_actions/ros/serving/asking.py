@@ -16,8 +16,6 @@ from bt_actions.ros.serving.endpoints import kept
 from bt_actions.ros.topics import DISCOVERS
 from bt_actions.ros.workarounds import participant
 
-__all__ = ["answers", "heard"]
-
 PATIENCE = 5.0
 """Seconds for a server to come in sight, and for one to answer."""
 Spin = Callable[[], None]

@@ -17,8 +17,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from bt_actions.ros.serving.off_executor import OffTheExecutor
 
-__all__ = ["Endpoints", "kept"]
-
 
 def kept(depth: int) -> QoSProfile:
     """The quality of service of a topic whose last messages also come to who comes late."""

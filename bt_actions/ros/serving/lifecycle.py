@@ -20,8 +20,6 @@ from bt_actions.ros.log import log
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.utilities.plain_text import in_words
 
-__all__ = ["Lifecycle"]
-
 
 class Lifecycle:
     """The state of a node, and the services that tell and change it; unconfigured at first.

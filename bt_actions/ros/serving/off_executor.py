@@ -14,8 +14,6 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.task import Future
 
-__all__ = ["OffTheExecutor"]
-
 _NUDGE = 0.01
 """Seconds between two reminders of an executor that something awaited is there."""
 _SPUN = 10.0

@@ -12,8 +12,6 @@ from typing import Any, TypeVar
 
 from rclpy.exceptions import InvalidHandle
 
-__all__ = ["closable"]
-
 Entity = TypeVar("Entity")
 
 

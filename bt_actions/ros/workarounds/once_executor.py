@@ -31,6 +31,10 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
         self._executor.shutdown()  # it has no thread yet
         self._executor = self._pool = _Pool(num_threads)
 
+    def finish(self) -> None:
+        """Take no more work, and wait for what is there."""
+        self._pool.shutdown()
+
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
         """Return what is to be run next, as rclpy's does; TimeoutException: nothing, as yet."""
         ready = super().wait_for_ready_callbacks(*args, **options)

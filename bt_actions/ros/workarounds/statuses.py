@@ -17,8 +17,6 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus, GoalStatusArray
 
-__all__ = ["status_reader"]
-
 ID, ENTRY, STATUS = 16, 28, 24
 """Bytes of a goal's id, and of an entry (id, time, status, filled up); and where the status is."""
 
