@@ -62,7 +62,7 @@ class Life:
         """Let time pass (on the node's clock `ros` seconds, the same by default) and poll."""
         ros = seconds if ros is None else ros
         self.now = Now(self.now.steady + seconds, self.now.ros + ros)
-        commands = list(self.goal.poll(self.now))
+        commands = [each for due in self.goal.due(self.now) for each in self.goal.on(due, self.now)]
         self.sent += commands
         return commands
 
@@ -127,7 +127,7 @@ def denied_unconfirmed() -> Life:
 
 def test_a_wish_to_stop_means_something_in_every_state_and_each_event_in_some() -> None:
     for state in set(State) - {State.DONE}:
-        assert TABLE[state, Event.PROCESS_EXITING] is not drop, state
+        assert {TABLE[state, Event.ABANDONED], TABLE[state, Event.PARKED]} != {drop}, state
     for state in set(State) - {State.DONE, State.LOST, State.NOT_RECEIVED}:
         assert TABLE[state, Event.INTERRUPTED] is not drop, state
     for event in Event:
@@ -235,7 +235,7 @@ def test_what_turns_up_again_is_canceled_and_holds_nothing() -> None:
     life = Life()
     life.goal = turned_up_again(b"1", "/move", LIMITS, frozenset({"/move"}), Busy.WAIT, life.now)
     assert life.goal.outcome is Outcome.SERVER_AMBIGUOUS
-    assert not life.goal.holding
+    assert not life.goal.claims_resources
     assert life.on(Event.SERVER_RETURNED) == [CANCEL, ASK]
     assert life.goal.end is End.UNKNOWN
     assert life.goal.blocks(waiting().goal, same_server=True)
@@ -323,7 +323,7 @@ def test_an_unconfirmed_goal_that_nobody_denies_stays_unknown_and_keeps_its_reso
     life = unconfirmed()
     life.pass_time(3.0)
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
-    assert life.goal.holding
+    assert life.goal.claims_resources
     assert life.pass_time(ASK_AGAIN) == [CANCEL], "and the questions go on"
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     life.pass_time(3.0)
@@ -395,7 +395,7 @@ def test_a_goal_that_ended_before_its_acceptance_was_heard_of_is_asked_for_its_r
 def test_what_a_result_says_goes_on_makes_the_end_unknown(
     canceled: bool, result: tuple[int, str]
 ) -> None:
-    life = executing(settles=lambda result: False)
+    life = executing(accounts_for_all=lambda result: False)
     if canceled:
         life.on(Event.INTERRUPTED)
     life.on(Event.RESULT, result)
@@ -441,7 +441,7 @@ def test_the_cancel_deadline_runs_to_the_terminal_status_not_to_the_acknowledgem
     assert life.goal.outcome is None
     life.pass_time(0.1)
     life.is_free(Outcome.CANCELED, End.UNKNOWN)
-    assert life.goal.holding, "others queue meanwhile"
+    assert life.goal.claims_resources, "others queue meanwhile"
     assert life.pass_time(ASK_AGAIN) == [CANCEL, ASK]
     life.on(Event.RESULT, CANCELED)
     life.ended(Outcome.CANCELED, End.CANCELED)
@@ -450,7 +450,7 @@ def test_the_cancel_deadline_runs_to_the_terminal_status_not_to_the_acknowledgem
 def test_what_the_server_said_of_a_cancel_is_told_as_long_as_it_holds() -> None:
     life = sending()
     life.on(Event.INTERRUPTED)
-    life.on(Event.DRAINED)
+    life.on(Event.DRAIN_GAVE_UP)
     assert not life.goal.cancel_said, "it was not asked"
     life.on(Event.ACCEPTED)
     assert "has not answered" in life.goal.cancel_said
@@ -462,7 +462,7 @@ def test_what_the_server_said_of_a_cancel_is_told_as_long_as_it_holds() -> None:
     assert "has not answered" in life.goal.cancel_said, "it is another one, perhaps"
     life.on(Event.CANCEL_ANSWERED, CANCEL_ACCEPTED)
     life.on(Event.CANCEL_ANSWERED, CANCEL_TERMINATED)
-    life.on(Event.NODE_CLOSED)
+    life.on(Event.PARKED)
     assert "has agreed to cancel it, and it has not ended" in life.goal.cancel_said
 
 
@@ -502,13 +502,13 @@ def test_a_request_that_was_denied_for_good_never_came_whatever_becomes_of_its_s
     for _ in range(int(DENIED_FOR_GOOD) + 5):
         life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
         life.pass_time(1.0)
-    assert not life.goal.unconfirmed
-    for goes in (Event.SERVER_LOST, Event.NODE_CLOSED):
+    assert not life.goal.may_still_be_accepted
+    for goes in (Event.SERVER_LOST, Event.PARKED):
         life.on(goes, "gone")
         assert life.on(Event.SERVER_RETURNED) == [CANCEL], "to ask does no harm"
         life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
         assert life.pass_time(60.0) == []
-        assert (life.goal.end, life.goal.unconfirmed) == (End.NEVER_STARTED, False)
+        assert (life.goal.end, life.goal.may_still_be_accepted) == (End.NEVER_STARTED, False)
     assert life.on(Event.ACCEPTED) == [CANCEL, ASK], "it came after all"
 
 
@@ -600,14 +600,14 @@ def test_without_deadlines_the_server_is_still_asked_now_and_then() -> None:
 def test_what_is_held_falls_due_later_and_nothing_else_does() -> None:
     life = executing()
     life.now = Now(life.now.steady + 2.5, life.now.ros + 2.5)  # nobody polls: timeout.feedback is 2
-    life.goal.hold(1.0, life.now)
+    life.goal.suspend_deadlines(1.0, life.now)
     assert life.pass_time(0.9) == []
     assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, pytest.approx(0.1))
     life.on(Event.FEEDBACK, "at last")
     assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, 2.0)
 
 
-@pytest.mark.parametrize("last", [Event.CANCEL_DUE, Event.DRAINED])
+@pytest.mark.parametrize("last", [Event.CANCEL_DUE, Event.DRAIN_GAVE_UP])
 def test_an_end_that_the_status_shows_is_known_when_nobody_waits_any_longer(last: Event) -> None:
     life = executing()
     life.on(Event.INTERRUPTED)
@@ -733,10 +733,10 @@ def test_feedback_clears_the_doubt() -> None:
 def test_what_its_node_leaves_is_canceled_where_its_server_is_seen_again(make: Any) -> None:
     life = make()
     life.on(Event.INTERRUPTED)
-    assert life.on(Event.NODE_CLOSED) == [RELEASE]
+    assert life.on(Event.PARKED) == [RELEASE]
     life.is_free(Outcome.CANCELED, End.UNKNOWN)
     assert life.due_in is None
-    assert life.on(Event.NODE_CLOSED) == []
+    assert life.on(Event.PARKED) == []
     assert CANCEL in life.on(Event.SERVER_RETURNED)
     assert life.goal.outstanding
     life.on(Event.ACCEPTED)
@@ -775,7 +775,8 @@ def test_a_server_that_dies_after_showing_the_end_leaves_no_question() -> None:
 @pytest.mark.parametrize("make", [sending, executing, unconfirmed])
 def test_a_process_that_ends_says_which_goal_it_cannot_account_for(make: Any) -> None:
     life = make()
-    life.on(Event.PROCESS_EXITING)
+    life.on(Event.PARKED)
+    life.on(Event.ABANDONED)
     assert life.goal.state is State.DONE
     assert life.goal.end is End.UNKNOWN
     assert life.goal.outcome is not None
@@ -867,8 +868,8 @@ def test_what_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_u
     life = unconfirmed()
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     life.pass_time(life.goal.timeouts.accept or 0.0)
-    assert life.goal.unconfirmed
-    life.on(Event.DRAINED)
+    assert life.goal.may_still_be_accepted
+    life.on(Event.DRAIN_GAVE_UP)
     assert (life.goal.outcome, life.goal.end) == (Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
     assert not life.goal.outstanding, "the server may get other goals"
     assert Command.CANCEL in life.on(Event.ACCEPTED)
@@ -891,12 +892,12 @@ def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -
 def test_an_unconfirmed_goal_that_is_denied_for_good_need_not_be_waited_for() -> None:
     life = denied_unconfirmed()
     assert life.pass_time(DENIED_FOR_GOOD - 2.0) == []
-    assert life.goal.unconfirmed
+    assert life.goal.may_still_be_accepted
     assert life.pass_time(1.0) == [CANCEL], "asked once more"
     denied(life)
-    assert not life.goal.unconfirmed
+    assert not life.goal.may_still_be_accepted
     assert life.due_in is None
-    life.on(Event.DRAINED)
+    life.on(Event.DRAIN_GAVE_UP)
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
     assert CANCEL in life.on(Event.ACCEPTED), "and it is still canceled if it turns up"
     assert life.goal.end is End.UNKNOWN
@@ -905,14 +906,14 @@ def test_an_unconfirmed_goal_that_is_denied_for_good_need_not_be_waited_for() ->
 def test_only_denials_count_towards_denied_for_good() -> None:
     life = denied_unconfirmed()
     life.pass_time(DENIED_FOR_GOOD)
-    assert life.goal.unconfirmed, "silence is no denial"
+    assert life.goal.may_still_be_accepted, "silence is no denial"
     denied(life)
-    assert not life.goal.unconfirmed
+    assert not life.goal.may_still_be_accepted
 
 
 def test_what_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_good() -> None:
     life = denied_unconfirmed()
-    life.on(Event.DRAINED)
+    life.on(Event.DRAIN_GAVE_UP)
     assert life.goal.end is End.UNKNOWN
     life.pass_time(DENIED_FOR_GOOD)
     denied(life)
@@ -926,13 +927,13 @@ def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> No
     for _ in range(int(DENIED_FOR_GOOD / (away + 1.5)) + 1):
         life.pass_time(1.5)
         denied(life)
-        life.on(Event.NODE_CLOSED)
+        life.on(Event.PARKED)
         life.pass_time(away)
         life.on(Event.SERVER_RETURNED)
     denied(life)
     life.pass_time(2 * (life.goal.timeouts.accept or 0.0))
     denied(life)
-    assert life.goal.unconfirmed is not counts
+    assert life.goal.may_still_be_accepted is not counts
 
 
 def test_an_unconfirmed_goal_whose_server_is_back_beside_another_is_canceled_again() -> None:
@@ -944,5 +945,6 @@ def test_a_process_that_ends_does_not_say_never_started_of_a_request_without_ans
     life = unconfirmed()
     life.on(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)
     life.pass_time(life.goal.timeouts.accept or 0.0)
-    life.on(Event.PROCESS_EXITING)
+    life.on(Event.PARKED)
+    life.on(Event.ABANDONED)
     life.ended(Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)

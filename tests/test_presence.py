@@ -6,9 +6,9 @@ import pytest
 
 from bt_actions.servers.presence import (
     LEASE,
+    NO_SECOND_AFTER,
     NOT_READY_FOR,
     PROBE_EVERY,
-    SETTLED_AFTER,
     SLOWEST_START,
     Server,
     ServerWatch,
@@ -35,7 +35,7 @@ def crowd(watch: ServerWatch, at: float = 1.0) -> ServerWatch:
 
 
 def settle(watch: ServerWatch, at: float = 1.0) -> ServerWatch:
-    """Show a ghost and its successor, and let only the successor answer."""
+    """Show a dead server and its successor, and let only the successor answer."""
     crowd(watch, at)
     watch.probe_answered(at + 0.1, 1)
     watch.observe(at + 0.1 + SLOWEST_START, True, gids(OLD, NEW))
@@ -60,23 +60,23 @@ def test_without_its_services_or_its_status_topic_it_is_absent(watch: ServerWatc
 
 
 def test_two_publishers_are_not_yet_two_servers(watch: ServerWatch) -> None:
-    assert crowd(watch).state(1.0) is Server.SETTLING
+    assert crowd(watch).state(1.0) is Server.UNCLEAR
 
 
 def test_two_answers_to_one_probe_are_two_servers(watch: ServerWatch) -> None:
     crowd(watch).probe_answered(1.1, 1)
-    assert watch.state(1.1) is Server.SETTLING
+    assert watch.state(1.1) is Server.UNCLEAR
     watch.probe_answered(1.2, 1)
     assert watch.state(1.2) is Server.AMBIGUOUS
 
 
-def test_one_answer_and_silence_are_a_ghost_and_its_successor(watch: ServerWatch) -> None:
+def test_one_answer_and_silence_are_a_dead_server_and_its_successor(watch: ServerWatch) -> None:
     late = 1.0 + SLOWEST_START
     crowd(watch).probe_answered(late, 1)
-    watch.observe(late + SETTLED_AFTER / 2, True, gids(OLD, NEW))
-    assert watch.state(late + SETTLED_AFTER / 2) is Server.SETTLING
-    watch.observe(late + SETTLED_AFTER, True, gids(OLD, NEW))
-    assert watch.state(late + SETTLED_AFTER) is Server.READY
+    watch.observe(late + NO_SECOND_AFTER / 2, True, gids(OLD, NEW))
+    assert watch.state(late + NO_SECOND_AFTER / 2) is Server.UNCLEAR
+    watch.observe(late + NO_SECOND_AFTER, True, gids(OLD, NEW))
+    assert watch.state(late + NO_SECOND_AFTER) is Server.READY
     assert watch.alone
 
 
@@ -94,7 +94,7 @@ def test_answers_to_two_probes_are_not_two_answers(watch: ServerWatch) -> None:
     crowd(watch)
     for probe in (1, 2, 3):
         watch.probe_answered(1.0 + 0.1 * probe, probe)
-    assert watch.state(1.5) is Server.SETTLING
+    assert watch.state(1.5) is Server.UNCLEAR
 
 
 def test_a_second_answer_that_is_late_still_shows_two_servers(watch: ServerWatch) -> None:
@@ -111,20 +111,20 @@ def test_who_answers_is_alone_only_where_a_later_probe_shows_it(watch: ServerWat
     watch.probe_sent(9.0, 2)
     watch.probe_answered(9.0, 2)
     denied_at = 9.5
-    assert not watch.alone_since(9.5 + SETTLED_AFTER, denied_at), "probe 2 was sent before"
+    assert not watch.alone_since(9.5 + NO_SECOND_AFTER, denied_at), "probe 2 was sent before"
     watch.probe_sent(9.6, 3)
     watch.probe_answered(9.6, 3)
     assert not watch.alone_since(9.6, denied_at), "a second answer may be under way"
-    assert watch.alone_since(9.6 + SETTLED_AFTER, denied_at)
-    watch.probe_answered(9.7 + SETTLED_AFTER, 3)
-    assert not watch.alone_since(9.9 + SETTLED_AFTER, denied_at)
+    assert watch.alone_since(9.6 + NO_SECOND_AFTER, denied_at)
+    watch.probe_answered(9.7 + NO_SECOND_AFTER, 3)
+    assert not watch.alone_since(9.9 + NO_SECOND_AFTER, denied_at)
 
 
 def test_what_is_shown_beyond_the_lease_is_a_server(watch: ServerWatch) -> None:
     assert settle(watch).state(1.0 + LEASE + 0.1) is Server.AMBIGUOUS
 
 
-def test_when_the_ghost_is_gone_there_is_one_again(watch: ServerWatch) -> None:
+def test_when_the_dead_one_is_gone_there_is_one_again(watch: ServerWatch) -> None:
     crowd(watch).observe(20.0, True, gids(NEW))
     assert watch.state(20.0) is Server.READY
     assert not watch.alone
@@ -186,13 +186,13 @@ def test_a_newcomer_is_a_change_and_a_departure_is_not(watch: ServerWatch) -> No
     assert not watch.changed(gids(OLD, NEW))
 
 
-def test_after_a_standstill_of_ours_answers_have_time_to_come_in(watch: ServerWatch) -> None:
+def test_after_a_stall_of_ours_answers_have_time_to_come_in(watch: ServerWatch) -> None:
     """One had answered; the other's answer may lie in a socket."""
     crowd(watch).probe_answered(1.1, 1)
     late = 1.0 + SLOWEST_START
     watch.stood_still(late)
-    for now in (late, late + 0.9 * SETTLED_AFTER):
+    for now in (late, late + 0.9 * NO_SECOND_AFTER):
         watch.observe(now, True, gids(OLD, NEW))
-        assert watch.state(now) is Server.SETTLING
-    watch.observe(late + SETTLED_AFTER, True, gids(OLD, NEW))
-    assert watch.state(late + SETTLED_AFTER) is Server.READY
+        assert watch.state(now) is Server.UNCLEAR
+    watch.observe(late + NO_SECOND_AFTER, True, gids(OLD, NEW))
+    assert watch.state(late + NO_SECOND_AFTER) is Server.READY

@@ -6,10 +6,10 @@ import pytest
 
 from bt_actions.servers.reachability import (
     DOUBT_LASTS,
-    MUTE_AFTER,
     TRIES,
     TRY_AGAIN,
     TRY_LASTS,
+    UNRESPONSIVE_AFTER,
     Reachability,
 )
 
@@ -36,24 +36,24 @@ def test_who_has_answered_owes_nothing(reachability: Reachability) -> None:
     assert not reachability.is_unresponsive(99.0)
 
 
-def test_who_is_silent_may_be_deaf_and_is_not_pestered(reachability: Reachability) -> None:
+def test_who_is_silent_may_not_hear_and_is_not_pestered(reachability: Reachability) -> None:
     reachability.asked(20.0)
-    reachability.asked(20.0 + MUTE_AFTER - 0.1)
-    assert not reachability.is_unresponsive(20.0 + MUTE_AFTER - 0.1)
-    assert reachability.is_unresponsive(20.0 + MUTE_AFTER), (
+    reachability.asked(20.0 + UNRESPONSIVE_AFTER - 0.1)
+    assert not reachability.is_unresponsive(20.0 + UNRESPONSIVE_AFTER - 0.1)
+    assert reachability.is_unresponsive(20.0 + UNRESPONSIVE_AFTER), (
         "questions that get lost do not put it off"
     )
     assert not reachability.take_question(99.0)
-    reachability.answered(20.0 + MUTE_AFTER - 0.1)
+    reachability.answered(20.0 + UNRESPONSIVE_AFTER - 0.1)
     assert not reachability.is_unresponsive(99.0)
 
 
-def test_an_answer_of_before_the_standstill_proves_nothing(reachability: Reachability) -> None:
+def test_an_answer_of_before_the_stall_proves_nothing(reachability: Reachability) -> None:
     reachability.asked(20.0)
     reachability.doubt(30.0)
     reachability.answered(20.0)
     assert reachability.in_doubt(31.0) == DOUBT_LASTS - 1.0
-    assert reachability.is_unresponsive(30.0 + MUTE_AFTER)
+    assert reachability.is_unresponsive(30.0 + UNRESPONSIVE_AFTER)
     reachability.answered(30.0)
     assert not reachability.in_doubt(31.0)
     assert not reachability.is_unresponsive(99.0)

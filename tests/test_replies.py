@@ -10,7 +10,7 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Timeouts
 from bt_actions.goals.terms import Event, Now
 from bt_actions.servers import replies as replies
-from bt_actions.servers.presence import LEASE, SETTLED_AFTER, SLOWEST_START, ServerWatch
+from bt_actions.servers.presence import LEASE, NO_SECOND_AFTER, SLOWEST_START, ServerWatch
 
 ONE, OTHER = b"one", b"other"
 BOTH = frozenset({ONE, OTHER})
@@ -49,10 +49,10 @@ def said(watch: ServerWatch) -> replies.Replies:
 
 
 def alone(watch: ServerWatch) -> float:
-    """Let one of the two be a ghost; return the time."""
+    """Let one of the two be dead; return the time."""
     watch.probe_sent(0.0, 1)
     watch.probe_answered(0.0, 1)
-    now = SLOWEST_START + SETTLED_AFTER
+    now = SLOWEST_START + NO_SECOND_AFTER
     watch.observe(now, True, BOTH)
     assert watch.alone
     return now
@@ -90,9 +90,7 @@ def test_what_one_refuses_the_other_may_accept(said: replies.Replies, watch: Ser
     assert events(said.answered(watch, 0.0, [False, False])) == [Event.REJECTED]
 
 
-def test_a_refusal_counts_when_the_other_is_a_ghost(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
+def test_a_refusal_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.answered(watch, 0.0, [False]) == []
     assert said.looked(watch, 0.0) == []
     assert events(said.looked(watch, alone(watch))) == [Event.REJECTED]
@@ -110,7 +108,7 @@ def test_what_both_have_ended_was_at_two_servers(said: replies.Replies, watch: S
     assert watch.both_live
 
 
-def test_an_end_counts_when_the_other_is_a_ghost(said: replies.Replies, watch: ServerWatch) -> None:
+def test_an_end_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
     assert said.looked(watch, 0.0) == []
     assert said.looked(watch, alone(watch)) == [(Event.RESULT, ABORTED)]
@@ -180,8 +178,8 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
 
 
-@pytest.mark.parametrize("how", ["both answer", "two of three, and no ghost", "the other has gone"])
-def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
+@pytest.mark.parametrize("how", ["both answer", "two of three, none dead", "the other has gone"])
+def test_a_server_that_was_taken_for_dead_is_back_when_that_was_wrong(
     said: replies.Replies, watch: ServerWatch, how: str
 ) -> None:
     said.sent_to = frozenset({ONE})
@@ -198,7 +196,7 @@ def test_a_server_that_was_taken_for_a_ghost_is_back_when_that_was_wrong(
         watch.observe(now, False, BOTH)
         assert said.looked(watch, now) == [], "it cannot be talked to"
         watch.observe(now, True, BOTH)
-    elif how == "two of three, and no ghost":
+    elif how == "two of three, none dead":
         watch.observe(now, True, BOTH | {b"third"})
         watch.two_answered()
         assert said.looked(watch, now) == [], "these may be the other two"
@@ -263,7 +261,7 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
     assert told(said, said.answered(watch, now, [True]), now) == [Event.ACCEPTED]
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
-    later = now + SETTLED_AFTER
+    later = now + NO_SECOND_AFTER
     assert said.finished(watch, later, now, [UNKNOWN]) == []
     watch.observe(later, True, BOTH)
     assert said.looked(watch, later) == []
@@ -281,7 +279,7 @@ def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
     assert said.canceled(watch, now, now, [DENIED]) == []
-    now += SETTLED_AFTER
+    now += NO_SECOND_AFTER
     assert told(said, said.looked(watch, now), now) == [Event.SERVER_LOST]
     assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"
 

@@ -623,8 +623,8 @@ class TestWhoWaits:
         self, journal: Journal, name: str, node: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         runner = TreeRunner(MoveRobot("m", 9.0, action_name=name), node=node)
-        waits, minds = threading.Event(), runner._mind_signals
-        monkeypatch.setattr(runner, "_mind_signals", lambda: (waits.set(), minds())[1])
+        waits, hears = threading.Event(), runner._hear_signals
+        monkeypatch.setattr(runner, "_hear_signals", lambda: (waits.set(), hears())[1])
         runner.start()
         journal.wait_for("accepted")
 

@@ -169,7 +169,7 @@ class ActionBehaviour(Behaviour):
     def due_in(self) -> float | None:
         """Return the seconds until this leaf needs a tick though nothing has happened."""
         if self._backend is None or self._handle is None or not self._filed(self._handle):
-            return None  # while a goal is open, traffic/traffic.py minds its deadlines
+            return None  # while a goal is open, traffic/traffic.py applies its deadlines
         return self._attempts.pause_left(self._backend.clock.now())
 
     # py_trees' contract
@@ -215,7 +215,7 @@ class ActionBehaviour(Behaviour):
                     return Status.RUNNING
                 handle, begun = self._begin(backend), True
             traffic.advance(handle, self._make_message)
-            settled = traffic.is_settled(handle)  # then all of its feedback is here
+            settled = traffic.is_decided(handle)  # then all of its feedback is here
             for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
                 message = handle.feedback.popleft()
                 if self.on_feedback is not None and not self._is_over():
@@ -325,7 +325,7 @@ class ActionBehaviour(Behaviour):
             self.busy,
             attempt=self._attempts.attempt,
             keeps_feedback=self.on_feedback is not None,
-            settles=self.settles,
+            accounts_for_all=self.settles,
         )
         return self._handle
 

@@ -7,7 +7,7 @@ of its own, and does not know what a deadline means (goal.py).
 
 from __future__ import annotations
 
-from bt_actions.goals.terms import ON_ROS_CLOCK, Event, Now
+from bt_actions.goals.terms import NEVER, ON_ROS_CLOCK, Event, Now
 
 
 class Deadlines:
@@ -17,7 +17,7 @@ class Deadlines:
         self.now = now
         """The last moment of which it was told."""
         self._due: dict[Event, float] = {}
-        self._not_before = float("-inf")
+        self._not_before = NEVER
 
     def arm(self, event: Event, seconds: float | None) -> None:
         """Let `event` fall due in so many seconds, not earlier or later; None leaves it alone."""
@@ -37,12 +37,14 @@ class Deadlines:
     def left(self, now: Now) -> list[tuple[float, Event]]:
         """Return the seconds until each, the earliest first; negative where it has passed."""
         waits = sorted(((self._left(event, now), event) for event in self._due), key=_seconds)
-        held = self._held(now)
-        return [(max(left, held), event) for left, event in waits] if held > 0.0 else waits
+        suspended = self._suspended_for(now)
+        return (
+            [(max(left, suspended), event) for left, event in waits] if suspended > 0.0 else waits
+        )
 
     def take_passed(self, event: Event, now: Now) -> bool:
         """Whether this one is still set and has passed; it is forgotten then."""
-        if event not in self._due or max(self._left(event, now), self._held(now)) > 0.0:
+        if event not in self._due or max(self._left(event, now), self._suspended_for(now)) > 0.0:
             return False
         del self._due[event]
         return True
@@ -52,11 +54,11 @@ class Deadlines:
         for event in self._due:
             self._due[event] += seconds
 
-    def hold(self, seconds: float, now: Now) -> None:
+    def suspend(self, seconds: float, now: Now) -> None:
         """Let none take effect within so many seconds of the steady clock."""
         self._not_before = now.steady + seconds
 
-    def _held(self, now: Now) -> float:
+    def _suspended_for(self, now: Now) -> float:
         return self._not_before - now.steady
 
     def follow(self, now: Now) -> None:

@@ -1,7 +1,8 @@
 """What is known of one goal, and the small tools with which the steps of the table change it.
 
-Nothing is decided here. Whoever has a goal reads these facts; only the steps (goals/steps) write
-them, but for `reason`, to which a caller may add.
+Whoever has a goal reads these facts. Its steps (goals/steps) write them, by the tools below, which
+are said once where several steps do the same; `Goal.on` writes the state that a step has led to.
+A caller may add to `reason`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 from bt_actions.goals.asking import Asking, LostResult
 from bt_actions.goals.deadlines import Deadlines
 from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
-from bt_actions.goals.terms import ACCEPTED, ENDS, UNANSWERED, Command, Event, Now, State
+from bt_actions.goals.terms import ACCEPTED, ENDS, MAY_STILL_BE_ACCEPTED, Command, Event, Now, State
 
 PATIENCE = 5.0
 """Seconds for an answer that nobody wants any more, where the user gave no deadline."""
@@ -30,16 +31,16 @@ class Facts:
         *,
         resources: frozenset[str] = frozenset(),
         busy: Busy = Busy.WAIT,
-        settles: Callable[[Any], bool] = lambda result: True,
+        accounts_for_all: Callable[[Any], bool] = lambda result: True,
     ) -> None:
         self.id = goal_id
         self.server = server
         self.timeouts = timeouts
         self.resources = resources or frozenset({server})
         self.busy = busy
-        self.settles = settles
+        self.accounts_for_all = accounts_for_all
         """Whether a result (None: a lost one) says that nothing it began still runs."""
-        self.state = self.before = State.QUEUED
+        self.state = self.last_live = State.QUEUED
         """Where it is, and where it was before it was LOST or DONE."""
         self.planned: Outcome | None = None
         """What its outcome will be when it has ended, where it is not wanted any more."""
@@ -48,11 +49,10 @@ class Facts:
         self.end = End.NEVER_STARTED
         self.result: Any = None
         self.feedback: Any = None
-        self.holding = True
-        """It holds its resources, or a place in the queue for them."""
-        self.waited_for = False
-        """The end of its tree was held up for it, in vain; nobody waits for it again, unless its
-        server comes back."""
+        self.claims_resources = True
+        """It has its resources, or a place in the queue for them."""
+        self.drain_gave_up = False
+        """The end of its tree waited for it in vain; none does again, until its server is back."""
         self.asking = Asking()
         self.lost_result = LostResult()
         self.deadlines = Deadlines(now)
@@ -63,7 +63,7 @@ class Facts:
     @property
     def phase(self) -> State:
         """Where it is, or was when its server could last be asked."""
-        return self.before if self.state in (State.LOST, State.DONE) else self.state
+        return self.last_live if self.state in (State.LOST, State.DONE) else self.state
 
     @property
     def sent(self) -> bool:
@@ -76,17 +76,17 @@ class Facts:
         return self.phase in ACCEPTED
 
     @property
-    def unconfirmed(self) -> bool:
+    def may_still_be_accepted(self) -> bool:
         """Whether the request may still be accepted, though nobody wants it any more.
 
         Also where its server denies it by now: the tree goes on, but must not end without asking
         again.
         """
-        return self.state in UNANSWERED
+        return self.state in MAY_STILL_BE_ACCEPTED
 
     @property
     def patience(self) -> float:
-        """Seconds within which the server is to answer what it was asked of an unanswered goal."""
+        """Seconds for the server to answer what it is asked of a goal that it did not accept."""
         return self.timeouts.accept or self.timeouts.cancel or PATIENCE
 
     @property
@@ -107,7 +107,7 @@ class Facts:
             self.planned, self.reason = outcome, reason
 
     def settle(self, outcome: Outcome, reason: str) -> None:
-        """Decide the outcome, once: the leaf may go on."""
+        """Decide the outcome, once: the leaf is free."""
         if self.outcome is None:
             self.outcome, self.reason = outcome, reason
 
@@ -121,14 +121,14 @@ class Facts:
     def take_result(self, detail: tuple[int, Any]) -> int:
         """Keep the result, and note how it ended; return the status."""
         status, self.result = detail
-        self.end = ENDS[status] if self.settles(self.result) else End.UNKNOWN
+        self.end = ENDS[status] if self.accounts_for_all(self.result) else End.UNKNOWN
         return status
 
     def end_by_status(self) -> State:
         """Believe the status, if one has shown the end; nothing more is asked."""
         if self.lost_result.status is not None:
             self.end = ended = ENDS[self.lost_result.status]
-            if ended is End.ABORTED and not self.settles(None):
+            if ended is End.ABORTED and not self.accounts_for_all(None):
                 self.end = End.UNKNOWN  # only its result could have told what goes on below it
             if self.outcome is None:
                 self.reason += f"; it ended as {ended}, and its result was lost"
@@ -137,8 +137,8 @@ class Facts:
 
     def release(self) -> None:
         """Give the resources back, once."""
-        if self.holding:
-            self.holding = False
+        if self.claims_resources:
+            self.claims_resources = False
             self.commands.append(Command.RELEASE)
 
     def ask(self) -> None:

@@ -9,9 +9,9 @@ The rules this lives by:
 - An outcome is decided once. An end that is UNKNOWN may still become known.
 - After what comes with DONE nothing is sent.
 
-A leaf is free to go on as soon as `outcome` is set. The goal itself may live on until it is DONE:
-somebody (traffic/traffic.py) keeps feeding it events. Whether to try again is not decided here
-(attempts.py), nor who may have a resource (resources.py).
+A leaf is free as soon as `outcome` is set. The goal itself may live on until it is DONE: somebody
+(traffic/traffic.py) keeps feeding it events. Whether to try again is decided in attempts.py, who
+may have a resource in resources.py.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from bt_actions.goals.terms import (
 
 
 class Goal(Facts):
-    """The life of one goal. Events go in through `on` and `poll`, commands come out.
+    """The life of one goal. Events go in through `on`, commands come out; `due` yields deadlines.
 
     After construction the caller asks for `resources` and reports GRANTED or TAKEN.
     """
@@ -55,14 +55,14 @@ class Goal(Facts):
         is_over = self.state in (State.LOST, State.DONE)
         if event in FROM_SERVER and self.asking.hear() and not is_over:
             self.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)  # it can be asked again
-        step, before = TABLE[self.state, event], self.state
+        step, previous = TABLE[self.state, event], self.state
         state = step(self, detail)
-        assert state is before or state in step.to, f"{event} took {self!r} to {state}"
-        if state is State.DONE and before is not State.DONE:
+        assert state is previous or state in step.to, f"{event} took {self!r} to {state}"
+        if state is State.DONE and previous is not State.DONE:
             self.deadlines.clear()
             self.release()
-        if state is not before and before is not State.LOST:
-            self.before = before
+        if state is not previous and previous is not State.LOST:
+            self.last_live = previous
         self.state = state
         commands, self.commands = tuple(self.commands), []
         return commands
@@ -85,18 +85,14 @@ class Goal(Facts):
             if self.deadlines.take_passed(event, now):
                 yield event
 
-    def poll(self, now: Now) -> tuple[Command, ...]:
-        """Let every deadline that has passed take effect, the earliest first."""
-        return tuple(command for event in self.due(now) for command in self.on(event, now))
-
     def postpone(self, seconds: float) -> None:
         """Give a goal that was not sent yet so much more time: the tree was paused."""
         if not self.sent:
             self.deadlines.postpone(seconds)
 
-    def hold(self, seconds: float, now: Now) -> None:
+    def suspend_deadlines(self, seconds: float, now: Now) -> None:
         """Let no deadline take effect for so many seconds: what is awaited may be on its way."""
-        self.deadlines.hold(seconds, now)
+        self.deadlines.suspend(seconds, now)
 
     # What the caller may ask
 
@@ -125,21 +121,21 @@ class Goal(Facts):
         return deadline_passed and came
 
     @property
-    def unanswered(self) -> bool:
+    def request_pending(self) -> bool:
         """Whether its request has no answer yet, and `timeout.accept` has not passed."""
         return self.state in (State.SENDING, State.UNWANTED)
 
     @property
     def in_flight(self) -> bool:
         """Whether its request may lie in its server's queue."""
-        may_come = self.state is State.SENDING or self.unconfirmed
+        may_come = self.state is State.SENDING or self.may_still_be_accepted
         return may_come and self.asking.denied_since is None
 
     @property
     def outstanding(self) -> bool:
         """Whether a server that has it must be rid of it before it gets another goal."""
-        unknown = self.sent and self.end is End.UNKNOWN and not self.holding
-        return unknown and (self.accepted or not self.waited_for)
+        unknown = self.sent and self.end is End.UNKNOWN and not self.claims_resources
+        return unknown and (self.accepted or not self.drain_gave_up)
 
     def blocks(self, other: Goal, *, same_server: bool) -> bool:
         """Whether this goal, given up as it is, must be accounted for before `other` is sent."""
@@ -174,7 +170,7 @@ def turned_up_again(
     """
     goal = Goal(goal_id, server, timeouts, now, resources=resources, busy=busy)
     goal.deadlines.clear()
-    goal.holding, goal.end = False, End.SERVER_GONE
-    goal.state, goal.before = State.LOST, State.CANCELING
+    goal.claims_resources, goal.end = False, End.SERVER_GONE
+    goal.state, goal.last_live = State.LOST, State.CANCELING
     goal.settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
     return goal

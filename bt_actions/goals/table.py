@@ -7,9 +7,9 @@ terms.py.
 from __future__ import annotations
 
 from bt_actions.goals.policy import Outcome
-from bt_actions.goals.steps import canceling, lost, running, unanswered, unsent
+from bt_actions.goals.steps import canceling, lost, requested, running, unsent
 from bt_actions.goals.steps.step import Step, drop
-from bt_actions.goals.terms import ACCEPTED, UNANSWERED, Event, State
+from bt_actions.goals.terms import ACCEPTED, MAY_STILL_BE_ACCEPTED, Event, State
 
 TABLE: dict[tuple[State, Event], Step] = {
     (state, event): drop for state in State for event in Event
@@ -29,9 +29,8 @@ def _in(*states: State, **steps: Step) -> None:
 _in(
     State.QUEUED,
     State.WAITING_FOR_SERVER,
-    INVALID=unsent.give_up(Outcome.INVALID_GOAL, "{detail}"),
     INTERRUPTED=unsent.give_up(Outcome.CANCELED, "interrupted before the goal was sent"),
-    PROCESS_EXITING=unsent.give_up(Outcome.CANCELED, "the process ended"),
+    ABANDONED=unsent.give_up(Outcome.CANCELED, "its node was closed"),
 )
 _in(
     State.QUEUED,
@@ -42,6 +41,7 @@ _in(
 _in(
     State.WAITING_FOR_SERVER,
     SERVER_READY=unsent.send,
+    INVALID=unsent.give_up(Outcome.INVALID_GOAL, "{detail}"),
     SERVER_AMBIGUOUS=unsent.give_up(
         Outcome.SERVER_AMBIGUOUS,
         "two action servers answer to {server}: a goal would be executed twice",
@@ -56,16 +56,16 @@ _in(
 _in(
     State.SENDING,
     SEND_FAILED=unsent.send_failed,
-    ACCEPTED=unanswered.begin,
-    REJECTED=unanswered.rejected,
-    ACCEPT_DUE=unanswered.accept_due,
-    INTERRUPTED=unanswered.withdraw(
+    ACCEPTED=requested.begin,
+    REJECTED=requested.rejected,
+    ACCEPT_DUE=requested.accept_due,
+    INTERRUPTED=requested.withdraw(
         Outcome.CANCELED, "interrupted by the tree before the goal was accepted"
     ),
-    REPLACED=unanswered.withdraw(
+    REPLACED=requested.withdraw(
         Outcome.CANCELED, "replaced by a newer goal before it was accepted"
     ),
-    SERVER_AMBIGUOUS=unanswered.withdraw(Outcome.SERVER_AMBIGUOUS, _TWO),
+    SERVER_AMBIGUOUS=requested.withdraw(Outcome.SERVER_AMBIGUOUS, _TWO),
 )
 _in(
     State.EXECUTING,
@@ -86,7 +86,7 @@ _in(
 )
 _in(
     State.REPLACED,
-    FEEDBACK=running.goes_on,
+    FEEDBACK=running.still_runs,
     RESULT=canceling.finished,
     CANCEL_DUE=canceling.cancel(Outcome.CANCELED, "replaced by a newer goal, and did not end"),
     SERVER_AMBIGUOUS=canceling.cancel(Outcome.CANCELED, _TWO),
@@ -95,53 +95,56 @@ _in(
 # Not wanted any more
 _in(
     State.CANCELING,
-    *UNANSWERED,
+    *MAY_STILL_BE_ACCEPTED,
     INTERRUPTED=canceling.interrupted,
     REPLACED=canceling.replaced,
     SERVER_AMBIGUOUS=canceling.taken_by_two,
     POLL_DUE=canceling.ask_again,
     CANCEL_ANSWERED=canceling.cancel_answered,
-    DRAINED=canceling.drained,
+    DRAIN_GAVE_UP=canceling.drain_gave_up,
 )
 _in(
     State.CANCELING,
     RESULT=canceling.finished,
-    FEEDBACK=running.goes_on,
+    FEEDBACK=running.still_runs,
     STATUS=running.status,
     RESULT_UNKNOWN=running.denied,
     CANCEL_DUE=canceling.cancel_due,
 )
 _in(
-    *UNANSWERED,
+    *MAY_STILL_BE_ACCEPTED,
     State.NOT_RECEIVED,
-    ACCEPTED=unanswered.turned_up,
-    REJECTED=unanswered.rejected,
+    ACCEPTED=requested.turned_up,
+    REJECTED=requested.rejected,
 )
-_in(State.UNWANTED, SEND_FAILED=unsent.send_failed, ACCEPT_DUE=unanswered.accept_due)
-_in(State.UNCONFIRMED, ACCEPT_DUE=unanswered.presume)
-_in(State.PRESUMED_NOT_RECEIVED, CANCEL_ANSWERED=unanswered.denied_again)
+_in(State.UNWANTED, SEND_FAILED=unsent.send_failed, ACCEPT_DUE=requested.accept_due)
+_in(State.UNCONFIRMED, ACCEPT_DUE=requested.presume)
+_in(  # a denial: by any other answer `Goal.on` has made it accepted first
+    State.PRESUMED_NOT_RECEIVED,
+    CANCEL_ANSWERED=requested.denied_again,
+)
 
 # Who is there to ask
 _in(
     *ACCEPTED,
-    *UNANSWERED,
+    *MAY_STILL_BE_ACCEPTED,
     SERVER_CHANGED=lost.ask_another,
 )
 _in(
     State.SENDING,
     *ACCEPTED,
-    *UNANSWERED,
+    *MAY_STILL_BE_ACCEPTED,
     State.NOT_RECEIVED,
     SERVER_LOST=lost.server_lost,
-    NODE_CLOSED=lost.node_closed,
-    PROCESS_EXITING=lost.exiting,
+    PARKED=lost.parked,
 )
+_in(State.NOT_RECEIVED, ABANDONED=lost.abandoned)
 _in(
     State.LOST,
     SERVER_LOST=lost.server_lost,
     SERVER_RETURNED=lost.returned,
     ACCEPTED=lost.runs,
     RESULT=canceling.finished,
-    DRAINED=canceling.drained,
-    PROCESS_EXITING=lost.exiting,
+    DRAIN_GAVE_UP=lost.drain_gave_up,
+    ABANDONED=lost.abandoned,
 )

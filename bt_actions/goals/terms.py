@@ -10,6 +10,9 @@ from typing import NamedTuple
 
 from bt_actions.goals.policy import End, Outcome
 
+NEVER = float("-inf")
+"""A moment that no moment is before: it has not happened yet."""
+
 
 class Now(NamedTuple):
     """One moment on both clocks, in seconds; only differences mean anything."""
@@ -45,14 +48,23 @@ class State(Enum):
         """The name in ``--json`` and on the terminal, which tell less finely."""
         if self is State.REPLACED:
             return State.EXECUTING.name
-        return State.CANCELING.name if self in _NOT_SHOWN else self.name
+        return State.CANCELING.name if self in _SHOWN_AS_CANCELING else self.name
 
 
-UNANSWERED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
+MAY_STILL_BE_ACCEPTED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
 """It was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
-_NOT_SHOWN = UNANSWERED | {State.NOT_RECEIVED, State.LOST}
-MAY_TURN_UP = _NOT_SHOWN | {State.SENDING}
+_SHOWN_AS_CANCELING = MAY_STILL_BE_ACCEPTED | {State.NOT_RECEIVED, State.LOST}
+MAY_TURN_UP = frozenset(
+    {
+        State.SENDING,
+        State.UNWANTED,
+        State.UNCONFIRMED,
+        State.PRESUMED_NOT_RECEIVED,
+        State.NOT_RECEIVED,
+        State.LOST,
+    }
+)
 """Feedback or a status is news: it was accepted, and runs, or has run."""
 
 
@@ -86,9 +98,9 @@ class Event(Enum):
     SERVER_RETURNED = "the server we had lost is back, with whatever it still runs"
     INTERRUPTED = "the tree no longer wants it"
     REPLACED = "a newer goal of this process was accepted in its place"  # by which server
-    DRAINED = "it was waited for long enough: what is not known stays so"
-    NODE_CLOSED = "its node goes, and the process stays: somebody else has to see to it"
-    PROCESS_EXITING = "the process ends: give up"
+    DRAIN_GAVE_UP = "the end of its tree has waited for it long enough: what is not known stays so"
+    PARKED = "who sent it leaves: it is kept for whoever sees its server next"
+    ABANDONED = "nobody sees to it any more: its node was closed, or newer lost goals crowd it out"
     QUEUE_DUE = "timeout.queue has passed"
     SERVER_DUE = "timeout.server has passed"
     ACCEPT_DUE = "timeout.accept has passed"

@@ -134,7 +134,7 @@ class _Sweep:
         self._wanted: frozenset[str] | None = None
         self._calls: dict[str, RollCall] = {}
         self._foreign: set[bytes] = set()
-        self._minded: dict[bytes, tuple[str, Author]] = {}  # goals of who is alive, or was
+        self._of_others: dict[bytes, tuple[str, Author]] = {}  # whose author is alive, or was
         self._left: dict[bytes, LeftBehind] = {}
         self._unanswered = Unanswered()
         self._awaits_until = 0.0
@@ -299,10 +299,10 @@ class _Sweep:
                 self._turns_up(left)
             elif ended:
                 if one_server:
-                    self._minded.pop(goal_id, None)
+                    self._of_others.pop(goal_id, None)
             elif (author := author_of(goal_id)) is not None:
                 if author.here:
-                    self._minded[goal_id] = action, author
+                    self._of_others[goal_id] = action, author
                 else:
                     self._meet_elsewhere(action, goal_id)
 
@@ -313,10 +313,10 @@ class _Sweep:
 
     def _find(self) -> None:
         """See who of those that left goals is dead by now: a status comes at a change only."""
-        dead = {author for author in {by for _, by in self._minded.values()} if not author.alive}
-        for goal_id, (action, author) in list(self._minded.items()) if dead else ():
+        dead = {author for author in {by for _, by in self._of_others.values()} if not author.alive}
+        for goal_id, (action, author) in list(self._of_others.items()) if dead else ():
             if author in dead:
-                del self._minded[goal_id]
+                del self._of_others[goal_id]
                 left = self._left[goal_id] = LeftBehind(action, goal_id, author.pid)
                 self._found(left)
         for sent in self._unanswered.read(self._domain):

@@ -6,13 +6,13 @@ follow that this project cannot live with, and each has its cure here:
   not the executor's thread; it is then dropped ("Ignoring unexpected goal response", rclpy #1123).
   Sending with filing, and taking, are each done under one lock.
 - The done-callbacks of futures are tasks of the executor: where nobody spins any more, they never
-  run. Here answers go straight to a listener, and `pump` takes them from any thread.
+  run. Here answers go straight to a listener, and `deliver_arrived` takes them from any thread.
 - Futures of requests that are never answered are kept for ever. Here `forget` drops them.
 And one that matters where two servers have one name: the first answer is all that rclpy hears. Here
 every answer to a question is told, with those before it.
 
 What is taken waits in one inbox and is delivered in its order by whoever comes first: the executor,
-or a `pump`. After a pump, nothing that had arrived before it is still under way.
+or a call of `deliver_arrived`, after which nothing that had arrived before is still under way.
 
 It carries messages and decides nothing. Of rclpy's ActionClient it keeps construction, the wait
 set and destruction; it uses the low-level handle, whose methods are checked for at construction.
@@ -35,11 +35,12 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
+from bt_actions.goals.terms import NEVER
 from bt_actions.ros.graph import servers
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds.statuses import status_reader
-from bt_actions.servers.reachability import NEVER, Reachability
+from bt_actions.servers.reachability import Reachability
 from bt_actions.traffic.transport import GOALS_KEPT, Listener
 from bt_actions.utilities.plain_text import raised
 
@@ -192,7 +193,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
 
     # Answers
 
-    def pump(self) -> bool:
+    def deliver_arrived(self) -> bool:
         """Take and deliver what has arrived, here and now, whether or not somebody spins.
 
         Returns whether there was anything.
@@ -201,7 +202,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         return self._deliver()
 
     def take_data(self) -> None:
-        """Take all that has arrived into the inbox. Called by the executor, and by `pump`."""
+        """Take all that has arrived into the inbox. By the executor, or `deliver_arrived`."""
         taken = self._inbox
         status_type, read_statuses = status_reader()
         with self._lock:

@@ -98,8 +98,8 @@ class RosHost:
     def _run(self) -> None:
         with self.lock:
             busy_at = self.steady()
-            while self.scheduler.attended or self.steady() - busy_at < LINGER:
-                if self.scheduler.attended:
+            while self.scheduler.scheduled or self.steady() - busy_at < LINGER:
+                if self.scheduler.scheduled:
                     busy_at = self.steady()
                 self.scheduler.run()
                 self._bell.wait(self.scheduler.wakes_at - self.steady())

@@ -45,11 +45,11 @@ class _Sight:
 
     def __init__(self, before: _Sight | None) -> None:
         self.since = host.steady()
-        """Since when it is known here; a new one is blind to nothing."""
+        """Since when it is known here; a new one has dropped no server yet."""
         now = host.stalls.long_times
         self.long_stalls: int = now if before is None else before.long_stalls
-        """How often this process had stood still for long by then: it may be deaf where an endpoint
-        is made after more of them."""
+        """How often this process had stood still for long by then: it may hear nothing where an
+        endpoint is made after more of them."""
         self.nodes: weakref.WeakSet[Node] = weakref.WeakSet()
 
 

@@ -50,7 +50,7 @@ AHEAD = 0.7
 _number = itertools.count(1)
 _participants: set[SecondParticipant] = set()
 _threads: set[threading.Thread] = set()
-_lookouts: dict[tuple[int, str], Rediscovery] = {}
+_by_domain: dict[tuple[int, str], Rediscovery] = {}
 _closing = False  # the process ends
 
 
@@ -61,7 +61,7 @@ class SecondParticipant:
         """Raises what rclpy raises where it cannot be made."""
         context = Context()
         context.init(args=["--ros-args", "--enclave", enclave], domain_id=domain)
-        name = f"bt_actions_lookout_{os.getpid()}_{next(_number)}"
+        name = f"bt_actions_rediscovery_{os.getpid()}_{next(_number)}"
         try:
             self.node = Node(
                 name,
@@ -117,9 +117,9 @@ def look_for(
     In the enclave of its node, which may be allowed to look where others are not.
     With `at_once`, whatever pause between two looks for others has been reached begins anew.
     """
-    rediscovery = _lookouts.get((domain, enclave))
+    rediscovery = _by_domain.get((domain, enclave))
     if rediscovery is None:
-        rediscovery = _lookouts[domain, enclave] = Rediscovery(domain, enclave)
+        rediscovery = _by_domain[domain, enclave] = Rediscovery(domain, enclave)
     rediscovery.add(seeker, action, at_once=at_once)
 
 
@@ -182,7 +182,7 @@ class Rediscovery:
         with host.lock:
             until = time.monotonic() + pause
             while self._still_missing():
-                waiting = {seeker for seeker in self._missing if seeker.is_waited_for()}
+                waiting = {seeker for seeker in self._missing if seeker.has_unsent}
                 self._is_urgent |= bool(waiting - self._waiting)
                 self._waiting = waiting
                 if self._is_urgent:
@@ -210,7 +210,7 @@ class Rediscovery:
             while time.monotonic() < until:
                 with host.lock:
                     seekers = dict(self._missing) if self._still_missing() else {}
-                    look.go_on(seekers)
+                    look.advance(seekers)
                 if not seekers:
                     break
                 time.sleep(GLANCE)
@@ -231,10 +231,10 @@ class _Look:
         self._tried: dict[Seeker, ActionTransport] = {}
         self._ready_since: dict[Seeker, float] = {}
 
-    def go_on(self, seekers: dict[Seeker, str]) -> None:
+    def advance(self, seekers: dict[Seeker, str]) -> None:
         """Try where a server is shown; move all for whom that is ready, together.
 
-        Together, because what one of them has lost may be in the way of another's next goal.
+        Together, because what one of them has lost may conflict with another's next goal.
         """
         now = time.monotonic()
         for seeker, action in seekers.items():
@@ -245,7 +245,7 @@ class _Look:
         ready = [
             seeker
             for seeker in seekers
-            if seeker in self._ready_since and seeker.prefers(self._tried[seeker])
+            if seeker in self._ready_since and seeker.try_and_compare(self._tried[seeker])
         ]
         if any(now - self._ready_since[seeker] >= AHEAD for seeker in ready):
             for seeker in ready:
@@ -262,7 +262,7 @@ class _Look:
 
 def _start(what: Callable[[], None]) -> threading.Thread | None:
     """Start a thread; None where there can be no more."""
-    thread = threading.Thread(target=what, name="bt_actions-lookout", daemon=True)
+    thread = threading.Thread(target=what, name="bt_actions-rediscovery", daemon=True)
     with host.lock:
         _threads.difference_update([each for each in _threads if not each.is_alive()])
         try:
@@ -279,7 +279,7 @@ def _close_at_exit() -> None:
     global _closing
     with host.lock:
         _closing = True
-        for rediscovery in _lookouts.values():
+        for rediscovery in _by_domain.values():
             rediscovery.wake()
         threads = list(_threads)
     for thread in threads:

@@ -39,13 +39,13 @@ class RunGoals:
         tree: BehaviourTree,
         emit: Callable[[GoalChanged], None],
         wake: Callable[[], None],
-        minded: Callable[[], None],
+        changed: Callable[[], None],
     ) -> None:
         """`wake` is called where there is something to tell, or to read.
 
-        `minded` is called, under the lock of the traffic, where one of ours has changed.
+        `changed` is called, under the lock of the traffic, where one of ours has changed.
         """
-        self._tree, self._emit, self._wake, self._minded = tree, emit, wake, minded
+        self._tree, self._emit, self._wake, self._changed = tree, emit, wake, changed
         self._token = object()  # in ours, which outlive the tree
         self._changes: deque[Change] = deque()
         self._handles: dict[GoalHandle, None] = {}  # in the order in which they began
@@ -92,7 +92,7 @@ class RunGoals:
         if change is not None and self._is_ours(change.handle):
             self._handles[change.handle] = None
             self._changes.append(change)
-            self._minded()
+            self._changed()
         elif not self.run_goes_on:
             return
         self._wake()

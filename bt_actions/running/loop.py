@@ -76,7 +76,7 @@ class TickLoop:
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
         self._observers: list[Observer] = []
-        self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.mind())
+        self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.watch())
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._set_up = weakref.WeakSet[Behaviour]()
         self._doing = "setup"

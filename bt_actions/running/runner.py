@@ -171,7 +171,7 @@ class TreeRunner:
             )
         self._begin()
         try:
-            with self._mind_signals():
+            with self._hear_signals():
                 return self._run(timeout)
         finally:
             self._release()
@@ -194,7 +194,7 @@ class TreeRunner:
             "they are parts of one tree"
         )
 
-    def _mind_signals(self) -> contextlib.AbstractContextManager[None]:
+    def _hear_signals(self) -> contextlib.AbstractContextManager[None]:
         """With a node of the user's, its context's signal handling is the user's as well."""
         if not self._spinner.owns_node:
             return contextlib.nullcontext()
@@ -251,7 +251,7 @@ class TreeRunner:
             raise RuntimeError("wait() within the run would wait for itself")
         if timeout is None and not future.done() and self._spinner.is_here():
             raise _waits_for_itself("wait()", "take the status in a done callback of `future`")
-        with self._mind_signals():
+        with self._hear_signals():
             futures.wait([future], None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         if not future.done():
             goals = [
@@ -302,7 +302,7 @@ class TreeRunner:
             )
         if self._runs_on == threading.get_ident():
             raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
-        with self._mind_signals():
+        with self._hear_signals():
             self._shut_down(patience=-1.0)
         if self._is_down:
             self._loop.raise_what_ended_it()

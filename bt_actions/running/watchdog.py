@@ -1,7 +1,7 @@
 """Cancels a run's goals where a tick does not return that should have been the last.
 
-While a behaviour does not return from it nobody else can stop the tree. Attended to beside the
-goals while any is open; has no thread of its own.
+While a behaviour does not return from it nobody else can stop the tree. Run beside the endpoints
+while any goal is wanted; has no thread of its own.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Watchdog:
     def __init__(self, traffic: Traffic, goals: RunGoals) -> None:
         self._traffic, self._host, self._goals = traffic, traffic.host, goals
         self._ends_at = math.inf
-        self._minds = False
+        self._watches = False
         self._ticks_on: int | None = None
         self.gave_up = False
         """Whether it was so in this run: what the tree says since is of no account."""
@@ -52,7 +52,7 @@ class Watchdog:
     def gives_up(self) -> bool:
         """Whether nobody waits for the rest of this thread's tick any more."""
         if self.is_overdue(self._host.steady()) and not self._goals.wanted:
-            self._give_up()  # else it is for `attend`, which bears with stalls
+            self._give_up()  # else it is for `run_due`, which bears with stalls
         return self.gave_up
 
     def _give_up(self) -> None:
@@ -62,17 +62,17 @@ class Watchdog:
                 f"{self._stuck_in()} does not return from its tick: canceling all goals"
             )
 
-    def mind(self) -> None:
+    def watch(self) -> None:
         """Look at the goals until none is wanted; the caller holds the lock."""
-        if not self._minds:  # each time it would be looked at, at once
-            self._minds = True
+        if not self._watches:  # each time it would be looked at, at once
+            self._watches = True
             self._host.scheduler.add(self)
 
-    def attend(self, now: float) -> float:
+    def run_due(self, now: float) -> float:
         """Cancel what is wanted where the last tick is overdue; return the seconds until a look."""
         wanted = self._goals.wanted
         if not wanted:
-            self._minds = False
+            self._watches = False
             self._host.scheduler.remove(self)
         if wanted and self.is_overdue(now) and not self._host.stalls.answers_take(now):
             self._give_up()

@@ -4,10 +4,10 @@ Fed with what discovery shows (readiness, and the GIDs of who reads goal request
 answers to probes. No ROS, no thread, no clock of its own; it sends nothing: `wants_probe` says
 that a probe is due.
 
-Two readers of goal requests are not yet two servers: after a server was killed, its ghost stays
-in discovery until the lease runs out (20 s with Fast DDS as it comes). A probe is a question
+Two readers of goal requests are not yet two servers: a server that was killed stays in
+discovery until its lease runs out (20 s with Fast DDS as it comes). A probe is a question
 that every live server answers once. Two answers: two servers. One answer and then silence: a
-ghost and its successor.
+dead server and its successor.
 """
 
 from __future__ import annotations
@@ -15,18 +15,20 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+from bt_actions.goals.terms import NEVER
+
 GID = bytes
 
 PROBE_EVERY = 0.5
 """Seconds between probes while it is open who is alive."""
-SETTLED_AFTER = 1.0
+NO_SECOND_AFTER = 1.0
 """Seconds of silence after a probe's first answer until a second one is not expected any more,"""
 SLOWEST_START = 3.0
 """and seconds within which a server that has just come in sight answers (0.15 to 2.7 measured)."""
 PROBES_KEPT = 20
 """Probes whose answers are counted; of those before, none is expected any more."""
 LEASE = 25.0
-"""Seconds after which no ghost is left: a server that is still shown is there."""
+"""Seconds after which no dead server is shown: one that still is, is there."""
 NOT_READY_FOR = 2.0
 """Seconds without readiness and without a word, though requests would be read, until the server
 counts as gone."""
@@ -37,7 +39,7 @@ class Server(Enum):
 
     ABSENT = "absent"
     READY = "ready"
-    SETTLING = "settling"
+    UNCLEAR = "unclear"
     """More than one is shown, and it is not known yet which of them live."""
     AMBIGUOUS = "ambiguous"
 
@@ -60,11 +62,11 @@ class ServerWatch:
         self._ready = False
         self._unready_since: float | None = None
         self._crowded_since: float | None = None
-        self._not_alone_before = float("-inf")
-        self._probed_at = float("-inf")
+        self._not_alone_before = NEVER
+        self._probed_at = NEVER
         self._sent: dict[int, float] = {}  # probe: when it was sent
         self._answers: dict[int, _Answers] = {}  # by probe
-        self._heard_at = float("-inf")
+        self._heard_at = NEVER
         self._both_answered = False
         self._most_answers = 0
 
@@ -94,7 +96,7 @@ class ServerWatch:
 
     def stood_still(self, now: float) -> None:
         """Take note that nobody listened for a while: answers of that time are yet to come in."""
-        self._not_alone_before = now + SETTLED_AFTER
+        self._not_alone_before = now + NO_SECOND_AFTER
 
     @property
     def is_crowded(self) -> bool:
@@ -108,7 +110,7 @@ class ServerWatch:
     def _answered_once(self, now: float, sent_since: float) -> bool:
         return any(
             answers.number == 1
-            and now - answers.first >= SETTLED_AFTER
+            and now - answers.first >= NO_SECOND_AFTER
             and answers.sent >= sent_since
             for answers in self._answers.values()
         )
@@ -129,7 +131,7 @@ class ServerWatch:
     def probe_answered(self, now: float, probe: int) -> None:
         """Take one answer to the probe numbered `probe`."""
         self.heard(now)
-        sent = self._sent.get(probe, float("-inf"))
+        sent = self._sent.get(probe, NEVER)
         count, first, sent = self._answers.get(probe, (0, now, sent))
         self._answers[probe] = _Answers(count + 1, first, sent)
         if len(self._answers) > PROBES_KEPT:
@@ -156,7 +158,7 @@ class ServerWatch:
     def all_live(self, now: float) -> bool:
         """Whether all that are shown live, and more than one are: so many answered one question.
 
-        Or two did, and no ghost is left by now.
+        Or two did, and a dead one would not be shown any more.
         """
         if not self._both_answered or self._crowded_since is None:
             return False
@@ -168,10 +170,10 @@ class ServerWatch:
             return Server.ABSENT
         if self._crowded_since is None:
             return Server.READY
-        no_ghost = now - self._crowded_since > LEASE and now >= self._not_alone_before
-        if self._both_answered or no_ghost:
+        none_dead = now - self._crowded_since > LEASE and now >= self._not_alone_before
+        if self._both_answered or none_dead:
             return Server.AMBIGUOUS
-        return Server.READY if self.alone else Server.SETTLING
+        return Server.READY if self.alone else Server.UNCLEAR
 
     def wants_probe(self, now: float, *, runs: bool = False) -> bool:
         """Whether a probe is due; the caller sends one when this says so.

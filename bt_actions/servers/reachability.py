@@ -10,10 +10,12 @@ thread, no clock of its own.
 
 from __future__ import annotations
 
+from bt_actions.goals.terms import NEVER
+
 AT_ONCE, TWICE = (0.0,), (0.0, 3.0)
 """Seconds after which to ask. A new participant is asked in twice: it may be known to all only when
 Fast DDS announces it the next time, after 3 s."""
-MUTE_AFTER = 2.0
+UNRESPONSIVE_AFTER = 2.0
 """Seconds without an answer to any question until the server may not hear them;"""
 TRIES = 2
 """so often is another way looked for while it is silent,"""
@@ -23,7 +25,6 @@ TRY_AGAIN = 60.0
 """and then only after so many since the last."""
 DOUBT_LASTS = 10.0
 """Seconds after a stall within which a way to be heard is found, if there is one."""
-NEVER = float("-inf")
 
 
 class Reachability:
@@ -84,6 +85,6 @@ class Reachability:
         Also while that is done.
         """
         since = self._unanswered_since
-        if since is None or now - since < MUTE_AFTER:
+        if since is None or now - since < UNRESPONSIVE_AFTER:
             return False
         return self._tries < TRIES or not TRY_LASTS <= now - self._tried_at < TRY_AGAIN

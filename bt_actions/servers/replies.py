@@ -4,7 +4,7 @@ One server's word does not speak for another's: where a second one opened, or wo
 request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
 other may run. So while more than one of the servers that the request went to may live, an ending
 is believed when all in sight have answered a question, or when it has turned out that one is left,
-beside ghosts.
+beside dead ones that discovery still shows.
 
 Told of answers and of looks at the server, it returns what the goal is to be told. What follows
 from that is the goal's (goals/goal.py); who lives is known to the watch (presence.py). No ROS, no
@@ -21,6 +21,7 @@ from bt_actions.goals.policy import End
 from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
     ENDS,
+    NEVER,
     STATUS_EXECUTING,
     STATUS_SUCCEEDED,
     Event,
@@ -28,7 +29,6 @@ from bt_actions.goals.terms import (
 from bt_actions.servers.presence import GID, Server, ServerWatch
 
 Told = list[tuple[Event, Any]]
-NEVER = float("-inf")
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
 OVERTAKEN = 1.0
@@ -69,7 +69,7 @@ class Replies:
             self._crowd = watch.gids
 
     def taken_over(self) -> None:
-        """Another node minds the goal from now on, and has not seen its server yet."""
+        """Another node sees to the goal from now on, and has not seen its server yet."""
         self._was_gone = True
         self._one_left = self._one_came = False
         self._crowd = self._in_sight = frozenset()
@@ -90,7 +90,7 @@ class Replies:
         self._accepted_by = max(self._accepted_by, accepted)
         if accepted:
             self._refused = False
-            self._spoke(watch, now)
+            self.spoke(watch, now)
         if accepted > 1:
             self.sent_to |= watch.gids
             watch.two_answered()
@@ -117,7 +117,7 @@ class Replies:
         """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal."""
         self._note_changes(watch, now)
         if answers[-1] != CANCEL_UNKNOWN_GOAL:
-            self._spoke(watch, now)
+            self.spoke(watch, now)
             return [(Event.CANCEL_ANSWERED, answers[-1])]
         if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
             return []
@@ -162,17 +162,12 @@ class Replies:
 
     def shown(self, watch: ServerWatch, now: float, status: int) -> Told:
         """Take the status that one server publishes of the goal."""
-        self.lives(watch, now)
+        self.spoke(watch, now)
         self._note_changes(watch, now)
         doubtful = self._may_be_at_two(watch) or self._fresh_since > NEVER
         if status in ENDS and len(self.sent_to) > 1 and doubtful:
             status = STATUS_EXECUTING  # it has ended at one; that it was accepted is sure
         return [(Event.STATUS, status)]
-
-    def lives(self, watch: ServerWatch, now: float) -> Told:
-        """Take feedback, or a status: who has the goal lives, whoever else denies it."""
-        self._spoke(watch, now)
-        return []
 
     # Told by discovery
 
@@ -186,8 +181,8 @@ class Replies:
         one_left, one_came = self._one_left, self._one_came
         self._one_left = self._one_came = False
         if goal.lost:
-            no_ghost = watch.all_live(now) or not watch.changed(self.sent_to)
-            is_there = not gone and no_ghost and watch.state(now) is not Server.ABSENT
+            none_dead = watch.all_live(now) or not watch.changed(self.sent_to)
+            is_there = not gone and none_dead and watch.state(now) is not Server.ABSENT
             if returned or (is_there and goal.end is not End.UNKNOWN):
                 self._forget(now)
                 return [(Event.SERVER_RETURNED, None)]
@@ -234,7 +229,7 @@ class Replies:
             self._one_came |= bool(came)
         self._crowd, self._in_sight = crowd, watch.gids
 
-    def _spoke(self, watch: ServerWatch, now: float) -> None:
+    def spoke(self, watch: ServerWatch, now: float) -> None:
         """Take note that one of those that it was sent to lives, and is none of the newcomers.
 
         So none of these has taken its place, unless the word is older than they are.

@@ -3,8 +3,7 @@
 Whoever sleeps knows when it meant to wake; more than 0.3 s late is a stall. What was sent meanwhile
 is still on its way in then, and a server whose lease has run out here is out of sight until it
 announces itself again. So for a moment nobody may conclude anything from what is missing; and not
-for ever, where a process is never in time. No ROS, no thread, no clock of its own; it decides
-nothing.
+for ever, where a process is never in time. No ROS, no thread, no clock of its own.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from bt_actions.testing.network import Lines
 from bt_actions.testing.timeline import Alarm, Timeline
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.host import Record, Trace
-from bt_actions.traffic.scheduler import Attended, Scheduler
+from bt_actions.traffic.scheduler import Scheduled, Scheduler
 
 
 class VirtualHost:
@@ -69,7 +69,7 @@ class VirtualHost:
         self._runs = True
         self.scheduler.run()
         self._runs = False
-        if self.scheduler.attended:
+        if self.scheduler.scheduled:
             self._set(self.scheduler.wakes_at)
         else:
             self._alarm = None
@@ -81,7 +81,7 @@ class VirtualHost:
         self._due = due
         self._alarm = self._timeline.call_at(due, self._run)
 
-    def _failed(self, endpoint: Attended, error: Exception) -> None:
+    def _failed(self, endpoint: Scheduled, error: Exception) -> None:
         raise error
 
 

@@ -29,15 +29,15 @@ class Lines:
         self.lines.append((level, text))
 
     def info(self, text: str) -> None:
-        """Take a line of what happens."""
+        """Log at info level."""
         self.add("info", text)
 
     def warning(self, text: str) -> None:
-        """Take a line of what should not."""
+        """Log at warning level."""
         self.add("warning", text)
 
     def error(self, text: str) -> None:
-        """Take a line of what must not."""
+        """Log at error level."""
         self.add("error", text)
 
     def flush(self) -> None:

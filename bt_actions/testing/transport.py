@@ -1,7 +1,7 @@
 """One action as one participant of the virtual network sees it, and the participant.
 
 The ActionTransport and the Participant of traffic/transport.py. What is sent arrives a little later
-and in order; what arrives is delivered at once, so a `pump` finds nothing.
+and in order; what arrives is delivered at once, so a `deliver_arrived` finds nothing.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class VirtualTransport:
 
     # Answers
 
-    def pump(self) -> bool:
+    def deliver_arrived(self) -> bool:
         """Find nothing: what has arrived was delivered."""
         return False
 

@@ -1,14 +1,12 @@
 """Whether a goal may be sent now, and what keeps it back.
 
-One verdict for each question; it sends nothing and tells no goal anything. It may look at other
-endpoints first, so that what was lost there, and is back, is canceled first. All under the host's
-lock.
+It sends nothing. But before it says yes it observes the servers at which goals were lost, so that
+what is back is canceled first; for that it may open endpoints. All under the host's lock.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from enum import Enum
 from typing import Any
 
 from bt_actions.goals.policy import Busy, Outcome
@@ -24,19 +22,6 @@ IN_FLIGHT = 8
 silently."""
 
 
-class Verdict(Enum):
-    """Whether to send, and else why not."""
-
-    SEND = "it may be sent"
-    NOT_ASKED = "it does not wait for its server"
-    CLOSING = "the process ends, or the node is gone"
-    UNHEARD = "the server may not hear us, or be two"
-    NO_SERVER = "no server, or more than one, or nobody knows yet"
-    OVERTAKES = "it might arrive before another goal's request"
-    CONFLICTS = "what it would use still has a goal that was given up"
-    FULL = "the server has requests enough to answer"
-
-
 class Admission:
     """For the goals of one node."""
 
@@ -50,22 +35,19 @@ class Admission:
         """`endpoints` are this node's, by name; `open_to` opens one more, to a type and a name."""
         self._host, self._domain, self._endpoints, self._open_to = host, domain, endpoints, open_to
 
-    def verdict(self, handle: GoalHandle) -> Verdict:
-        """Say whether to send it now."""
+    def may_send(self, handle: GoalHandle) -> bool:
+        """Whether to send it now. If nothing else speaks against it, see to lost goals first."""
         endpoint, now = handle.endpoint, self._host.steady()
         if handle.goal.state is not State.WAITING_FOR_SERVER:
-            return Verdict.NOT_ASKED
+            return False
         if self._host.closing or endpoint.orphaned or not endpoint.participant.alive():
-            return Verdict.CLOSING
-        if endpoint.holds_back(now):
-            return Verdict.UNHEARD
-        if endpoint.watch.state(now) is not Server.READY:
-            return Verdict.NO_SERVER
+            return False
+        if endpoint.holds_back(now) or endpoint.watch.state(now) is not Server.READY:
+            return False
         if self._may_overtake(handle):
-            return Verdict.OVERTAKES
-        if self._conflicts(handle):
-            return Verdict.CONFLICTS
-        return Verdict.FULL if self._in_flight(endpoint) >= IN_FLIGHT else Verdict.SEND
+            return False
+        self._cancel_what_is_back(handle)
+        return not self._conflicts(handle) and self._in_flight(endpoint) < IN_FLIGHT
 
     def why_not(self, handle: GoalHandle) -> str:
         """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
@@ -103,14 +85,14 @@ class Admission:
         rivals = holders[:at] if handle.goal.busy is Busy.REPLACE else []
         rivals += [other for other in holders[at + 1 :] if other.goal.busy is Busy.REPLACE]
         return any(
-            other.goal.unanswered and _same_server(other.endpoint, handle.endpoint)
+            other.goal.request_pending and _same_server(other.endpoint, handle.endpoint)
             for other in rivals
         )
 
-    def _conflicts(self, handle: GoalHandle) -> bool:
-        """Whether a goal that any node of this process gave up must be canceled first.
+    def _cancel_what_is_back(self, handle: GoalHandle) -> None:
+        """Observe each server at which goals were lost that this one might run beside.
 
-        One that was lost holds nothing any more; should its server be back, it is canceled first.
+        Should it be back, they are canceled. Opens an endpoint where this node has none.
         """
         to_see = dict.fromkeys(each for each in self._domain.open if _has_lost(each, handle))
         left = {(each.name, each.action_type): None for each in to_see}
@@ -125,7 +107,14 @@ class Admission:
                 to_see[ours] = None
         now = self._host.steady()
         for endpoint in to_see:  # all of them first: one may see what another has lost
-            endpoint.look(now)
+            endpoint.observe_and_tell(now)
+
+    def _conflicts(self, handle: GoalHandle) -> bool:
+        """Whether a goal that any node of this process gave up must be accounted for first.
+
+        One that was lost holds nothing any more; should its server be back, it is canceled first.
+        """
+        now = self._host.steady()
         return any(
             _conflicts_with(each, handle) or _may_come_back_for(each, handle, now)
             for each in self._domain.open

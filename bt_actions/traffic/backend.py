@@ -1,7 +1,8 @@
 """What `setup(node=...)` resolves to: all that a leaf, or a run, asks of the world, as protocols.
 
-ros/node_participant.py keeps them over rclpy, for one node. One that stands for no node at all is
-given to `setup` in a node's place. Nothing is decided here, and nothing of ROS is imported.
+The third part of the seam, beside transport.py and host.py, for what is above traffic/: behaviours/
+and running/ use it, and nothing in traffic/. ros/node_participant.py keeps these protocols over
+rclpy, for one node; testing/backend.py without a node. Nothing of ROS is imported here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""On whose behalf this thread begins goals; whoever ticks a tree says so here. Decides nothing."""
+"""Which run begins goals on this thread (a context variable), set by whoever ticks its tree."""
 
 from __future__ import annotations
 

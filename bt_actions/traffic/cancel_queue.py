@@ -1,9 +1,9 @@
 """The cancel requests to one server, of which only so many are under way at a time.
 
 A server keeps the last ten requests of all its clients together and drops the others silently:
-sixty goals that are interrupted in one moment would go on for a second, until they are canceled
-again. So what is over waits here for an answer, or until one is not expected any more. It decides
-nothing: who is to be canceled, and when again, is goals/goal.py's. All under the one lock.
+sixty goals that are interrupted in one moment would run for a second more, until they are canceled
+again. So what is over waits here for an answer, or until one is not expected any more. Who
+is to be canceled, and when again, is for goals/goal.py to decide. All under the one lock.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ class Cancels:
     def ask(self, goal_id: bytes, send: Send, now: float) -> None:
         """Ask to cancel this goal as soon as there is room (seconds, steady clock)."""
         self._waiting[goal_id] = send
-        self.go_on(now)
+        self.send_more(now)
 
     def answered(self, goal_id: bytes, now: float) -> None:
         """Take note of an answer."""
         self._asked.pop(goal_id, None)
-        self.go_on(now)
+        self.send_more(now)
 
     def forget(self, goal_id: bytes) -> None:
         """Ask no more for this goal."""
@@ -56,7 +56,7 @@ class Cancels:
         if send is not None:
             send(goal_id)
 
-    def go_on(self, now: float) -> None:
+    def send_more(self, now: float) -> None:
         """Send what there is room for."""
         while self._waiting and self._under_way(now) < AT_MOST:
             goal_id = next(iter(self._waiting))

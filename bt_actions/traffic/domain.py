@@ -1,7 +1,4 @@
-"""What all nodes of a process in one ROS domain share: resources, open endpoints, lost goals.
-
-A table; it decides nothing.
-"""
+"""What all nodes of a process in one ROS domain share: resources, open endpoints, lost goals."""
 
 from __future__ import annotations
 
@@ -28,8 +25,8 @@ class Domain:
         self.effects = Effects()
         self.open: dict[Endpoint, None] = {}
         """The endpoints with goals, of all nodes, in the order in which they came."""
-        self.lost_sight = False
-        """A server that was in sight is not any more: what else its process serves may not be."""
+        self.ever_lost_sight = False
+        """A server went out of sight once: what else its process serves may have, too."""
         self.known: set[Action] = set()
         """The actions that had a server once."""
         self._lost: dict[Action, list[GoalHandle]] = {}

@@ -62,7 +62,7 @@ class Drain:
             for handle in self._wanted:
                 handle.endpoint.tell(handle, Event.INTERRUPTED)
             self._waits = [
-                each for each in self._wanted if not each.is_over and not each.goal.waited_for
+                each for each in self._wanted if not each.is_over and not each.goal.drain_gave_up
             ]
             self._deadline = 0.0
             self._began = now = host.steady()
@@ -81,21 +81,21 @@ class Drain:
         with self._host.lock:
             if self._gives_up_at is None:
                 if not hurry and not self._is_over(now):
-                    self._pump()
+                    self._deliver_arrived()
                     for handle in self._waits:
-                        handle.endpoint.mind(handle)
+                        handle.endpoint.apply_deadlines_guarded(handle)
                     self._waits = [handle for handle in self._waits if not handle.is_over]
                     if self._waits:
                         return Sleep(LOOK)
                 self._gives_up_at = now + LAST_REQUESTS
             if self._has_requests and now < self._gives_up_at:
-                self._pump()
+                self._deliver_arrived()
                 return Sleep(LOOK)
             return Done(self._finish())
 
-    def _pump(self) -> None:
+    def _deliver_arrived(self) -> None:
         for endpoint in dict.fromkeys(handle.endpoint for handle in self._waits):
-            endpoint.pump()
+            endpoint.deliver_arrived()
 
     @property
     def _has_requests(self) -> bool:
@@ -105,7 +105,7 @@ class Drain:
         for handle in self._waits:  # all at once, though a server's queue drops what is too much
             handle.endpoint.cancels.send_now(handle.goal.id)
         for handle in self._waits:
-            handle.endpoint.tell(handle, Event.DRAINED)
+            handle.endpoint.tell(handle, Event.DRAIN_GAVE_UP)
         return [handle for handle in self._wanted if not handle.is_over]
 
     def _is_over(self, now: float) -> bool:

@@ -1,7 +1,7 @@
 """What is to be done for goals, as values, in the order in which it was decided.
 
 A goal decides at once, whoever tells it something. What follows waits in one queue of its domain;
-whoever drains it first carries out all, also what is decided meanwhile, which comes behind. So
+whoever runs it first carries out all, also what is decided meanwhile, which comes behind. So
 nothing is done by recursion, and no effect overtakes an older one. Carries out nothing itself.
 """
 
@@ -22,7 +22,7 @@ class Do(Enum):
     """What is done beside the goal's commands."""
 
     NOTE = "report that it has changed"
-    GO_ON = "wake those whose goals it may have let go on"
+    WAKE_WAITING = "wake those whose goals may have waited for this"
     RECORD = "put what more is known of it on record, if it is there"
     STRIKE = "take it off the record"
     RETIRE = "see to it no more"
@@ -54,7 +54,13 @@ class Before(NamedTuple):
     def of(cls, handle: GoalHandle) -> Before:
         """Return it as it is now."""
         goal = handle.goal
-        in_the_way = goal.in_flight, goal.unanswered, goal.outstanding, goal.lost, goal.holding
+        in_the_way = (
+            goal.in_flight,
+            goal.request_pending,
+            goal.outstanding,
+            goal.lost,
+            goal.claims_resources,
+        )
         shown = goal.state.shown, goal.outcome, goal.end
         done = goal.state is State.DONE
         return cls(shown, in_the_way, goal.accepted, goal.lost, _is_answered(handle), done)
@@ -68,7 +74,7 @@ def what_follows(
     if now.shown != before.shown:
         yield Do.NOTE
     if now.in_the_way != before.in_the_way:
-        yield Do.GO_ON
+        yield Do.WAKE_WAITING
     yield from commands
     if now.answered and not before.answered:
         yield Do.STRIKE
@@ -97,20 +103,20 @@ class Effects:
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[Callable[[Effect], None], Effect]] = deque()
-        self._drains = False
+        self._runs = False
 
     def put(self, carry_out: Callable[[Effect], None], effect: Effect) -> None:
         """Have this carried out behind what was decided before."""
         self._waiting.append((carry_out, effect))
 
-    def drain(self) -> None:
-        """Carry out all, unless somebody does so already."""
-        if self._drains:
+    def run_all(self) -> None:
+        """Carry out all, unless that is under way."""
+        if self._runs:
             return
-        self._drains = True
+        self._runs = True
         try:
             while self._waiting:
                 carry_out, effect = self._waiting.popleft()
                 carry_out(effect)
         finally:
-            self._drains = False
+            self._runs = False

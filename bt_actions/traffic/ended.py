@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.goal import turned_up_again
-from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, Event
+from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, NEVER, Event
 from bt_actions.servers.presence import GID
-from bt_actions.traffic.handle import NEVER, Endpoint, GoalHandle
+from bt_actions.traffic.handle import Endpoint, GoalHandle
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.transport import GOALS_KEPT
 
@@ -41,7 +41,7 @@ class Past:
         self._ended: dict[bytes, Ended] = {}
 
     def keep(self, handle: GoalHandle) -> None:
-        """Keep a goal that is DONE in mind."""
+        """Remember a goal that is DONE."""
         goal, endpoint = handle.goal, self._endpoint
         what = goal.id, goal.server, goal.timeouts, goal.resources, goal.busy
         owner = (lambda: None) if handle.owner is None else weakref.ref(handle.owner)
@@ -93,7 +93,7 @@ class Past:
         return None if self._endpoint.is_parents else self._ended.get(goal_id)
 
     def _may_be_several(self, ended: Ended) -> bool:
-        self._endpoint.see()
+        self._endpoint.observe()
         return len(ended.servers | self._endpoint.watch.gids) > 1
 
     def _turns_up(self, goal_id: bytes, ended: Ended) -> None:

@@ -25,8 +25,8 @@ from bt_actions.goals.terms import (
 )
 from bt_actions.servers.presence import PROBES_KEPT, Server, ServerWatch
 from bt_actions.servers.replies import Told
-from bt_actions.traffic.carrier import Carrier
 from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.effect_runner import EffectRunner
 from bt_actions.traffic.effects import Before, Effect, what_follows
 from bt_actions.traffic.ended import Past
 from bt_actions.traffic.handle import GoalHandle, Reporter
@@ -39,11 +39,17 @@ from bt_actions.utilities.plain_text import raised
 
 LOOKED_OUT_FOR = 3.0
 """Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
-went away: one that only stood still goes on with its goal. Once for each goal."""
+went away: one that only stood still still runs its goal. Once for each goal."""
 
 
 class ActionEndpoint:
-    """One action as one node sees it: the shared transport, and the goals on it."""
+    """One action as one node sees it: the shared transport, and the goals on it.
+
+    `tell` tells one goal what happened; `apply_deadlines` what time it is. `observe` reads
+    discovery, `observe_and_tell` tells the goals what that means. `deliver_arrived` takes messages
+    though nobody spins, `probe` asks a server for a sign of life. `run_due` does all of that, as
+    far as it is due, where nobody ticks.
+    """
 
     def __init__(
         self,
@@ -74,7 +80,7 @@ class ActionEndpoint:
         self._last_probes: deque[int] = deque()
         self._warned_of: set[str] = set()
         self._past = Past(self, host)
-        self._carrier = Carrier(self, host, domain, self._warn_once)
+        self._effect_runner = EffectRunner(self, host, domain, self._warn_once)
         self._predecessors = Predecessors(name, host.log)
         self.transport = participant.open_transport(action_type, name, self)
         self.route = Route(self, self, host, domain)
@@ -104,7 +110,7 @@ class ActionEndpoint:
                 return
             now = self.heard_at = self._host.steady()
             self.watch.heard(now)
-            self.pass_on(handle, handle.replies.lives(self.watch, now))
+            handle.replies.spoke(self.watch, now)
             self.tell(handle, Event.FEEDBACK, feedback)
             if handle.keeps_feedback and handle.goal.outcome is None:
                 handle.feedback.append(feedback)
@@ -170,7 +176,7 @@ class ActionEndpoint:
             if not (denies and self.watch.changed(handle.replies.sent_to)):
                 self.heard_at = self._host.steady()
             if len(handle.replies.sent_to) > 1:
-                self.see()
+                self.observe()
         return handle
 
     def pass_on(self, handle: GoalHandle, told: Told) -> None:
@@ -194,7 +200,7 @@ class ActionEndpoint:
         return self._forks != self._host.forks
 
     @property
-    def is_waited_for(self) -> bool:
+    def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
         return any(not handle.goal.sent for handle in self.goals.values())
 
@@ -210,7 +216,7 @@ class ActionEndpoint:
                 handle.paused_at = now.steady  # its next deadline begins in the pause
             self._apply(handle, event, now, detail, message)
 
-    def poll(self, handle: GoalHandle) -> None:
+    def apply_deadlines(self, handle: GoalHandle) -> None:
         """Let the goal's deadlines take effect, unless its tree is paused before sending.
 
         What has arrived by now is taken in first: an answer that came in time is in time, though
@@ -226,7 +232,7 @@ class ActionEndpoint:
                 return
             self._give_back_time(handle, now.steady)
             if goal.due_in(now) == 0.0:
-                self.pump()
+                self.deliver_arrived()
                 now = self.participant.now()
                 self._bear_with(goal, now)
             self._host.trace.polls(handle)
@@ -247,14 +253,14 @@ class ActionEndpoint:
         open_question = self.holds_back if waits else self.in_doubt
         in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
         servers = stalls.servers_take(now.steady) if waits else 0.0
-        goal.hold(max(stalls.answers_take(now.steady), servers, in_doubt), now)
+        goal.suspend_deadlines(max(stalls.answers_take(now.steady), servers, in_doubt), now)
 
-    def mind(self, handle: GoalHandle) -> None:
-        """Poll a goal on nobody's tick; what fails in that keeps no other goal from its turn."""
+    def apply_deadlines_guarded(self, handle: GoalHandle) -> None:
+        """The same; what fails in it keeps no other goal from its turn."""
         try:
-            self.poll(handle)
+            self.apply_deadlines(handle)
         except Exception as error:  # noqa: BLE001 - a mistake of ours: any
-            self._warn_once("a goal could not be minded", error)
+            self._warn_once("a deadline could not be applied", error)
 
     def _apply(
         self, handle: GoalHandle, event: Event, now: Now, detail: Any = None, message: Any = None
@@ -271,14 +277,14 @@ class ActionEndpoint:
         if newly_gone and handle.look_out_left is None:
             handle.look_out_left = LOOKED_OUT_FOR
         for do in what_follows(handle, before, commands):
-            self.domain.effects.put(self._carrier.carry_out, Effect(do, handle, message))
+            self.domain.effects.put(self._effect_runner.carry_out, Effect(do, handle, message))
         if (due := goal.due_in(now)) is not None:
             self._host.scheduler.wake_by(now.steady + due)
-        self.domain.effects.drain()
+        self.domain.effects.run_all()
 
     def ask_to_cancel(self, goal_id: bytes) -> None:
         """Ask the server to cancel a goal, as soon as its queue has room."""
-        self._carrier.ask_to_cancel(goal_id)
+        self._effect_runner.ask_to_cancel(goal_id)
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
@@ -290,15 +296,15 @@ class ActionEndpoint:
         with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
             self.transport.probe(probe, self._host.random_id())
 
-    def pump(self) -> None:
+    def deliver_arrived(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
         if self.is_parents:
             return
         try:
-            self.transport.pump()
+            self.transport.deliver_arrived()
         except Exception as error:  # noqa: BLE001 - the middleware's: any
             self._warn_once("something that arrived could not be taken", error)
-        self.cancels.go_on(self._host.steady())
+        self.cancels.send_more(self._host.steady())
 
     def _warn_once(self, what: str, error: Exception) -> None:
         if what not in self._warned_of:
@@ -314,7 +320,7 @@ class ActionEndpoint:
         self._host.scheduler.add(self)
 
     def retire(self, handle: GoalHandle) -> None:
-        """See to this goal no more, and attend only to what is left."""
+        """See to this goal no more; without any goal, to the server neither."""
         goal = handle.goal
         if self.goals.get(goal.id) is handle:  # and not what has turned up again
             del self.goals[goal.id]
@@ -336,17 +342,17 @@ class ActionEndpoint:
         with self._host.lock:
             return [handle for handle in self.goals.values() if handle.owner is owner]
 
-    def attend(self, now: float) -> float:
+    def run_due(self, now: float) -> float:
         """Do what is due here, on nobody's tick; return the seconds until there is more."""
-        return self.watcher.attend(now)
+        return self.watcher.run_due(now)
 
-    def look(self, now: float) -> Server:
+    def observe_and_tell(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
-        return self.watcher.look(now)
+        return self.watcher.observe_and_tell(now)
 
-    def see(self) -> None:
-        """Observe who is in sight; what follows for the server is for the next look to say."""
-        self.watcher.see()
+    def observe(self) -> None:
+        """Observe who is in sight; what follows is for `observe_and_tell` to say."""
+        self.watcher.observe()
 
     def in_doubt(self, now: float) -> float:
         """Return for how many seconds a server that is silent may not have heard us; or 0."""
@@ -356,7 +362,7 @@ class ActionEndpoint:
         """Whether nothing is sent though a server is in sight."""
         return self.route.holds_back(now)
 
-    def go_on_with(self, transport: ActionTransport) -> None:
+    def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""
         self.transport.close()
         self.cancels.forget_answers(self.goals)

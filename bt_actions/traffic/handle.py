@@ -1,6 +1,6 @@
 """A goal on its way, with what its owner and its server need to know; and whom it belongs to.
 
-Values, and the protocols by which the parts of traffic/ know each other. Nothing is decided here.
+Values, and the protocols by which the parts of traffic/ know each other.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from typing import Any, Protocol
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.goals.terms import Event, State
+from bt_actions.goals.terms import NEVER, Event, State
 from bt_actions.servers.presence import Server, ServerWatch
 from bt_actions.servers.replies import Replies, Told
 from bt_actions.traffic.cancel_queue import Cancels
 from bt_actions.traffic.transport import ActionTransport, Participant
 
-NEVER = float("-inf")
 FEEDBACK_KEPT = 100
 """Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
 
@@ -30,7 +29,7 @@ class Reporter(Protocol):
         """Report a goal's change."""
 
     def notify(self, change: Change | None) -> None:
-        """Tell the observers, and whoever waits; None: something may go on, or can be read."""
+        """Tell the observers, and whoever waits; None: something may be sent, or can be read."""
 
 
 class Endpoint(Protocol):
@@ -57,7 +56,7 @@ class Endpoint(Protocol):
         """Whether this was made before a fork, and we are the child: the goals are not ours."""
 
     @property
-    def is_waited_for(self) -> bool:
+    def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
 
     def tell(
@@ -68,11 +67,11 @@ class Endpoint(Protocol):
     def pass_on(self, handle: GoalHandle, told: Told) -> None:
         """Tell a goal what is believed of what was said of it, or seen."""
 
-    def poll(self, handle: GoalHandle) -> None:
+    def apply_deadlines(self, handle: GoalHandle) -> None:
         """Let the goal's deadlines take effect."""
 
-    def mind(self, handle: GoalHandle) -> None:
-        """Poll a goal on nobody's tick."""
+    def apply_deadlines_guarded(self, handle: GoalHandle) -> None:
+        """The same; what fails in it keeps no other goal from its turn."""
 
     def take_in(self, handle: GoalHandle) -> None:
         """See to this goal from now on."""
@@ -80,14 +79,14 @@ class Endpoint(Protocol):
     def retire(self, handle: GoalHandle) -> None:
         """See to it no more."""
 
-    def pump(self) -> None:
-        """Take what has arrived."""
+    def deliver_arrived(self) -> None:
+        """Take what has arrived, whether or not somebody spins."""
 
-    def look(self, now: float) -> Server:
+    def observe_and_tell(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
 
-    def see(self) -> None:
-        """Observe who is in sight, and conclude nothing."""
+    def observe(self) -> None:
+        """Observe who is in sight; what follows is for `observe_and_tell` to say."""
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
@@ -101,7 +100,7 @@ class Endpoint(Protocol):
     def holds_back(self, now: float) -> bool:
         """Whether nothing is sent though a server is in sight."""
 
-    def go_on_with(self, transport: ActionTransport) -> None:
+    def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""
 
 
@@ -133,9 +132,11 @@ class GoalHandle:
     """Since when it is not sent though a server is in sight (Route.holds_back), steady clock."""
     paused_at: float | None = None
     begun_at: float = NEVER
+    """Seconds, steady clock."""
     not_gone_before: float = NEVER
-    """Until when it is no news that its server is not shown: it may be stopped for less than its
-    lease, or not be discovered yet. Both in seconds of the steady clock."""
+    """Until when (steady clock) its server does not count as gone where it is not shown. It may be
+    stopped, and is shown again within LEASE, or not be discovered by a new node, which takes
+    TOO_NEW (handover.adopt, Route.move_to)."""
 
     def __post_init__(self) -> None:
         self.replies = Replies(self.goal)
@@ -144,7 +145,11 @@ class GoalHandle:
     def accounted_for(self) -> bool:
         """Whether the goal's end is known."""
         goal = self.goal
-        return goal.outcome is not None and goal.end is not End.UNKNOWN and not goal.unconfirmed
+        return (
+            goal.outcome is not None
+            and goal.end is not End.UNKNOWN
+            and not goal.may_still_be_accepted
+        )
 
     @property
     def is_over(self) -> bool:

@@ -1,17 +1,17 @@
 """Hands goals that were lost, or left, from one endpoint to another of the same action.
 
 Each node discovers for itself; so a goal whose server has gone for one node is seen to by whichever
-node of this process sees that server again, and is canceled first. What is believed of the server
-is servers/'s to say. All under the host's lock.
+node of this process sees that server again, and is canceled first. Whether a
+server is there is for servers/ to say. All under the host's lock.
 """
 
 from __future__ import annotations
 
 from bt_actions.goals.policy import End
-from bt_actions.goals.terms import Event
+from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import LEASE, Server
 from bt_actions.traffic.domain import LOST_KEPT, Domain
-from bt_actions.traffic.handle import NEVER, Endpoint
+from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import TOO_NEW
 
@@ -31,15 +31,16 @@ def take_over(endpoint: Endpoint, domain: Domain, now: float) -> None:
 
 
 def _sees_more(endpoint: Endpoint, other: Endpoint, servers: frozenset[bytes], now: float) -> bool:
-    """Whether one of `servers` is here that has gone for `other`, or that it takes for a ghost.
+    """Whether one of `servers` is here that has gone for `other`, or is taken there for a dead one.
 
-    What both see is left where it is: a ghost would be handed to and fro.
+    A dead server is shown until its lease runs out. Where both endpoints see the same, the goal
+    stays where it is: else they would hand it to each other in turn.
     """
     watch = endpoint.watch
     if not servers & watch.gids or watch.state(now) is Server.ABSENT:
         return False
-    ghost_there = watch.all_live(now) and not other.watch.all_live(now)
-    return other.orphaned or other.watch.gone(now, servers) or ghost_there
+    taken_for_dead = watch.all_live(now) and not other.watch.all_live(now)
+    return other.orphaned or other.watch.gone(now, servers) or taken_for_dead
 
 
 def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
@@ -59,8 +60,8 @@ def park(endpoint: Endpoint, host: Host, domain: Domain, *, all_of_them: bool = 
     """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
     for handle in list(endpoint.goals.values()):
         goal = handle.goal
-        if all_of_them or (goal.outcome is not None and not goal.holding):
-            endpoint.tell(handle, Event.NODE_CLOSED)
+        if all_of_them or (goal.outcome is not None and not goal.claims_resources):
+            endpoint.tell(handle, Event.PARKED)
         if goal.lost:
             handle.look_out_left = 0.0  # nobody does from now on
             domain.keep_lost((endpoint.name, endpoint.action_type), handle, host.record.strike)
@@ -69,13 +70,13 @@ def park(endpoint: Endpoint, host: Host, domain: Domain, *, all_of_them: bool = 
 
 def bound_the_lost(endpoint: Endpoint, host: Host) -> None:
     """Give up the oldest of too many lost goals; none that its server may still decide on."""
-    settled = [
+    forgettable = [
         handle
         for handle in endpoint.goals.values()
         if handle.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
         and handle.goal.outcome is not None
-        and not handle.goal.unconfirmed
+        and not handle.goal.may_still_be_accepted
     ]
-    for handle in settled[:-LOST_KEPT]:
-        endpoint.tell(handle, Event.PROCESS_EXITING)
+    for handle in forgettable[:-LOST_KEPT]:
+        endpoint.tell(handle, Event.ABANDONED)
         host.record.strike(handle.goal.id)

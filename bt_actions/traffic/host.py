@@ -1,7 +1,7 @@
 """The seam to what a process gives: its clock, its lock, ids, the log, the record, the wake-up.
 
-One host a process with rclpy (ros/host.py), or one a run that is explored. All that goals share
-beyond their endpoints hangs on it, so that nothing hangs on a module. Nothing is decided here.
+One host a process with rclpy (ros/host.py), or one a simulated run (testing/host.py). All that
+goals share beyond their endpoints hangs on it, so that nothing hangs on a module.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ class Log(Protocol):
     """Takes lines from any thread, and never waits."""
 
     def info(self, text: str) -> None:
-        """Of what happens."""
+        """Log at info level."""
 
     def warning(self, text: str) -> None:
-        """Of what should not."""
+        """Log at warning level."""
 
     def error(self, text: str) -> None:
-        """Of what must not."""
+        """Log at error level."""
 
     def flush(self) -> None:
         """Have what was said written, before more is told by other ways; waits a moment at most."""
@@ -80,12 +80,12 @@ class Trace:
         """A goal was begun."""
 
     def tells(self, handle: GoalHandle, event: Event) -> None:
-        """A goal is about to be told what happened;"""
+        """A goal is about to be told what happened."""
 
     def told(
         self, handle: GoalHandle, event: Event, detail: Any, commands: tuple[Command, ...]
     ) -> None:
-        """and was told, and this is what it says."""
+        """A goal was told what happened, and returned these commands."""
 
     def does(self, effect: Effect) -> None:
         """What a goal has decided is about to be done."""
@@ -98,7 +98,7 @@ class Trace:
 
 
 class Host(Protocol):
-    """What the goals of a process, or of one run that is explored, have in common."""
+    """What the goals of a process, or of one simulated run, have in common."""
 
     @property
     def lock(self) -> AbstractContextManager[Any]:

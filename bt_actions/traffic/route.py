@@ -1,19 +1,18 @@
 """How one endpoint reaches its server: in its node's participant or, where that fails, in another.
 
-Our participant may be blind to a server that runs (ros/rediscovery.py), or that server deaf to it
+Our participant may not see a server that runs (ros/rediscovery.py), or that server may not hear it
 (servers/reachability.py). This tells the participant to have another one look, tries a transport in
-that, and has the endpoint go on with it, and fall back when it is gone. Of goals it decides
-nothing: they are told that their server is to be asked anew, and given time for that. All under the
-host's lock.
+that, and has the endpoint use it, and fall back when it is gone. Goals are told that their server
+is to be asked anew, and given time for that. All under the host's lock.
 """
 
 from __future__ import annotations
 
 import contextlib
 
-from bt_actions.goals.terms import Event, State
+from bt_actions.goals.terms import NEVER, Event, State
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.servers.reachability import NEVER, TWICE, Reachability
+from bt_actions.servers.reachability import TWICE, Reachability
 from bt_actions.servers.stalls import ANSWERS_TAKE
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint
@@ -66,8 +65,8 @@ class Route:
             return 0.0  # there is no other way
         return self._reachability(now).in_doubt(now)
 
-    def wants_question(self, now: float) -> bool:
-        """Whether to ask the server something now, just in order to be answered."""
+    def take_question(self, now: float) -> bool:
+        """Whether to ask the server something now, just in order to be answered; takes the turn."""
         reachability = self._reachability(now)
         return not self._is_absent(now) and reachability.take_question(now)
 
@@ -101,7 +100,7 @@ class Route:
         if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.goals.values()):
             return False  # nobody here wants it; it is remembered, as what is put away is
         action = endpoint.name, endpoint.action_type
-        known = self._domain.lost_sight or action in self._domain.known
+        known = self._domain.ever_lost_sight or action in self._domain.known
         running = (State.SENDING, State.EXECUTING, State.REPLACED)
         still = all(handle.goal.state not in running for handle in endpoint.goals.values())
         return (known and self._is_absent(now) and still) or self._is_unresponsive(now)
@@ -117,12 +116,13 @@ class Route:
         endpoint = self._endpoint
         if self._is_absent(now) or not endpoint.transport.reachability.is_unresponsive(now):
             return False
-        endpoint.pump()
+        endpoint.deliver_arrived()
         return endpoint.transport.reachability.is_unresponsive(now)
 
-    def is_waited_for(self) -> bool:
+    @property
+    def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
-        return self._endpoint.is_waited_for
+        return self._endpoint.has_unsent
 
     def try_in(self, participant: Opener) -> ActionTransport:
         """Return a transport like our own in another participant, on trial."""
@@ -135,8 +135,8 @@ class Route:
             self._last_question_at = NEVER
         return transport
 
-    def prefers(self, transport: ActionTransport) -> bool:
-        """Whether this one, which is ready, is heard where our own is not, or sees the server.
+    def try_and_compare(self, transport: ActionTransport) -> bool:
+        """Ask in this one, which is ready; whether it is heard where our own is not, or sees more.
 
         A server that answers nobody is busy; one that has just answered this one would answer our
         own as well, if it heard it.
@@ -146,7 +146,7 @@ class Route:
             return True
         if not self._is_unresponsive(now):
             return False
-        transport.pump()
+        transport.deliver_arrived()
         if not transport.reachability.heard:
             if transport.reachability.take_question(now):
                 with contextlib.suppress(Exception):
@@ -158,20 +158,20 @@ class Route:
         return now - self._last_question_at >= LAST_WORD
 
     def move_to(self, transport: ActionTransport) -> None:
-        """Go on in a participant that sees the server; nobody spins that.
+        """Use a transport in a participant that sees the server; nobody spins that.
 
         What is under way in the old one is not heard there. A question for a result, or a cancel,
         is asked anew; of a goal request nobody knows whether it has arrived.
         """
         endpoint, now = self._endpoint, self._host.steady()
         blind, seen = self._is_absent(now), endpoint.watch.gids
-        endpoint.pump()
+        endpoint.deliver_arrived()
         if endpoint.transport.closed:  # by what came, and nobody used the endpoint
             transport.close()
             return
         transport.on_trial = False
         self.elsewhere = True
-        endpoint.go_on_with(transport)
+        endpoint.replace_transport(transport)
         name = endpoint.name
         if blind:
             self._host.log.info(
@@ -182,11 +182,11 @@ class Route:
         for handle in list(endpoint.goals.values()):
             if handle.replies.sent_to & seen:  # it may be shown later than another of its name
                 handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
-            handle.goal.hold(ANSWERS_TAKE, endpoint.participant.now())
+            handle.goal.suspend_deadlines(ANSWERS_TAKE, endpoint.participant.now())
             endpoint.tell(handle, Event.SERVER_CHANGED)
 
     def fall_back(self) -> bool:
-        """Go on in our node's participant, as the other is gone; return whether that is there."""
+        """Use our node's participant again, as the other is gone; return whether that is there."""
         endpoint = self._endpoint
         if not self.elsewhere:
             return endpoint.participant.alive()  # the next look may see more
@@ -196,5 +196,5 @@ class Route:
         except Exception:  # noqa: BLE001 - or it is gone by now, too
             return False
         self.elsewhere = False
-        endpoint.go_on_with(transport)
+        endpoint.replace_transport(transport)
         return True

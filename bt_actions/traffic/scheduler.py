@@ -1,4 +1,4 @@
-"""Whom to attend to, and when: the endpoints with open goals, ticks or not.
+"""What is to be run, and when: the endpoints with open goals, ticks or not.
 
 Decides when it wants to be run; whoever owns it (the alarm thread of ros/, or a loop in virtual
 time) sleeps until then. As it never sleeps for long, it notices when the whole process stood still;
@@ -20,10 +20,10 @@ SHORTEST = 0.001
 """Seconds of sleep in any case, should what is due stay due."""
 
 
-class Attended(Protocol):
-    """What is attended to."""
+class Scheduled(Protocol):
+    """What is run when it is due: an endpoint, or a watchdog."""
 
-    def attend(self, now: float) -> float:
+    def run_due(self, now: float) -> float:
         """Do what is due and return the seconds until there is more."""
 
 
@@ -35,7 +35,7 @@ class Scheduler:
         steady: Callable[[], float],
         stalls: Stalls,
         wake: Callable[[], None],
-        failed: Callable[[Attended, Exception], None],
+        failed: Callable[[Scheduled, Exception], None],
     ) -> None:
         """`wake` is called when `run` is wanted earlier than it has said, or again after a rest.
 
@@ -43,26 +43,26 @@ class Scheduler:
         """
         self._steady, self._stalls = steady, stalls
         self._wake, self._failed = wake, failed
-        self._open: dict[Attended, None] = {}  # in the order in which they came
+        self._open: dict[Scheduled, None] = {}  # in the order in which they came
         self.wakes_at = 0.0
         """When it wants to be run again (seconds, steady clock)."""
 
-    def add(self, endpoint: Attended) -> None:
-        """Attend to this endpoint until it is removed."""
+    def add(self, endpoint: Scheduled) -> None:
+        """Run this one until it is removed."""
         if not self._open:
             self._wake()
         self._open[endpoint] = None
 
-    def remove(self, endpoint: Attended) -> None:
-        """Attend to it no more."""
+    def remove(self, endpoint: Scheduled) -> None:
+        """Run it no more."""
         self._open.pop(endpoint, None)
 
     def clear(self) -> None:
-        """Attend to nothing."""
+        """Run nothing."""
         self._open.clear()
 
     @property
-    def attended(self) -> list[Attended]:
+    def scheduled(self) -> list[Scheduled]:
         """Return the endpoints with open goals."""
         return list(self._open)
 
@@ -73,12 +73,12 @@ class Scheduler:
             self._wake()
 
     def run(self) -> None:
-        """Attend to all, and say when to do so again (`wakes_at`)."""
+        """Run all, and say when to do so again (`wakes_at`)."""
         wait, self.wakes_at = AT_LEAST_EVERY, math.inf  # who asks meanwhile is heard
-        for endpoint in self.attended:
+        for endpoint in self.scheduled:
             self._stalls.lives(self._steady())  # each look takes its time
             try:
-                wait = min(wait, endpoint.attend(self._steady()))
+                wait = min(wait, endpoint.run_due(self._steady()))
             except Exception as error:  # noqa: BLE001 - the last guard of every deadline
                 self._failed(endpoint, error)
         now = self._steady()

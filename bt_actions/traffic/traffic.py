@@ -4,9 +4,9 @@ A leaf begins a goal here and advances it at its ticks. From the moment the requ
 goal is driven by what arrives, whether or not anybody ticks: answers, deadlines and the watch over
 the servers (scheduler.py). What a leaf leaves behind is thereby drained without it.
 
-One lock guards all of it. Under the lock nothing waits, and no code of the user's runs: observers
-only take note. This file decides nothing about a goal (goals/goal.py), its tries
-(goals/attempts.py), or whether it may be sent (admission.py).
+One lock guards all of it. Under the lock nothing waits, and of the user's code only what says so:
+observers, which take note, and `ActionBehaviour.settles`. This file decides nothing about a goal
+(goals/goal.py), its tries (goals/attempts.py), or whether it may be sent (admission.py).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from bt_actions.goals.resources import Answer
 from bt_actions.goals.terms import Event, Now, State
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
-from bt_actions.traffic.admission import Admission, Verdict
+from bt_actions.traffic.admission import Admission
 from bt_actions.traffic.begun import begun_in
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
@@ -112,18 +112,19 @@ class Traffic:
         *,
         attempt: int = 1,
         keeps_feedback: bool = False,
-        settles: Callable[[Any], bool] = lambda result: True,
+        accounts_for_all: Callable[[Any], bool] = lambda result: True,
     ) -> GoalHandle:
         """Begin a goal: it queues for its resources. It is sent by `advance`.
 
-        A resource is named as an action is: what is relative is in the node's namespace. `settles`
-        is asked with the result, under the lock: where it says no, the goal's end is UNKNOWN.
+        A resource is named as an action is: what is relative is in the node's namespace.
+        `accounts_for_all` is asked with the result, under the lock: where it says no, the goal's
+        end is UNKNOWN.
         """
         with self.host.lock:
             held = frozenset(self._full_name(each) for each in resources)
             goal = Goal(
                 self.host.new_goal_id(), endpoint.name, timeouts, self.now(),
-                resources=held, busy=busy, settles=settles,
+                resources=held, busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
             began = begun_in.get()
             handle = GoalHandle(
@@ -160,14 +161,14 @@ class Traffic:
         with self.host.lock:
             if handle.goal.state is State.DONE:
                 return
-            endpoint.poll(handle)
+            endpoint.apply_deadlines(handle)
             if self.host.closing:
                 endpoint.tell(handle, Event.INTERRUPTED)
             if handle.goal.state is not State.WAITING_FOR_SERVER:
                 return
-            if endpoint.look(self.host.steady()) is Server.AMBIGUOUS:
+            if endpoint.observe_and_tell(self.host.steady()) is Server.AMBIGUOUS:
                 endpoint.tell(handle, Event.SERVER_AMBIGUOUS)
-            if self._admission.verdict(handle) is not Verdict.SEND:
+            if not self._admission.may_send(handle):
                 return
         try:
             message = make_message()
@@ -176,11 +177,11 @@ class Traffic:
             endpoint.tell(handle, Event.INVALID, reason)
             return
         with self.host.lock:
-            if self._admission.verdict(handle) is Verdict.SEND:
+            if self._admission.may_send(handle):
                 endpoint.tell(handle, Event.SERVER_READY, message=message)
 
-    def is_settled(self, handle: GoalHandle) -> bool:
-        """Whether its outcome is decided, and what is known of its end then is, too."""
+    def is_decided(self, handle: GoalHandle) -> bool:
+        """Whether its outcome is decided, and its end and result are set as they are known then."""
         with self.host.lock:  # a goal takes one step at a time
             return handle.goal.outcome is not None
 
@@ -267,6 +268,6 @@ class Traffic:
             for endpoint in list(self._endpoints.values()):
                 handover.park(endpoint, self.host, self._domain, all_of_them=True)
                 for handle in list(endpoint.goals.values()):
-                    endpoint.tell(handle, Event.PROCESS_EXITING)
+                    endpoint.tell(handle, Event.ABANDONED)
                 endpoint.transport.close()
             self._endpoints.clear()

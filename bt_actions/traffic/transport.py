@@ -2,7 +2,7 @@
 
 `ros/` implements these protocols with rclpy, `testing/` on a network in virtual time. Both sides of
 the seam keep one contract (tests/traffic/test_transport.py). All of it is called under the host's
-lock, but for what takes messages from the middleware. Nothing is decided here.
+lock, but for what takes messages from the middleware.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class ActionTransport(Protocol):
         But for further acceptances of the newest `GOALS_KEPT` goals.
         """
 
-    def pump(self) -> bool:
+    def deliver_arrived(self) -> bool:
         """Deliver what has arrived, here and now; return whether there was anything."""
 
     @property
@@ -111,17 +111,21 @@ class Seeker(Protocol):
     def misses(self) -> bool:
         """Whether a server is wanted, and is not in sight, or does not answer, by now."""
 
-    def is_waited_for(self) -> bool:
-        """Whether somebody wants to send a goal."""
+    @property
+    def has_unsent(self) -> bool:
+        """Whether a goal is still to be sent."""
 
     def try_in(self, participant: Opener) -> ActionTransport:
         """Open a transport like its own in another participant, on trial."""
 
-    def prefers(self, transport: ActionTransport) -> bool:
-        """Whether this one, which is ready, does what its own does not."""
+    def try_and_compare(self, transport: ActionTransport) -> bool:
+        """Ask in this one, which is ready; whether it is heard, or sees, what its own does not.
+
+        Called again and again until an answer has had time to come.
+        """
 
     def move_to(self, transport: ActionTransport) -> None:
-        """Go on with this one, or close it."""
+        """Use this one from now on, or close it."""
 
 
 class Opener(Protocol):
@@ -132,7 +136,7 @@ class Opener(Protocol):
 
 
 class Participant(Opener, Protocol):
-    """Whose eyes and ears the goals of one node have."""
+    """A participant of the ROS network: what it sees and hears, the goals of its node do."""
 
     @property
     def domain(self) -> int:
@@ -140,19 +144,22 @@ class Participant(Opener, Protocol):
 
     @property
     def name(self) -> str:
-        """Of the node;"""
+        """The name of the node."""
 
     @property
     def namespace(self) -> str:
-        """and its namespace, "/" or "/r1"."""
+        """The namespace of the node: "/" or "/r1"."""
 
     @property
     def seen_since(self) -> float:
-        """Since when it sees others (seconds, steady clock); a new one is blind to nothing;"""
+        """Since when it sees others (seconds, steady clock).
+
+        A new one has dropped no server yet: what it does not see it may still discover.
+        """
 
     @property
     def long_stalls(self) -> int:
-        """and how often the process had stood still for long by then (Stalls.long_times)."""
+        """How often the process had stood still for long by `seen_since` (Stalls.long_times)."""
 
     def now(self) -> Now:
         """Return this moment, by the steady clock and by its own."""
@@ -167,7 +174,7 @@ class Participant(Opener, Protocol):
         """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
 
     def seek(self, seeker: Seeker, name: str, *, at_once: bool) -> None:
-        """Have another participant look for what is missed; `at_once`: do not go on pausing.
+        """Have another participant look for what is missed; `at_once`: without waiting out a pause.
 
         Does nothing where there can be no other, or where it would find another server than ours.
         """

@@ -1,32 +1,32 @@
 """Watches over the server of one endpoint: looks at discovery, asks, and tells the goals.
 
-Decides when to look, and takes note of what is seen; who is alive is servers/presence.py's to say,
-and what follows for a goal servers/replies.py's. All under the host's lock.
+Decides when to look. Who is alive is for servers/presence.py to say, and what follows for a goal
+for servers/replies.py. All under the host's lock.
 """
 
 from __future__ import annotations
 
 import contextlib
 
-from bt_actions.goals.terms import Event
+from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.handle import NEVER, Endpoint, GoalHandle
+from bt_actions.traffic.handle import Endpoint, GoalHandle
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import Route
 
 LOOK_WHILE_WAITING = 0.05
 LOOK_WHILE_RUNNING = 0.2
 LOOK_WHILE_LOST = 1.0
-PUMP_EVERY = 0.01
+DELIVER_EVERY = 0.01
 """Seconds between two looks at a server: somebody waits for it; goals run on it; only its return
 would matter. The last: between two takes of answers, where nobody spins."""
 LATE = 0.5
 """Seconds by which a look is so late that answers may have come in between, unseen."""
 SILENT_FOR = 40.0
 """Seconds without a word of their server until goals whose node is gone are left to whoever can see
-whether it is there: longer than a ghost is shown, or a question waits (asking.DENIED_FOR_GOOD)."""
+whether it is there: longer than a dead one is shown, or a question is kept (DENIED_FOR_GOOD)."""
 BESIDE = 1.0
 """Seconds for which a server may be in sight before another one that was there all the time, or
 that came back with it; 0.5 measured."""
@@ -44,27 +44,27 @@ class Watcher:
         self._looked_out_at = host.steady()
         self._warned_crowd = False
 
-    def attend(self, now: float) -> float:
-        """Do what is due; return the seconds until there is more."""
+    def run_due(self, now: float) -> float:
+        """Look, send and apply deadlines as far as due; return the seconds until there is more."""
         endpoint = self._endpoint
         self._look_out(now)
         if now >= self._look_at:
-            self.look(now)
-            settling = endpoint.watch.state(now) is Server.SETTLING
-            if settling or endpoint.is_waited_for:
+            self.observe_and_tell(now)
+            unclear = endpoint.watch.state(now) is Server.UNCLEAR
+            if unclear or endpoint.has_unsent:
                 self._look_at = now + LOOK_WHILE_WAITING
             elif any(not handle.is_over for handle in endpoint.goals.values()):
                 self._look_at = now + LOOK_WHILE_RUNNING
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
-        endpoint.cancels.go_on(now)
+        endpoint.cancels.send_more(now)
         if endpoint.orphaned or self._route.elsewhere:
-            endpoint.pump()
+            endpoint.deliver_arrived()
             if not all(handle.accounted_for for handle in endpoint.goals.values()):
-                wait = min(wait, PUMP_EVERY)
+                wait = min(wait, DELIVER_EVERY)
         for handle in list(endpoint.goals.values()):
-            endpoint.mind(handle)
+            endpoint.apply_deadlines_guarded(handle)
             due = handle.goal.due_in(endpoint.participant.now())
             if due is not None and handle.paused_at is None:
                 wait = min(wait, due)
@@ -80,19 +80,19 @@ class Watcher:
         self._looked_like = Server.ABSENT
         self._look_at = 0.0
 
-    def look(self, now: float) -> Server:
+    def observe_and_tell(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
         endpoint, watch = self._endpoint, self._endpoint.watch
         if not endpoint.participant.alive():
             self._orphan()
             self._look_blindly(now)
             return Server.ABSENT
-        self._take_in(now)
+        self._deliver_pending(now)
         if endpoint.transport.closed:  # by what came, and nobody used the endpoint
             return Server.ABSENT
         before = self._looked_like
         try:
-            self._observe(now)
+            self._ask_discovery(now)
         except Exception:  # noqa: BLE001 - the participant was destroyed since
             if not self._route.fall_back():
                 self._orphan()
@@ -100,7 +100,7 @@ class Watcher:
         handover.adopt(endpoint, self._host, self._domain)
         handover.take_over(endpoint, self._domain, now)
         runs = any(handle.goal.sent and not handle.goal.lost for handle in endpoint.goals.values())
-        if self._route.wants_question(now) or watch.wants_probe(now, runs=runs):
+        if self._route.take_question(now) or watch.wants_probe(now, runs=runs):
             endpoint.probe()
         for handle in list(endpoint.goals.values()):
             gone = watch.gone(now, handle.replies.sent_to)
@@ -110,7 +110,7 @@ class Watcher:
                 continue  # it has not been discovered yet, though its status may have come already
             if handle.goal.sent:
                 if gone and not handle.goal.lost:
-                    endpoint.pump()  # its last words
+                    endpoint.deliver_arrived()  # its last words
                 endpoint.pass_on(handle, handle.replies.looked(watch, now))
         state = self._looked_like = watch.state(now)
         if before is Server.ABSENT or self._was_away:
@@ -122,7 +122,7 @@ class Watcher:
         self._held_up = held_up
         if state is not before:
             endpoint.reporter.notify(None)
-            self._domain.lost_sight |= state is Server.ABSENT
+            self._domain.ever_lost_sight |= state is Server.ABSENT
             self._domain.known.add((endpoint.name, endpoint.action_type))
         self._route.seek(now)
         if state is Server.AMBIGUOUS and not self._warned_crowd:
@@ -135,14 +135,14 @@ class Watcher:
             self._warned_crowd = False
         return state
 
-    def see(self) -> None:
-        """Observe who is in sight; what follows for the server is for the next look to say."""
+    def observe(self) -> None:
+        """Observe who is in sight; what follows is for `observe_and_tell` to say."""
         with contextlib.suppress(Exception):
             now = self._host.steady()
-            self._observe(now, concludes=False)
+            self._ask_discovery(now, concludes=False)
             self._was_away |= self._endpoint.watch.state(now) is Server.ABSENT
 
-    def _observe(self, now: float, *, concludes: bool = True) -> None:
+    def _ask_discovery(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""
         transport = self._endpoint.transport
         ready, servers = transport.ready(), transport.servers()
@@ -161,18 +161,18 @@ class Watcher:
             if handle.goal.lost and handle.look_out_left:
                 handle.look_out_left = max(0.0, handle.look_out_left - passed)
 
-    def _take_in(self, now: float) -> None:
-        """What answers of several came in time count, though nobody spun the node."""
+    def _deliver_pending(self, now: float) -> None:
+        """Deliver pending answers before judging silence, where several servers are shown."""
         if self._endpoint.watch.is_crowded:
             late = self._look_at and now - self._look_at > LATE
             if late or self._host.stalls.answers_take(self._host.steady()):
                 self._endpoint.watch.stood_still(now)
-            self._endpoint.pump()
+            self._endpoint.deliver_arrived()
 
     def _look_blindly(self, now: float) -> None:
         """Of the servers that were shown when the node went, find out by asking who lives."""
         endpoint, watch = self._endpoint, self._endpoint.watch
-        self._take_in(now)
+        self._deliver_pending(now)
         if not watch.is_crowded or endpoint.transport.closed:
             return
         watch.observe(now, True, watch.gids)

@@ -156,7 +156,7 @@ def test_an_answer_that_cannot_be_taken_keeps_no_other_goal_from_being_canceled(
     with TreeRunner(together(*leaves), node=node) as runner:
         runner.start()
         until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
-        monkeypatch.setattr(leaves[0]._endpoint.transport, "pump", broken)
+        monkeypatch.setattr(leaves[0]._endpoint.transport, "deliver_arrived", broken)
     assert [journal.ends() for journal in journals] == [["canceled"], ["canceled"]]
     told: list[str] = []  # by the log's own thread
     until(lambda: "not be taken: RuntimeError: of a type" in "".join(told),

@@ -91,7 +91,7 @@ class CrowdPlay(Play):
         super().move(kind, number)
 
     def _answer_probes(self) -> None:
-        """Who lives, and can be reached, answers a probe in time: by that a ghost is told."""
+        """Who lives, and can be reached, answers a probe in time: by that a dead server is told."""
         for kind in ("probe", "probe answer"):
             for message in [each for each in self.world.air if each.kind == kind]:
                 if not message.server.cut:

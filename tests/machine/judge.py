@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goals.facts import PATIENCE
+from bt_actions.goals.facts import PATIENCE, Facts
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
 from tests.machine.parts import Before, GoalHandle, Leaf, Ledger
@@ -88,11 +88,11 @@ class Judge:
                 ledger.unwanted = True
         if event is Event.REJECTED:
             ledger.refused = True
-        ledger.left |= event is Event.NODE_CLOSED
-        if event is Event.PROCESS_EXITING and before.state is not State.DONE:
+        ledger.left |= event is Event.PARKED
+        if event is Event.ABANDONED and before.state is not State.DONE:
             ledger.closed = True
             ledger.excuse = ledger.excuse or "its run, or the process, ended"
-        if event is Event.DRAINED and goal.end is End.UNKNOWN and not goal.accepted:
+        if event is Event.DRAIN_GAVE_UP and goal.end is End.UNKNOWN and not goal.accepted:
             ledger.excuse = ledger.excuse or "its run ended, and has reported it as UNKNOWN"
         if event is Event.CANCEL_ANSWERED:
             ledger.denied = detail == CANCEL_UNKNOWN_GOAL
@@ -117,7 +117,9 @@ class Judge:
             if command is Command.SEND:
                 ledger.sends += 1
                 waited = before.state is State.WAITING_FOR_SERVER
-                self._hold(waited and goal.holding, "a goal is sent only while it holds resources")
+                self._hold(
+                    waited and goal.claims_resources, "a goal is sent only while it holds resources"
+                )
             elif command is Command.RELEASE:
                 ledger.releases += 1
                 known = goal.end is not End.UNKNOWN or goal.state is State.DONE
@@ -192,7 +194,9 @@ class Judge:
             excused = limits.result is None and limits.feedback is None
         else:
             settled = goal.outcome is not None and goal.end is not End.UNKNOWN
-            excused = settled or (goal.unconfirmed and goal.waited_for and not goal.holding)
+            excused = settled or (
+                goal.may_still_be_accepted and goal.drain_gave_up and not goal.claims_resources
+            )
         self._hold(excused, f"no deadline is forgotten ({state.name})")
 
     def polled(self, handle: GoalHandle) -> None:
@@ -297,21 +301,21 @@ class Judge:
             if other.goal.lost and self.caller.out_of_sight(other, handle):
                 handle.ledger.beside += (other,)
             elif other.endpoint.name == handle.endpoint.name and other.goal.outcome is not None:
-                taken_for_ghosts = other.goal.end is End.SERVER_GONE  # as they answer nothing
-                runs = not other.goal.holding and any(
+                taken_for_dead = other.goal.end is End.SERVER_GONE  # as they answer nothing
+                runs = not other.goal.claims_resources and any(
                     job.live
                     and self.caller.world.in_sight(job.server, handle.node)
-                    and not (taken_for_ghosts and job.server.cut)
+                    and not (taken_for_dead and job.server.cut)
                     for job in other.ledger.jobs
                 )
                 excused: str | bool = other.ledger.excuse
                 excused = excused or (other.ledger.crowded and len(other.ledger.heard) < 2)
-                excused = excused or (other.goal.waited_for and not other.goal.accepted)
+                excused = excused or (other.goal.drain_gave_up and not other.goal.accepted)
                 rule = f"{other} was given up, and is canceled before {handle} is sent there"
                 self._hold(not runs or excused, rule)
             elif other is not handle and other.endpoint.name == handle.endpoint.name:
                 _, newer = sorted((other.goal, handle.goal), key=lambda goal: int(goal.id))
-                crosses = other.goal.unanswered and newer.busy is Busy.REPLACE
+                crosses = other.goal.request_pending and newer.busy is Busy.REPLACE
                 crosses = crosses and bool(other.goal.resources & handle.goal.resources)
                 self._hold(not crosses, f"{other} is answered before {handle} is sent")
         if reached > 1:
@@ -375,7 +379,11 @@ class Judge:
         return all(
             handle.goal.state is State.DONE
             or (handle.goal.outcome is not None and handle.goal.end is not End.UNKNOWN)
-            or (handle.goal.unconfirmed and handle.goal.waited_for and not handle.goal.holding)
+            or (
+                handle.goal.may_still_be_accepted
+                and handle.goal.drain_gave_up
+                and not handle.goal.claims_resources
+            )
             for handle in self.caller.handles
         )
 
@@ -386,9 +394,13 @@ class Judge:
         for handle in caller.handles:
             goal = handle.goal
             done = goal.state is State.DONE or goal.end is not End.UNKNOWN
-            done |= goal.unconfirmed and goal.waited_for and not goal.holding  # and reported so
+            done |= (
+                goal.may_still_be_accepted and goal.drain_gave_up and not goal.claims_resources
+            )  # and reported so
             self._hold(goal.outcome is not None and done, f"every goal ends: {handle} {goal!r}")
-            self._hold(not goal.holding, f"every resource is given back: {handle} {goal!r}")
+            self._hold(
+                not goal.claims_resources, f"every resource is given back: {handle} {goal!r}"
+            )
             self._the_end_is_true(handle)
         self._hold(len(caller.resources) == 0, "no resource is leaked")
 
@@ -414,7 +426,7 @@ class Judge:
         else:
             forgot = any(job.goal_id not in job.server.jobs for job in jobs)
             dead = any(not job.server.alive for job in jobs)
-            asked = goal.unconfirmed and goal.waited_for  # a request that was never answered
+            asked = goal.may_still_be_accepted and goal.drain_gave_up  # it was never answered
             another = len(handle.replies.sent_to) > 1  # as far as is known, and it denied the goal
             cause = closed or ledger.crowded or forgot or dead or asked or another
             self._hold(cause, f"UNKNOWN with a cause: {said}")
@@ -432,3 +444,8 @@ class Judge:
         if not kept:
             self._violation = self._violation or Violation(rule)
             raise self._violation
+
+
+def _given_up(goal: Facts) -> bool:
+    """Whether it may still be accepted, and nobody waits for that any more."""
+    return goal.may_still_be_accepted and goal.drain_gave_up and not goal.claims_resources

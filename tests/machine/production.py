@@ -98,7 +98,7 @@ class ModelTransport:
         while len(self._past) > GOALS_KEPT:
             del self._past[next(iter(self._past))]
 
-    def pump(self) -> bool:
+    def deliver_arrived(self) -> bool:
         return False
 
     def close(self) -> None:
@@ -285,7 +285,7 @@ class Caller:
                 "look": (lambda: (None,), lambda _: self.attend()),
                 "drained": (
                     self._left_behind,
-                    lambda handle: handle.endpoint.tell(handle.real, Event.DRAINED),
+                    lambda handle: handle.endpoint.tell(handle.real, Event.DRAIN_GAVE_UP),
                 ),
                 "rerun": (lambda: () if self.closed else NODES, self.run_again),
             }
@@ -340,8 +340,8 @@ class Caller:
         of_node = self._traffics[leaf.plan.node]
         to_action = self.come(leaf.plan.action, leaf.plan.node)
         if leaf.handle is not None and leaf.attempts is not None:
-            to_action.look(self.moment())
-            leaf.handle.endpoint.poll(leaf.handle)
+            to_action.observe_and_tell(self.moment())
+            leaf.handle.endpoint.apply_deadlines(leaf.handle)
             goal = leaf.handle.goal
             if goal.outcome is not None:
                 self._judge_attempt(leaf, leaf.attempts, leaf.handle)
@@ -396,7 +396,8 @@ class Caller:
         """The process ends."""
         self.closed = True
         for handle in self.handles:
-            handle.endpoint.tell(handle.real, Event.PROCESS_EXITING)
+            handle.endpoint.tell(handle.real, Event.PARKED)
+            handle.endpoint.tell(handle.real, Event.ABANDONED)
 
     def _left_behind(self) -> list[GoalHandle]:
         """Goals that are still waited for, though no leaf has them any more."""
@@ -406,7 +407,7 @@ class Caller:
             for handle in self.handles
             if handle.real not in held
             and handle.goal.outcome is not None
-            and (handle.goal.end is End.UNKNOWN or handle.goal.unconfirmed)
+            and (handle.goal.end is End.UNKNOWN or handle.goal.may_still_be_accepted)
         ]
 
     # What arrives, and what time does
@@ -429,15 +430,15 @@ class Caller:
     def attend(self) -> None:
         """What the alarm does, which is late where the process was frozen."""
         self.host.stalls.rests(self.moment())
-        self._attend()
+        self._run_due()
         if self.takes("freezes"):
             self._freeze((0.9, 2.5, 6.0)[self._moments % 3])
 
-    def _attend(self) -> None:
-        for each in self.host.scheduler.attended:
+    def _run_due(self) -> None:
+        for each in self.host.scheduler.scheduled:
             assert isinstance(each, ActionEndpoint)
             each.watcher.rest()  # a look is due
-            each.attend(self.moment())
+            each.run_due(self.moment())
             for real in each.goals.values():
                 handle = self.known(real.goal)
                 if handle is not None and not self.froze:
@@ -464,7 +465,7 @@ class Caller:
             hidden -= world.overlooked
         world.overlooked |= hidden
         world.now = Now(world.now.steady + seconds, world.now.ros + seconds * world.pace)
-        self._attend()
+        self._run_due()
         for handle, state in before.items():
             if handle.goal.state is not state and self._freezes <= IN_A_ROW:
                 raise Violation(f"who was frozen looks first for what came meanwhile: {handle}")

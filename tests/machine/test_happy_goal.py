@@ -53,11 +53,11 @@ def test_each_message_enters_once_the_graph_is_asked_twice_and_there_is_one_goal
     deliver()
     assert trace.steps == [
         (Event.GRANTED, [Do.NOTE]),
-        (Event.SERVER_READY, [Do.NOTE, Do.GO_ON, Command.SEND]),
-        (Event.ACCEPTED, [Do.NOTE, Do.GO_ON, Command.ASK_RESULT, Do.STRIKE]),
+        (Event.SERVER_READY, [Do.NOTE, Do.WAKE_WAITING, Command.SEND]),
+        (Event.ACCEPTED, [Do.NOTE, Do.WAKE_WAITING, Command.ASK_RESULT, Do.STRIKE]),
         (Event.STATUS, []),
         (Event.STATUS, []),
-        (Event.RESULT, [Do.NOTE, Do.GO_ON, Command.RELEASE, Do.RETIRE]),
+        (Event.RESULT, [Do.NOTE, Do.WAKE_WAITING, Command.RELEASE, Do.RETIRE]),
     ]
     # Before it is sent, and after: who opens in between gets it, too
     assert (goal.state, caller.looks) == (State.DONE, 2)

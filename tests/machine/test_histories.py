@@ -24,7 +24,7 @@ COUNT = int(os.environ.get("BT_HISTORIES", "50000" if THOROUGH else "5000"))
 RARE = {(State.NOT_RECEIVED, event) for event in Event} | {
     (State.PRESUMED_NOT_RECEIVED, Event.REPLACED),
     (State.REPLACED, Event.FEEDBACK),
-    (State.REPLACED, Event.PROCESS_EXITING),
+    (State.REPLACED, Event.PARKED),
     (State.REPLACED, Event.RESULT_UNKNOWN),
     (State.REPLACED, Event.SERVER_AMBIGUOUS),
     (State.UNWANTED, Event.SERVER_AMBIGUOUS),
@@ -43,14 +43,7 @@ def test_no_history_breaks_a_rule() -> None:
 def test_the_histories_come_everywhere() -> None:
     """Every decision of the table, every outcome and every end: or silence proves nothing."""
     unreached = {key for key, step in TABLE.items() if step is not drop}
-    unreached -= {  # a caller that is in order tells none of these
-        (State.QUEUED, Event.INVALID),
-        (State.UNWANTED, Event.SEND_FAILED),
-        (State.SENDING, Event.NODE_CLOSED),  # a node that goes has interrupted its goals before
-        (State.EXECUTING, Event.NODE_CLOSED),
-        (State.REPLACED, Event.NODE_CLOSED),
-    }
-    unreached -= RARE
+    unreached -= RARE | {(State.UNWANTED, Event.SEND_FAILED)}  # no caller that is in order tells it
     unseen: set[object] = {*Outcome, *End} - {Outcome.UNEXPECTED_RESULT}  # which a leaf decides
 
     for seed in range(6_000):

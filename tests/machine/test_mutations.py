@@ -18,10 +18,10 @@ from bt_actions.goals.facts import Facts
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.resources import Answer, Resources
-from bt_actions.goals.steps import canceling, lost, running, unanswered
+from bt_actions.goals.steps import canceling, lost, requested, running
 from bt_actions.goals.steps.step import Does, Step, drop
 from bt_actions.goals.table import TABLE
-from bt_actions.goals.terms import UNANSWERED, Command, Event, State
+from bt_actions.goals.terms import MAY_STILL_BE_ACCEPTED, Command, Event, State
 from bt_actions.servers import replies
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import admission, handover
@@ -49,7 +49,7 @@ def mutation(make: Callable[[Patch], None]) -> Callable[[Patch], None]:
     return make
 
 
-UNWANTED = (State.CANCELING, *UNANSWERED)
+UNWANTED = (State.CANCELING, *MAY_STILL_BE_ACCEPTED)
 
 
 def decide(patch: Patch, event: Event, does: Does, *states: State) -> None:
@@ -66,16 +66,16 @@ def ignore(patch: Patch, event: Event, *states: State) -> None:
 @mutation
 def forgets_the_cancel_before_acceptance(patch: Patch) -> None:
     def accepted(goal: Facts, detail: Any) -> State:
-        state = unanswered.turned_up(goal, detail)
+        state = requested.turned_up(goal, detail)
         goal.commands.remove(Command.CANCEL)
         return state
 
-    decide(patch, Event.ACCEPTED, accepted, *UNANSWERED)
+    decide(patch, Event.ACCEPTED, accepted, *MAY_STILL_BE_ACCEPTED)
 
 
 @mutation
 def begins_though_it_was_interrupted(patch: Patch) -> None:
-    decide(patch, Event.ACCEPTED, unanswered.begin, *UNANSWERED)
+    decide(patch, Event.ACCEPTED, requested.begin, *MAY_STILL_BE_ACCEPTED)
 
 
 @mutation
@@ -206,7 +206,7 @@ def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
 
 
 @mutation
-def minds_only_the_goals_of_its_own_node(patch: Patch) -> None:
+def looks_only_at_the_goals_of_its_own_node(patch: Patch) -> None:
     patch.setattr(
         Admission,
         "_conflicts",

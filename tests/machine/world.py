@@ -36,7 +36,7 @@ class Mood(Enum):
 
     OBEYS = "obeys"
     REFUSES = "refuses"
-    DEAF = "is deaf"
+    UNHEARING = "hears nothing"
 
 
 @dataclass(eq=False, slots=True)
@@ -72,7 +72,7 @@ class ModelServer:
     cut: bool = False
     """The link is down: nothing arrives, but it runs on."""
     shown: bool = True
-    """Discovery shows it; a ghost is shown without being alive."""
+    """Discovery shows it; a dead server is shown, too, for a while."""
     matched: bool = True
     """Its services are matched, too; without them it is shown, and not ready."""
     mood: Mood = Mood.OBEYS
@@ -263,7 +263,7 @@ class World:
         elif message.kind == "probe":
             self._reply(message, "probe answer", None)
         elif message.kind == "cancel":
-            if server.mood is not Mood.DEAF:
+            if server.mood is not Mood.UNHEARING:
                 self._reply(message, "cancel answer", self._cancel(server, job))
         elif job is None or job.status == UNANSWERED:
             self._reply(message, "result", 0)
@@ -367,10 +367,10 @@ class World:
         return [server for server in self.servers if server.alive and not server.cut]
 
     def _kill(self, server: ModelServer) -> None:
-        server.alive = server.cut = False  # its ghost stays in discovery until the lease runs out
+        server.alive = server.cut = False  # it stays in discovery until the lease runs out
 
     def _crash(self, server: ModelServer) -> None:
-        """It dies, and what watches over it starts it anew; its ghost is shown beside it."""
+        """It dies, and what watches over it starts it anew; the dead one is shown beside it."""
         self._kill(server)
         if self._startable():
             self.start(server.action)

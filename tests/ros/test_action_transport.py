@@ -203,11 +203,11 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
     until(client.server_is_ready)
     goal_id = uuid.uuid4().bytes
     client.send(goal_id, MoveRobotAction.Goal(distance=5.0))
-    until(lambda: heard.goals, meanwhile=client.pump)
+    until(lambda: heard.goals, meanwhile=client.deliver_arrived)
     context.shutdown()
     client.cancel(goal_id)
     client.ask_result(goal_id)
-    until(lambda: heard.results, meanwhile=client.pump)
+    until(lambda: heard.results, meanwhile=client.deliver_arrived)
     assert heard.results[0][:2] == (goal_id, 5)
     assert journal.ends() == ["canceled"]
     client.close()
@@ -237,7 +237,7 @@ def test_a_destroyed_client_is_silent_and_refuses_to_send(
     request(client, "result")
     client.close()
     client.close()
-    client.pump()
+    client.deliver_arrived()
     assert not heard.results
     with pytest.raises(Exception, match=r"(?i)destroy|invalid|pointer"):
         request(client, "goal")

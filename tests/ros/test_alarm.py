@@ -15,7 +15,7 @@ from bt_actions.traffic.scheduler import AT_LEAST_EVERY
 from tests.support.waiting import until
 
 
-class Attended:
+class Scheduled:
     """A line that wants nothing, but that the next look comes when it says so."""
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class Attended:
         """and seconds for which it calls `wake_by` in its next look."""
         self.asked: list[float] = []
 
-    def attend(self, now: float) -> float:
+    def run_due(self, now: float) -> float:
         self.looks.append(now)
         if self.asks is not None:
             self.asked.append(now + self.asks)
@@ -37,8 +37,8 @@ class Attended:
 
 
 @pytest.fixture
-def attended() -> Iterator[Attended]:
-    each = Attended()
+def attended() -> Iterator[Scheduled]:
+    each = Scheduled()
     with each.host.lock:
         each.host.scheduler.add(each)
     until(lambda: len(each.looks) > 1)
@@ -47,7 +47,7 @@ def attended() -> Iterator[Attended]:
         each.host.scheduler.remove(each)
 
 
-def test_who_asks_to_be_woken_while_it_is_attended_is_heard(attended: Attended) -> None:
+def test_who_asks_to_be_woken_while_it_is_attended_is_heard(attended: Scheduled) -> None:
     """The alarm would otherwise look again after 0.2 s."""
     lateness = []
     for _ in range(10):  # one of them may be late because the machine is
@@ -59,7 +59,7 @@ def test_who_asks_to_be_woken_while_it_is_attended_is_heard(attended: Attended) 
     assert min(lateness) < AT_LEAST_EVERY / 4
 
 
-def test_work_is_no_standstill() -> None:
+def test_work_is_no_stall() -> None:
     """A garbage collection, say: threads that take in what is sent do not wait for it."""
     began, idle_before = time.monotonic(), module._idle(0.0)
     end = time.thread_time() + STOOD_STILL
@@ -68,7 +68,7 @@ def test_work_is_no_standstill() -> None:
     assert time.monotonic() - began - (module._idle(0.0) - idle_before) >= STOOD_STILL - 0.01
 
 
-def test_the_alarm_notices_what_happens_while_it_works(attended: Attended) -> None:
+def test_the_alarm_notices_what_happens_while_it_works(attended: Scheduled) -> None:
     with attended.host.lock:
         threading.Event().wait(4 * STOOD_STILL)
         assert attended.host.stalls.answers_take(time.monotonic())

@@ -39,10 +39,10 @@ def test_so_many_are_sent_and_each_answer_makes_room_for_one(cancels: Sent) -> N
 
 
 def test_what_is_not_answered_makes_room_after_a_while(cancels: Sent) -> None:
-    cancels.go_on(ANSWERED_WITHIN - 0.1)
+    cancels.send_more(ANSWERED_WITHIN - 0.1)
     assert cancels.sent == GOALS[:AT_MOST]
     for rounds in (1, 2):
-        cancels.go_on(rounds * ANSWERED_WITHIN)
+        cancels.send_more(rounds * ANSWERED_WITHIN)
     assert cancels.sent == GOALS
 
 
@@ -57,13 +57,13 @@ def test_who_is_asked_for_again_keeps_its_turn(cancels: Sent) -> None:
 def test_what_has_ended_is_not_asked_for_and_makes_room(cancels: Sent) -> None:
     cancels.forget(GOALS[AT_MOST])
     cancels.forget(GOALS[0])
-    cancels.go_on(0.1)
+    cancels.send_more(0.1)
     assert cancels.sent == [*GOALS[:AT_MOST], GOALS[AT_MOST + 1]]
 
 
 def test_another_client_hears_no_answers_to_what_was_asked_before(cancels: Sent) -> None:
     cancels.forget_answers(GOALS)
-    cancels.go_on(0.1)
+    cancels.send_more(0.1)
     assert cancels.sent == GOALS[: 2 * AT_MOST]
 
 

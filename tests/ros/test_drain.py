@@ -34,7 +34,7 @@ def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> 
     """One whose server has gone."""
     goal = Goal(b"1" * 16, "/move", LIMITS, Now(0.0, 0.0))
     goal.outcome, goal.end, goal.state = Outcome.SERVER_LOST, end, state
-    nothing = dict.fromkeys(("pump", "mind"), lambda *_: None)
+    nothing = dict.fromkeys(("deliver_arrived", "apply_deadlines_guarded"), lambda *_: None)
     endpoint: Any = Endpoint(
         in_doubt=lambda _: 0.0, is_parents=False, cancels=Cancels(), tell=tell, **nothing
     )
@@ -45,7 +45,7 @@ def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> 
 
 def tell(handle: GoalHandle, event: Event) -> None:
     """Only what is the end of a drain."""
-    if event is Event.DRAINED:
+    if event is Event.DRAIN_GAVE_UP:
         handle.goal.on(event, Now(0.0, 0.0))
 
 
@@ -82,7 +82,7 @@ def test_who_is_looked_out_for_is_waited_for_but_not_without_end() -> None:
     )
     host.now += LOOKS_OUT_AT_MOST
     assert drain.step(host.now) == Done([lost])
-    assert lost.goal.waited_for
+    assert lost.goal.drain_gave_up
     assert Drain(host, [lost]).step(host.now) == Done([lost]), "once"
 
 

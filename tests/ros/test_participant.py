@@ -58,7 +58,7 @@ def of_a_runner(_: int) -> None:
         pass
 
 
-def of_a_lookout(domain: int) -> None:
+def of_a_rediscovery(domain: int) -> None:
     sight = SecondParticipant(domain, "/")
     sight.looking = False
     sight.close()
@@ -68,11 +68,11 @@ def of_a_lookout(domain: int) -> None:
     ("come_and_go", "name"),
     [
         (of_a_runner, "bt_actions_"),
-        (of_a_lookout, "bt_actions_lookout_"),
+        (of_a_rediscovery, "bt_actions_rediscovery_"),
         (lambda _: cleanup(look=0.1, patience=0.1, wanted=[]), "bt_actions_cleanup"),
         (lambda _: parameters_in(["-p", "a:=1"]), "bt_actions_"),
     ],
-    ids=["runner", "lookout", "cleanup", "parameters"],
+    ids=["runner", "rediscovery", "cleanup", "parameters"],
 )
 def test_participants_of_our_own_fall_silent_before_they_go(
     monkeypatch: pytest.MonkeyPatch, domain: int, come_and_go: Callable[[int], object], name: str

@@ -128,7 +128,8 @@ def test_what_is_not_accounted_for_stays(
         goal = journal.wait_for("received").goal
         with process.lock:
             [handle] = traffic_of(node).endpoint(leaf.action_type, name).goals.values()
-            handle.endpoint.tell(handle, Event.PROCESS_EXITING)
+            handle.endpoint.tell(handle, Event.PARKED)
+            handle.endpoint.tell(handle, Event.ABANDONED)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
 
 

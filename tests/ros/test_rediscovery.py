@@ -30,7 +30,7 @@ now = time.monotonic
 
 @pytest.fixture
 def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
-    """Make a leaf's node blind to its server, from now on, and deaf and dumb."""
+    """Make a leaf's node blind to its server, from now on, so that neither hears the other."""
 
     def blind(leaf: MoveRobot) -> None:
         client = leaf._endpoint.transport
@@ -57,8 +57,8 @@ def is_of(route: way.Route, name: str) -> bool:
 
 def nobody_looks() -> bool:
     """Nobody has anything to look for, and no participant is being closed."""
-    threads = [each for each in threading.enumerate() if each.name == "bt_actions-lookout"]
-    known = rediscovery._lookouts.values()
+    threads = [each for each in threading.enumerate() if each.name == "bt_actions-rediscovery"]
+    known = rediscovery._by_domain.values()
     return len(threads) <= len(known) and not any(each._missing for each in known)
 
 
@@ -92,7 +92,7 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
         pytest.param(True, id="it is canceled"),
     ],
 )
-def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
+def test_who_is_not_heard_after_a_stall_hears_of_its_goal_all_the_same(
     serve: Any, name: str, node: Any, monkeypatch: pytest.MonkeyPatch, canceled: bool
 ) -> None:
     """What the node asks gets lost, and what it is told, though the server is in sight."""
@@ -121,7 +121,7 @@ def test_who_is_not_heard_after_a_standstill_hears_of_its_goal_all_the_same(
 def test_nobody_looks_where_nothing_was_ever_lost(
     name: str, node: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_domain(node), "lost_sight", False)
+    monkeypatch.setattr(_domain(node), "ever_lost_sight", False)
     leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=1.5))
     with TreeRunner(leaf, node=node) as runner:
         runner.start()
@@ -139,7 +139,7 @@ def test_an_action_that_had_a_server_once_is_looked_for(
 ) -> None:
     """Also by an endpoint that is newer than the loss, where no other endpoint saw it."""
     serve()
-    monkeypatch.setattr(_domain(node), "lost_sight", False)
+    monkeypatch.setattr(_domain(node), "ever_lost_sight", False)
     for again in (False, True):
         leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=20.0))
         leaf.setup(node=node)

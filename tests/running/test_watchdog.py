@@ -25,13 +25,13 @@ class Guarded:
         self.traffic.host.stalls.answers_take.return_value = 0.0
         self.dog = Watchdog(self.traffic, self.goals)
         self.dog.begin(ENDS_AT)
-        self.dog.mind()
+        self.dog.watch()
 
     def look_until(self, end: float, *, begin: float = ENDS_AT) -> bool:
         """Look now and then; return whether the goal was canceled."""
         now = begin
         while now < end:
-            self.dog.attend(now)
+            self.dog.run_due(now)
             now += LOOK
         return bool(self.traffic.interrupt.called)
 
@@ -82,12 +82,12 @@ def test_nothing_is_given_up_while_a_stall_is_borne_with(run: Guarded) -> None:
 
 def test_it_is_attended_to_while_a_goal_is_wanted(run: Guarded) -> None:
     scheduler = run.traffic.host.scheduler
-    run.dog.mind()
+    run.dog.watch()
     scheduler.add.assert_called_once_with(run.dog)
     run.goals.wanted = []
-    run.dog.attend(ENDS_AT)
+    run.dog.run_due(ENDS_AT)
     scheduler.remove.assert_called_once_with(run.dog)
-    run.dog.mind()
+    run.dog.watch()
     assert scheduler.add.call_count == 2
 
 

@@ -316,16 +316,16 @@ def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
             warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
             pid = os.fork()
         if pid == 0:
-            minds = (
+            sees_to_nothing = (
                 process.lock.acquire(timeout=5.0)
-                and not process.scheduler.attended
+                and not process.scheduler.scheduled
                 and not process.domains
             )
-            os._exit(0 if minds else 1)
+            os._exit(0 if sees_to_nothing else 1)
         assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
         over.set()
         holder.join()
-        assert process.scheduler.attended
+        assert process.scheduler.scheduled
     assert journal.ends() == ["canceled"]
     host.close_server(name)
     record.outcome = "CANCELED by the parent; its child knows no goal and gets the lock"
@@ -485,7 +485,7 @@ def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_no
     def sees(leaf: MoveRobot) -> bool:
         with process.lock:
             assert leaf._endpoint is not None
-            return leaf._endpoint.look(time.monotonic()) is Server.READY
+            return leaf._endpoint.observe_and_tell(time.monotonic()) is Server.READY
 
     def count(what: str) -> int:
         return [state(leaf) for leaf in leaves].count(what)

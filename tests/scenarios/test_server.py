@@ -65,44 +65,44 @@ def until_shown(node: Any, name: str, servers: int) -> None:
 def until_both_hear(leaf: MoveRobot, node: Any) -> None:
     """Set the leaf up, and wait until two servers answer its client, and so will hear it later."""
     leaf.setup(node=node)
-    line = leaf._endpoint
-    assert line is not None
+    endpoint = leaf._endpoint
+    assert endpoint is not None
 
     def state_now() -> Server:
         with process.lock:
-            return line.look(time.monotonic())
+            return endpoint.observe_and_tell(time.monotonic())
 
-    until(lambda: state_now() is Server.AMBIGUOUS, 9.0, meanwhile=line.pump)
-    as_if_nothing_was_asked(line)
+    until(lambda: state_now() is Server.AMBIGUOUS, 9.0, meanwhile=endpoint.deliver_arrived)
+    as_if_nothing_was_asked(endpoint)
 
 
 def until_heard(leaf: MoveRobot, node: Any) -> None:
     """Set the leaf up, and wait until its server answers its client: so neither is in any doubt."""
     leaf.setup(node=node)
-    line = leaf._endpoint
-    assert line is not None
+    endpoint = leaf._endpoint
+    assert endpoint is not None
     asked_at = float("-inf")
 
     def is_heard() -> bool:
         nonlocal asked_at
         with process.lock:
             now = time.monotonic()
-            if line.look(now) is Server.READY and now - asked_at > PROBE_EVERY:
+            if endpoint.observe_and_tell(now) is Server.READY and now - asked_at > PROBE_EVERY:
                 asked_at = now
-                line.probe()
-            return line.transport.reachability.heard
+                endpoint.probe()
+            return endpoint.transport.reachability.heard
 
-    until(is_heard, 9.0, meanwhile=line.pump)
-    as_if_nothing_was_asked(line)
+    until(is_heard, 9.0, meanwhile=endpoint.deliver_arrived)
+    as_if_nothing_was_asked(endpoint)
 
 
-def as_if_nothing_was_asked(line: ActionEndpoint) -> None:
-    """Have the line begin anew with the servers that it sees."""
+def as_if_nothing_was_asked(endpoint: ActionEndpoint) -> None:
+    """Have the endpoint begin anew with the servers that it sees."""
     with process.lock:
-        line.pump()
-        line.watch = ServerWatch()
-        for probe in line._last_probes:
-            line.transport.forget(probe)
+        endpoint.deliver_arrived()
+        endpoint.watch = ServerWatch()
+        for probe in endpoint._last_probes:
+            endpoint.transport.forget(probe)
 
 
 class TestKilled:
@@ -600,9 +600,9 @@ class TestStopped:
         context.init(domain_id=domain)
         gone = Node("gone", context=context)
         first.setup(node=gone)
-        line = first._endpoint
-        assert line is not None
-        ticking = lambda: (line.pump(), first.tick_once())  # noqa: E731
+        endpoint = first._endpoint
+        assert endpoint is not None
+        ticking = lambda: (endpoint.deliver_arrived(), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
         first.shutdown()
         assert first.end is End.UNKNOWN
@@ -642,13 +642,13 @@ class TestStopped:
         context.init(domain_id=domain)
         gone = Node("gone", context=context)
         first.setup(node=gone)
-        line = first._endpoint
-        assert line is not None
-        ticking = lambda: (line.pump(), first.tick_once())  # noqa: E731
+        endpoint = first._endpoint
+        assert endpoint is not None
+        ticking = lambda: (endpoint.deliver_arrived(), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
         killed = victim.kill()
         journal = successor.open(name)
-        until(lambda: line.watch.is_crowded)
+        until(lambda: endpoint.watch.is_crowded)
         first.shutdown()
         assert first.end is End.UNKNOWN
         gone.destroy_node()
@@ -779,9 +779,13 @@ class TestRestarted:
             assert runner.wait(20.0) is Status.SUCCESS
             first = leaf.history[0]
             said = (first.outcome, first.end)
-            if phase == "SENDING":  # until the ghost is gone, it might still be accepted
+            if phase == "SENDING":  # while the dead one is shown, it might still be accepted
                 assert first.outcome is Outcome.ACCEPT_TIMEOUT
-                until(lambda: first.end is End.SERVER_GONE or ended(first), STOCK, what="ghost")
+                until(
+                    lambda: first.end is End.SERVER_GONE or ended(first),
+                    STOCK,
+                    what="gone",
+                )
                 assert first.end in (End.SERVER_GONE, End.NEVER_STARTED)
         if phase != "SENDING":
             wanted = Outcome.RESULT_TIMEOUT if phase == "CANCELING" else Outcome.SERVER_LOST
@@ -1067,10 +1071,10 @@ class TestTwice:
             until(lambda: {report.name for report in runner.unaccounted} == names, 10.0)
         record.outcome = "told as unaccounted for, by its name"
 
-    def test_a_ghost_is_not_a_second_server(
+    def test_a_dead_server_still_shown_is_not_a_second_one(
         self, new_host: HostFactory, name: str, node: Any, record: Record
     ) -> None:
-        """A server was killed (stock lease: a ghost for 20 s), its successor is up: a new goal"""
+        """A server was killed (stock lease: shown for 20 s), its successor is up: a new goal"""
         victim, successor = new_host(short_lease=False), new_host(short_lease=False)
         victim.open(name)
         warm = MoveRobot("warm", 0.1, action_name=name)

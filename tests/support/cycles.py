@@ -29,7 +29,7 @@ from bt_actions.simulation import Script, ScriptedServer
 from tests.support.waiting import until
 
 NAME = "/cycles/move"
-OF_THE_PROCESS = {"bt_actions-lookout", "bt_actions-alarm"}
+OF_THE_PROCESS = {"bt_actions-rediscovery", "bt_actions-alarm"}
 """Threads that are begun when they are needed, and rest a while before they end: one of each."""
 ENDS_IN = 10.0
 """Seconds that a thread has to end when it has been told to."""

@@ -1,7 +1,7 @@
 """Steps of a goal that is not wanted any more: the server is asked to cancel it until it has ended.
 
-`timeout.cancel` runs to the end of the goal, not to an answer. When it has passed the leaf goes on,
-and the questions do, too.
+`timeout.cancel` runs to the end of the goal, not to an answer. When it has passed the leaf is free;
+the questions are repeated all the same.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def cancel_answered(goal: Facts, detail: Any) -> State:
 
 @leads_to(State.DONE)
 def cancel_due(goal: Facts, detail: Any) -> State:
-    """The leaf has waited long enough; the questions go on, unless the status shows the end."""
+    """The leaf is free; the server is asked on and on, unless the status shows the end."""
     if goal.lost_result.status is None:
         goal.settle_as_planned()
         goal.ask()
@@ -116,13 +116,13 @@ def ask_again(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def drained(goal: Facts, detail: Any) -> State:
+def drain_gave_up(goal: Facts, detail: Any) -> State:
     """Nobody waits any longer; what is not known by now is UNKNOWN, and may become known."""
-    goal.waited_for = True
+    goal.drain_gave_up = True
     if goal.lost_result.questions > 0:
         return goal.end_by_status()
     goal.settle_as_planned()
-    if goal.unconfirmed:
+    if goal.may_still_be_accepted:
         goal.end = End.UNKNOWN  # canceled if it turns up all the same
     return goal.state
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from bt_actions.goals.facts import Facts
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.goals.steps import unanswered
+from bt_actions.goals.steps import requested
 from bt_actions.goals.steps.step import leads_to
 from bt_actions.goals.terms import Command, Event, State
 
@@ -26,10 +26,10 @@ def server_lost(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.LOST, State.DONE)
-def node_closed(goal: Facts, detail: Any) -> State:
+def parked(goal: Facts, detail: Any) -> State:
     """Keep the goal for the next node that sees its server; what is not known stays UNKNOWN."""
     goal.settle_as_planned(Outcome.CANCELED, "its node was closed")
-    if goal.unconfirmed:
+    if goal.may_still_be_accepted:
         goal.end = End.UNKNOWN
     return _keep(goal)
 
@@ -50,7 +50,7 @@ def returned(goal: Facts, detail: Any) -> State:
         goal.commands.append(Command.CANCEL)
         return State.NOT_RECEIVED
     goal.end = End.UNKNOWN
-    goal.waited_for = False  # there is somebody again who can tell
+    goal.drain_gave_up = False  # there is somebody again who can tell
     goal.ask()
     if goal.accepted:
         return State.CANCELING
@@ -63,7 +63,7 @@ def returned(goal: Facts, detail: Any) -> State:
 @leads_to(State.CANCELING)
 def runs(goal: Facts, detail: Any) -> State:
     """It runs, so its server is back: canceled at once."""
-    return (returned if goal.accepted else unanswered.turned_up)(goal)
+    return (returned if goal.accepted else requested.turned_up)(goal)
 
 
 @leads_to()
@@ -76,10 +76,14 @@ def ask_another(goal: Facts, detail: Any) -> State:
     return goal.state
 
 
+@leads_to()
+def drain_gave_up(goal: Facts, detail: Any) -> State:
+    """Nobody waits any longer."""
+    goal.drain_gave_up = True
+    return State.LOST
+
+
 @leads_to(State.DONE)
-def exiting(goal: Facts, detail: Any) -> State:
-    """CANCELED; what is not known by now stays UNKNOWN."""
-    goal.settle_as_planned(Outcome.CANCELED, "the process ended")
-    if goal.unconfirmed:
-        goal.end = End.UNKNOWN
-    return goal.end_by_status()
+def abandoned(goal: Facts, detail: Any) -> State:
+    """Forget it; what is not known by now stays so."""
+    return State.DONE

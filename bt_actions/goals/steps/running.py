@@ -26,14 +26,14 @@ from bt_actions.goals.terms import (
 @leads_to()
 def feedback(goal: Facts, detail: Any) -> State:
     """The silence is over; timeout.feedback begins anew."""
-    goes_on(goal, detail)
+    still_runs(goal, detail)
     if goal.lost_result.status is None:
         goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback)
     return State.EXECUTING
 
 
 @leads_to()
-def goes_on(goal: Facts, detail: Any) -> State:
+def still_runs(goal: Facts, detail: Any) -> State:
     """It runs, whoever has denied it, or, long ago, shown that it had ended."""
     goal.feedback = detail
     goal.lost_result.denials = 0
@@ -56,7 +56,7 @@ def status(goal: Facts, detail: Any) -> State:
 
 @leads_to(State.DONE)
 def ask_for_result(goal: Facts, detail: Any) -> State:
-    """Ask again; after several questions believe the status, or go on asking."""
+    """Ask again; after several questions believe the status."""
     if goal.lost_result.asked_in_vain():
         goal.settle_as_planned(Outcome.SERVER_LOST, f"{goal.server} finished, but gave no result")
         return goal.end_by_status()

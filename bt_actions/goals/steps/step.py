@@ -1,6 +1,7 @@
 """What a step of the table is: it changes the facts of a goal, and says where the goal is then.
 
-A step sends nothing: what its caller has to do is left in the goal's `commands`.
+A step sends nothing: what its caller has to do is left in the goal's `commands`. The first line of
+its docstring is data: docs/goal.md shows it.
 """
 
 from __future__ import annotations
@@ -31,7 +32,10 @@ class Step:
 
 
 def leads_to(*to: State) -> Callable[[Does], Step]:
-    """Make a function a step, which leads to one of these states or stays where it is."""
+    """Make a function a step, which leads to one of these states or stays where it is.
+
+    What docs/goal.md says of it is the first line of the function's docstring.
+    """
     return lambda does: Step(does, frozenset(to), (does.__doc__ or "").splitlines()[0].rstrip("."))
 
 

@@ -32,7 +32,7 @@ def granted(goal: Facts, detail: Any) -> State:
 def send(goal: Facts, detail: Any) -> State:
     """Send it; until the server says how it ended, its end is UNKNOWN."""
     goal.deadlines.disarm(Event.SERVER_DUE)
-    goal.deadlines.hold(0.0, goal.deadlines.now)  # it was for a server that is out of sight
+    goal.deadlines.suspend(0.0, goal.deadlines.now)  # it was for a server that is out of sight
     goal.deadlines.arm(Event.ACCEPT_DUE, goal.timeouts.accept)
     goal.end = End.UNKNOWN
     goal.commands.append(Command.SEND)

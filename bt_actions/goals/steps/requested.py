@@ -1,8 +1,8 @@
-"""Steps of a goal whose request is out and has no answer yet.
+"""Steps of a goal whose request is out, and was not accepted yet.
 
 While it is wanted, an answer is waited for. After that the server is asked by canceling, which
 stops the goal as well: it may have it, or get it yet. If the server denies it for long enough, the
-tree goes on; whenever it turns up, it is canceled.
+tree need not wait; whenever it turns up, it is canceled.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def accept_due(goal: Facts, detail: Any) -> State:
 
 @leads_to(State.PRESUMED_NOT_RECEIVED, State.NOT_RECEIVED)
 def presume(goal: Facts, detail: Any) -> State:
-    """The leaf may go on; if the server has denied the goal just now: NEVER_STARTED."""
+    """The leaf is free; if the server has denied the goal just now: NEVER_STARTED."""
     goal.settle_as_planned()
     if not goal.asking.denied_lately(goal.steady):
         goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience)
@@ -94,7 +94,7 @@ def _denied_for_long(goal: Facts) -> State:
 def denied_again(goal: Facts, detail: Any) -> State:
     """Denied for 30 s, nobody need wait for it any more."""
     goal.asking.answered(detail, goal.steady)
-    if not goal.waited_for:  # after its server was back, it was UNKNOWN until now
+    if not goal.drain_gave_up:  # after its server was back, it was UNKNOWN until now
         goal.end = End.NEVER_STARTED
     return _denied_for_long(goal)
 

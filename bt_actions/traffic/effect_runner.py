@@ -1,7 +1,7 @@
 """Carries out what the goals of one endpoint have decided: records, sends, asks, cancels, reports.
 
-What was true at the decision is looked at again here. Decides nothing about a goal; what fails is
-told to it. All under the host's lock.
+What was true at the decision is looked at again here, and what fails is told to the goal. All
+under the host's lock.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from bt_actions.traffic.handle import Endpoint, GoalHandle
 from bt_actions.traffic.host import Host
 
 
-class Carrier:
-    """For the goals of one endpoint."""
+class EffectRunner:
+    """Runs the effects of one endpoint."""
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class Carrier:
         self._endpoint, self._host, self._domain, self._failed = endpoint, host, domain, failed
         self._does: dict[Do | Command, Callable[[GoalHandle], None]] = {
             Do.NOTE: lambda handle: handle.reporter.note(handle),
-            Do.GO_ON: self._let_go_on,
+            Do.WAKE_WAITING: self._wake_waiting,
             Do.RECORD: self._record_again,
             Do.STRIKE: lambda handle: host.record.strike(handle.goal.id),
             Do.RETIRE: endpoint.retire,
@@ -55,7 +55,7 @@ class Carrier:
             self._put_on_record(handle)
             endpoint.transport.send(handle.goal.id, effect.message)
             known = handle.replies.sent_to
-            endpoint.see()
+            endpoint.observe()
             handle.replies.sent(endpoint.watch)  # who opened since got it, too
             if handle.replies.sent_to != known:
                 self._put_on_record(handle)
@@ -106,8 +106,8 @@ class Carrier:
         if handle.goal.id in self._host.record:
             self._put_on_record(handle)
 
-    def _let_go_on(self, _: GoalHandle) -> None:
-        """Wake those of all nodes whose goals wait: there may be room, or nothing in the way."""
-        waiting = [each.reporter for each in self._domain.open if each.is_waited_for]
+    def _wake_waiting(self, _: GoalHandle) -> None:
+        """Wake those of all nodes whose goals wait: there may be room, or no conflict any more."""
+        waiting = [each.reporter for each in self._domain.open if each.has_unsent]
         for reporter in dict.fromkeys(waiting):
             reporter.notify(None)
