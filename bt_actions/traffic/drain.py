@@ -62,7 +62,9 @@ class Drain:
             for handle in self._wanted:
                 handle.endpoint.tell(handle, Event.INTERRUPTED)
             self._waits = [
-                each for each in self._wanted if not each.is_over and not each.goal.drain_gave_up
+                handle
+                for handle in self._wanted
+                if _may_end(handle) and not handle.goal.drain_gave_up
             ]
             self._deadline = 0.0
             self._began = now = host.steady()
@@ -84,7 +86,7 @@ class Drain:
                     self._deliver_arrived()
                     for handle in self._waits:
                         handle.endpoint.apply_deadlines_guarded(handle)
-                    self._waits = [handle for handle in self._waits if not handle.is_over]
+                    self._waits = [handle for handle in self._waits if _may_end(handle)]
                     if self._waits:
                         return Sleep(LOOK)
                 self._gives_up_at = now + LAST_REQUESTS
@@ -129,3 +131,8 @@ class Drain:
         if handles:
             within = max(handle.goal.drains_within for handle in handles)
             self._deadline = max(self._deadline, now + within + JUST_PAST)
+
+
+def _may_end(handle: GoalHandle) -> bool:
+    """Whether its end is not known and may become known: nothing more comes of what is done."""
+    return not handle.is_over and handle.goal.state is not State.DONE

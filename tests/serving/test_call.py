@@ -85,7 +85,7 @@ def test_a_run_that_left_a_goal_behind_ends_with_3(
     (folder / "move.yaml").write_text(MOVE.format(server=name, cancel="500 ms"))
     journal = serve("1:ignore_cancel")
     serve_trees()
-    process = call("move", "--set", "distance=30.0", "-q")
+    process = call("move", "--set", "distance=6.0", "-q")
     journal.wait_for("accepted", within=20.0)
     process.send(signal.SIGINT)
     assert process.wait(60.0) == 3, process
