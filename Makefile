@@ -1,7 +1,6 @@
 # Sets up .venv and runs the project in it. Every step leaves a stamp, so that a second call has nothing to do.
 
 PYTHON ?=
-SLACK ?= 1.0
 WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
@@ -14,10 +13,10 @@ PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees laun
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
 unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup dev demo quick test docs chaos soak benchmark lint types format colcon clean python colcon-python
+.PHONY: help setup dev demo quick test docs chaos soak bench bench-short lint types format colcon clean python colcon-python
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 
 setup: $(VENV)/runtime.stamp ## make .venv with ROS 2, the interfaces and bt_actions
 
@@ -50,9 +49,11 @@ chaos: dev ## every scenario with killed processes and cut networks, and storms;
 soak: dev ## 20,000 goals with every fault; an hour or two
 	$(BIN)/python scripts/soak.py
 
-benchmark: dev ## are checking a large tree, and RunTree, as fast as promised? fails where not
-	$(BIN)/python benchmarks/check.py --slack $(SLACK)
-	$(BIN)/python benchmarks/serve.py --slack $(SLACK)
+bench: dev ## measure everything beside a yardstick, twenty minutes or so; writes docs/performance.md
+	$(BIN)/python -m benchmarks --page docs/performance.md
+
+bench-short: dev ## measure rows 1, 3, 5 and 8; fails where one is far beyond its limit
+	$(BIN)/python -m benchmarks --short
 
 types: dev ## mypy --strict
 	$(BIN)/mypy --strict

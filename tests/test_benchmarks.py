@@ -1,91 +1,62 @@
-"""The gates in benchmarks/ fail when what they promise does not hold."""
+"""What benchmarks/ makes of what was measured; the measuring itself is for `make bench`."""
 
 from __future__ import annotations
 
-import runpy
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
 
 import pytest
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
-CHECK = runpy.run_path(str(BENCHMARKS / "check.py"))
-WITHIN = {"parse": 1.0, "check": 2.9, "load": 5.3, "check_large": 57.0, "times_larger": 10.0}
+from benchmarks.harness import Family, Figures, Measured, Row, hold_within, measure, table
+from benchmarks.loading import text_of
+
+RATIO = Row("1", "a goal", "by hand", ("tree", "ms"), ("hand", "ms"), 1.5)
+MORE = Row("2", "a start", "by hand", ("tree", "ms"), ("hand", "ms"), 2.0, is_difference=True)
+ALONE = Row("3", "memory", "", ("tree", "ms"), None, 3.0, "MB")
 
 
-def rounds(**took: float) -> list[Any]:
-    """Two rounds as told, and one in which everything but the parser was slow."""
-    usual = {**WITHIN, **took}
-    odd = {**usual, "check": 9.0, "load": 30.0, "check_large": 300.0}
-    return [CHECK["Round"](**each) for each in (usual, odd, usual)]
+def taken(*rounds: tuple[float, float]) -> list[dict[str, Figures]]:
+    return [{"tree": {"ms": tree}, "hand": {"ms": hand}} for tree, hand in rounds]
 
 
-def kept(**took: float) -> list[bool]:
-    """Which of the promises about parser, build and growth are kept."""
-    return [promise.holds(rounds(**took)) for promise in CHECK["PROMISES"]]
+def test_sides_are_measured_in_turns() -> None:
+    order: list[str] = []
+
+    def side(name: str) -> Figures:
+        order.append(name)
+        return {"ms": 1.0}
+
+    family = Family([RATIO], {name: lambda name=name: side(name) for name in ("hand", "tree")})  # type: ignore[misc]
+    said: list[str] = []
+    [measured] = measure(family, 3, said.append)
+    assert order == ["hand", "tree"] * 3
+    assert len(measured.rounds) == len(said) == 3
 
 
-def test_what_is_within_its_limits_holds() -> None:
-    assert kept() == [True, True, True]
+@pytest.mark.parametrize(("row", "value"), [(RATIO, 2.0), (MORE, 1.0), (ALONE, 4.0)])
+def test_a_value_is_the_median_of_what_was_compared_within_a_round(row: Row, value: float) -> None:
+    rounds = taken((2.0, 1.0), (4.0, 3.0), (90.0, 2.0), (8.0, 4.0), (2.0, 2.0))
+    assert Measured(row, rounds).value == value
+
+
+def test_what_is_beyond_its_limit_is_shown_as_missed() -> None:
+    shown = table([Measured(RATIO, taken((1.4, 1.0))), Measured(MORE, taken((4.5, 2.0)))])
+    assert "| 1.4 × (1.4 to 1.4) | ≤ 1.5 × | holds |" in shown
+    assert "| + 2.5 ms (2.5 to 2.5) | ≤ + 2 ms | **missed** |" in shown
 
 
 @pytest.mark.parametrize(
-    ("took", "holds"),
-    [
-        ({"parse": 0.9}, [False, True, True]),
-        ({"load": 5.9}, [True, False, True]),
-        ({"check_large": 60.0}, [True, True, False]),
-    ],
+    ("tries", "missed"),
+    [([1.8], []), ([1.9, 1.8], []), ([1.9, 1.9, 1.8], []), ([1.9, 1.9, 1.9], ["1"])],
 )
-def test_what_is_beyond_a_limit_does_not(took: dict[str, float], holds: list[bool]) -> None:
-    assert kept(**took) == holds
-
-
-@pytest.mark.parametrize(
-    ("parse", "slack", "code"), [(1.0, "1", 0), (0.9, "1", 1), (0.9, "1.25", 0), (0.7, "1.25", 1)]
-)
-def test_the_gate_fails_with_exit_code_1(
-    parse: float,
-    slack: str,
-    code: int,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+def test_only_what_is_beyond_its_limit_and_the_slack_in_each_try_fails(
+    tries: list[float], missed: list[str]
 ) -> None:
-    took = rounds(parse=parse)
-    monkeypatch.setitem(CHECK["main"].__globals__, "measure", lambda *_: took)
-    monkeypatch.setattr("sys.argv", ["check.py", "--slack", slack])
-    assert CHECK["main"]() == code
-    assert ("DOES NOT HOLD" in capsys.readouterr().out) is (parse < 1.0)
+    values: Iterator[float] = iter(tries)
+    failed = hold_within(lambda: [Measured(RATIO, taken((next(values), 1.0)))], 1.25)
+    assert [each.row.number for each in failed] == missed
+    assert next(values, None) is None
 
 
-def test_every_job_is_measured() -> None:
-    measured = CHECK["measure"](200, 400, 2)
-    assert len(measured) == 2
-    for took in measured:
-        for seconds in (took.parse, took.check, took.load, took.check_large):
-            assert 0.0 < seconds < float("inf")
-        assert took.times_larger == 2.0
-
-
-def test_the_tree_that_is_measured_has_so_many_nodes() -> None:
-    written = CHECK["text_of"](1000)
+def test_the_tree_that_is_loaded_has_so_many_nodes() -> None:
+    written = text_of(1000)
     assert sum(written.count(f"- {kind}: ") for kind in ("move", "check")) == 1000
-
-
-@pytest.mark.parametrize(
-    ("tree", "slack", "code"), [(1.9, "1", 0), (2.1, "1", 1), (2.1, "1.25", 0), (2.6, "1.25", 1)]
-)
-@pytest.mark.ros
-def test_run_tree_costs_twice_as_much_as_an_action_by_hand_at_most(
-    tree: float,
-    slack: str,
-    code: int,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    serve = runpy.run_path(str(BENCHMARKS / "serve.py"))
-    taken = iter([(1.0, tree), (2.0, 90.0), (3.0, 3.0 * tree)] * 4)
-    monkeypatch.setitem(serve["main"].__globals__, "measure", lambda goals: next(taken))
-    monkeypatch.setattr("sys.argv", ["serve.py", "--rounds", "3", "--slack", slack])
-    assert serve["main"]() == code
-    assert ("DOES NOT HOLD" in capsys.readouterr().out) is bool(code)

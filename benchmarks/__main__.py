@@ -1,0 +1,134 @@
+"""Measures all rows, prints them, and writes docs/performance.md.
+
+    python -m benchmarks [--rows 1,3] [--rounds 5] [--short] [--page FILE]
+
+--short measures the rows that CI holds us to, and fails where one is beyond its limit by more than
+a quarter in each of three tries. Without it, what is missed is shown, and nothing fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+from pathlib import Path
+
+from benchmarks import (
+    chain,
+    demo,
+    fleet,
+    importing,
+    loading,
+    many_leaves,
+    run_tree,
+    saving,
+    ticking,
+    waiting,
+)
+from benchmarks.harness import Family, Measured, hold_within, measure, table
+
+FAMILIES = [
+    chain.STOCK,
+    chain.FORGETFUL,
+    many_leaves.FAMILY,
+    waiting.FAMILY,
+    ticking.FAMILY,
+    demo.FAMILY,
+    fleet.FAMILY,
+    loading.FAMILY,
+    importing.FAMILY,
+    saving.FAMILY,
+    run_tree.FAMILY,
+]
+GATED = {"1", "3", "5", "8"}
+SLACK = 1.25
+PAGE = """\
+# How fast it is
+
+Made by `make bench`, which measures all of this in one go; nothing here is written by hand.
+
+Each row has a yardstick that is measured in the same run, in turns with ours, in processes of their
+own. The value of a row is the median of {rounds} rounds, each of which compares what was measured
+one after the other; in brackets are its lowest and its highest. Compare values, not times: these
+belong to the machine ({machine}; load {load} at the beginning).
+Every goal of rows 1 to 5, 9 and 10 went to a server in another process, whose journal showed that
+each ran once and in its order.
+
+{table}
+
+- An action in a chain is a Fibonacci goal that its server finishes as soon as it is accepted; what
+  counts is the time from the first result to the last, taken where both sides meet: at rclpy's C++
+  client. So are the moments of row 3; a goal is sent when it is handed to that client.
+- Our side of rows 1 to 5 is `ActionBehaviour`s in a tree under `TreeRunner`, with nothing said; the
+  other sends each goal in the callback of the result before it.
+- Rows 9 and 10 count the better of two runs, after one that waits for discovery.
+- `make bench-short` measures rows 1, 3, 5 and 8, and fails where one is beyond its limit by more
+  than a quarter in each of three tries.
+"""
+
+
+def _machine() -> str:
+    text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    models = [line.split(":", 1)[1].strip() for line in text.splitlines() if "model name" in line]
+    cores = len(os.sched_getaffinity(0))
+    model = models[0] if models else platform.machine()
+    return f"{cores} cores of {model}, Python {platform.python_version()}"
+
+
+def _wanted(rows: set[str]) -> list[Family]:
+    families = []
+    for family in FAMILIES:
+        kept = [row for row in family.rows if row.number.split(",")[0] in rows]
+        sides = {row.ours[0] for row in kept} | {row.theirs[0] for row in kept if row.theirs}
+        if kept:
+            needed = {name: side for name, side in family.sides.items() if name in sides}
+            families.append(Family(kept, needed))
+    return families
+
+
+def _measured(families: list[Family], rounds: int) -> list[Measured]:
+    found = [each for family in families for each in measure(family, rounds, _say)]
+    return sorted(found, key=lambda each: int(each.row.number.split(",")[0]))
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def main() -> int:
+    """Measure; return the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks", description=__doc__.splitlines()[0]
+    )
+    parser.add_argument("--rows", help="their numbers, with commas between; all where left out")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--short", action="store_true", help="what CI holds us to")
+    parser.add_argument("--page", type=Path, help="write the table there")
+    wanted = parser.parse_args()
+    every = {row.number.split(",")[0] for family in FAMILIES for row in family.rows}
+    rows = {*wanted.rows.split(",")} if wanted.rows else GATED if wanted.short else every
+    load = f"{os.getloadavg()[0]:.1f}"
+    if wanted.short:
+
+        def again() -> list[Measured]:
+            measured = _measured(_wanted(rows), wanted.rounds)
+            print(table(measured), flush=True)
+            return measured
+
+        missed = hold_within(again, SLACK)
+        for each in missed:
+            print(f"row {each.row.number} is beyond its limit: {each.value:.3g}")
+        return 1 if missed else 0
+    measured = _measured(_wanted(rows), wanted.rounds)
+    print(table(measured))
+    if wanted.page:
+        page = PAGE.format(
+            rounds=wanted.rounds, machine=_machine(), load=load, table=table(measured)
+        )
+        wanted.page.write_text(page, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
