@@ -13,8 +13,8 @@ class Gate(Decorator):
     """Like py_trees' Decorator, with a question asked first.
 
     A subclass says in `gate` what to do: None ticks the child, RUNNING waits without ticking it,
-    SUCCESS and FAILURE end the node. `update` then reads the child's status as usual. Where `begin`
-    raises ValueError, the visit fails with its text.
+    SUCCESS and FAILURE end the node. `update` then says what the child's status means: itself,
+    where nothing else is said. Where `begin` raises ValueError, the visit fails with its text.
     """
 
     refused = False
@@ -36,6 +36,10 @@ class Gate(Decorator):
     def gate(self) -> Status | None:
         """What to do this time; called after `begin`."""
         return None
+
+    def update(self) -> Status:
+        status: Status = self.decorated.status
+        return status
 
     def tick(self) -> Iterator[Behaviour]:
         if self.status is not Status.RUNNING:

@@ -60,9 +60,6 @@ class Deadline(Gate):
             self.feedback_message += f"; the end of {', '.join(unknown)} is not known"
         return Status.FAILURE
 
-    def update(self) -> Status:
-        return self.decorated.status
-
     def due_in(self) -> float | None:
         """Seconds until the deadline."""
         return None if self._expired else self._countdown.left()
@@ -91,6 +88,3 @@ class While(Gate):
             return None
         self.feedback_message = why
         return Status.FAILURE
-
-    def update(self) -> Status:
-        return self.decorated.status

@@ -13,15 +13,19 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 from bt_actions.messages.fields import constants
-from bt_actions.messages.interfaces import Kind, UnknownInterface, installed, interface, short_name
+from bt_actions.messages.interfaces import (
+    PARTS,
+    Kind,
+    UnknownInterface,
+    installed,
+    interface,
+    short_name,
+)
 from bt_actions.utilities.suggest import did_you_mean
 from bt_actions.utilities.units import parse_angle, parse_duration
 
 _BILLION = 1_000_000_000
 _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
-_PARTS = ("Goal", "Result", "Feedback", "Request", "Response")
-_KINDS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
-                           "Request": "srv", "Response": "srv"}  # fmt: skip
 ANGLES = ("roll", "pitch", "yaw")
 
 
@@ -98,7 +102,7 @@ def _class(path: str, owner: type | None) -> type:
     """The class a path such as ``MoveRobot.Feedback`` names, from the module of `owner`."""
     package, _, rest = path.rpartition("/")
     names = rest.split(".")
-    if owner is not None and names[-1] in _PARTS and len(names) == 1 and not package:
+    if owner is not None and names[-1] in PARTS and len(names) == 1 and not package:
         names = [owner.__name__.rpartition("_")[0], *names]
     found: object = None
     if package:
@@ -106,16 +110,16 @@ def _class(path: str, owner: type | None) -> type:
         found = _interface(f"{name}/{kind or 'msg'}/{names[0]}")
     elif owner is not None:
         found = _beside(names[0], owner)
-    kind = _KINDS.get(names[-1], "msg" if len(names) == 1 else "action")
+    kind = PARTS.get(names[-1], "msg" if len(names) == 1 else "action")
     if found is None and not package:
         found = _anywhere(names[0], kind)
     near = ""
     if found is None:
         near = did_you_mean(names[0], {full.rpartition("/")[2] for full in installed(kind)})
     for name in names[1:]:
-        if isinstance(found, type) and not (name in _PARTS and hasattr(found, name)):
-            near = did_you_mean(name, [part for part in _PARTS if hasattr(found, part)])
-        found = getattr(found, name, None) if name in _PARTS else None
+        if isinstance(found, type) and not (name in PARTS and hasattr(found, name)):
+            near = did_you_mean(name, [part for part in PARTS if hasattr(found, part)])
+        found = getattr(found, name, None) if name in PARTS else None
     if not isinstance(found, type):
         raise UnknownClass(f"no message class {path!r} is known here{near}")
     return found

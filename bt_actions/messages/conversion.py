@@ -75,11 +75,7 @@ def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.t
     gives nanoseconds for `stamp: now`; pass the node's clock where there is one. Raises
     MessageError, with every problem in it.
     """
-    filler = _Filler(now, None)
-    message = filler.convert(Message(message_type), data, ())
-    if filler.problems:
-        raise MessageError(filler.problems)
-    return message  # type: ignore[no-any-return]
+    return _filled(Message(message_type), data, now)  # type: ignore[no-any-return]
 
 
 def fill_value(kind: FieldType, data: object, *, now: Callable[[], int] = time.time_ns) -> object:
@@ -87,11 +83,16 @@ def fill_value(kind: FieldType, data: object, *, now: Callable[[], int] = time.t
 
     Raises MessageError.
     """
+    value = _filled(kind, data, now)
+    return value if isinstance(value, array.array) else plain(value)
+
+
+def _filled(kind: FieldType, data: object, now: Callable[[], int]) -> Any:
     filler = _Filler(now, None)
     value = filler.convert(kind, data, ())
     if filler.problems:
         raise MessageError(filler.problems)
-    return value if isinstance(value, array.array) else plain(value)
+    return value
 
 
 def examine(kind: FieldType, data: object, hole: Hole | None = None) -> list[Problem]:
@@ -262,10 +263,8 @@ def _wrong(kind: Scalar, value: object) -> str | None:
     """Why a value does not fit a scalar type, or None."""
     if kind.name == "bool":
         return None if isinstance(value, bool) else f"true or false is needed, not {show(value)}"
-    if kind.name in FLOATS:
-        return _wrong_float(kind.name, value)
-    if kind.name in INTEGERS:
-        return _wrong_integer(kind.name, value)
+    if kind.name in FLOATS or kind.name in INTEGERS:
+        return _wrong_number(kind.name, value)
     if not isinstance(value, str):
         return f"a text is needed, not {show(value)}"
     if kind.limit is not None and len(value) > kind.limit:
@@ -285,25 +284,22 @@ def _number_in(value: object) -> str:
     return ": write the number alone, in the unit that is expected"
 
 
-def _wrong_float(name: str, value: object) -> str | None:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return f"a number ({name}) is needed, not {show(value)}{_number_in(value)}"
+def _wrong_number(name: str, value: object) -> str | None:
+    what, fits = ("a number", (int, float)) if name in FLOATS else ("a whole number", (int,))
+    if isinstance(value, bool) or not isinstance(value, fits):
+        return f"{what} ({name}) is needed, not {show(value)}{_number_in(value)}"
+    if name in INTEGERS:
+        least, greatest = INTEGERS[name]
+        if least <= value <= greatest:
+            return None
+        a = "an" if name.startswith("i") else "a"
+        return f"{show(value)} does not fit {a} {name}: {least} to {greatest}"
     try:
         number = float(value)
     except OverflowError:
         return f"{show(value)} does not fit a {name}"
     if math.isfinite(number) and abs(number) > FLOATS[name]:
         return f"{show(value)} does not fit a {name}"
-    return None
-
-
-def _wrong_integer(name: str, value: object) -> str | None:
-    if isinstance(value, bool) or not isinstance(value, int):
-        return f"a whole number ({name}) is needed, not {show(value)}{_number_in(value)}"
-    least, greatest = INTEGERS[name]
-    if not least <= value <= greatest:
-        a = "an" if name.startswith("i") else "a"
-        return f"{show(value)} does not fit {a} {name}: {least} to {greatest}"
     return None
 
 

@@ -16,6 +16,9 @@ from bt_actions.utilities.suggest import did_you_mean
 
 Kind = Literal["action", "srv", "msg"]
 _WORDS: dict[str, str] = {"action": "action", "srv": "service", "msg": "message"}
+PARTS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
+                          "Request": "srv", "Response": "srv"}  # fmt: skip
+"""The messages that an interface consists of, and of which kind it is then."""
 _PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -40,18 +43,16 @@ def interface(name: str | type, kind: Kind) -> type:
     if isinstance(name, type):
         return name
     package, short = _split(name, kind)
-    folder = _folder(package, kind)
-    if folder is None:
+    folders = (Path(entry or ".") / package / kind for entry in sys.path)
+    known = next(filter(None, map(_listed, folders)), None)
+    if known is None:
         raise UnknownInterface(name, _missing_package(package, kind))
-    found = _load(package, kind, short)
-    if found is None:
-        known = _listed(folder)
-        raise UnknownInterface(
-            name,
-            f"package {package!r} has no {_WORDS[kind]} {short!r}"
-            + (did_you_mean(short, known) or _listing(known)),
-        )
-    return found
+    found = getattr(importlib.import_module(f"{package}.{kind}"), short, None)
+    wanted = {"action": "Goal", "srv": "Request", "msg": "get_fields_and_field_types"}[kind]
+    if isinstance(found, type) and hasattr(found, wanted):
+        return found
+    near = did_you_mean(short, known) or _listing(known)
+    raise UnknownInterface(name, f"package {package!r} has no {_WORDS[kind]} {short!r}{near}")
 
 
 def find_action(short: str) -> type:
@@ -84,7 +85,7 @@ def packages(kind: Kind) -> dict[str, Path]:
         for child in children:
             if child.name not in found and _PACKAGE.fullmatch(child.name):
                 folder = child / kind
-                if _holds_interfaces(folder):
+                if _listed(folder):
                     found[child.name] = folder
     return found
 
@@ -107,7 +108,7 @@ def interface_name(cls: type) -> str:
 def short_name(cls: type) -> str:
     """The class as people call it: ``MoveRobot.Goal``, ``SetBool.Request``, ``Pose``."""
     name = cls.__name__
-    for part in ("Goal", "Result", "Feedback", "Request", "Response"):
+    for part in PARTS:
         owner = name.removesuffix(f"_{part}")
         if owner != name and ".msg" not in cls.__module__:
             return f"{owner}.{part}"
@@ -125,29 +126,12 @@ def _split(name: str, kind: Kind) -> tuple[str, str]:
     return parts[0], parts[1]
 
 
-def _folder(package: str, kind: Kind) -> Path | None:
-    for entry in sys.path:
-        folder = Path(entry or ".") / package / kind
-        if _holds_interfaces(folder):
-            return folder
-    return None
-
-
-def _holds_interfaces(folder: Path) -> bool:
-    """Generated folders import their own hidden modules by full name; others do not."""
-    return bool(_listed(folder))
-
-
-def _load(package: str, kind: Kind, short: str) -> type | None:
-    module = importlib.import_module(f"{package}.{kind}")
-    found = getattr(module, short, None)
-    wanted = {"action": "Goal", "srv": "Request", "msg": "get_fields_and_field_types"}[kind]
-    return found if isinstance(found, type) and hasattr(found, wanted) else None
-
-
 @lru_cache(maxsize=1024)
 def _listed(folder: Path) -> tuple[str, ...]:
-    """The interfaces of a package, read from the file that imports them: nothing is loaded."""
+    """The interfaces of a package, read from the file that imports them: nothing is loaded.
+
+    Generated folders import their own hidden modules by full name; others do not.
+    """
     try:
         text = (folder / "__init__.py").read_text(encoding="utf-8")
     except (OSError, ValueError):

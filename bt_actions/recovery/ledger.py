@@ -123,8 +123,7 @@ def left_behind(
     Files in `passed_over` are not read. `failed` is called with what cannot be read.
     """
     try:
-        home = _directory()
-        _check(home)
+        home = directory(make=False)
         paths = sorted(home.glob("*" + _SUFFIX))
     except FileNotFoundError:
         return
@@ -157,31 +156,25 @@ def mark_lost(goals: Iterable[Sent]) -> None:
             _write(sent.path, sent.action, sent.domain, sent.servers, sent.accept, True)
 
 
-def directory() -> Path:
-    """Make the directory of the records where it is not there. Raises OSError for an unsafe one."""
-    found = _directory()
-    found.mkdir(mode=0o700, parents=True, exist_ok=True)
-    _check(found)
-    return found
+def directory(*, make: bool = True) -> Path:
+    """Return where the records are.
 
-
-def _directory() -> Path:
-    """Return where the records are. Raises OSError where that depends on where one stands."""
+    Raises OSError where that depends on where one stands, or others could put something into it.
+    """
     named = os.environ.get(DIRECTORY)
     if named and not Path(named).is_absolute():
         raise OSError(errno.EINVAL, f"{DIRECTORY} is no absolute path", named)
-    # What others may have made there is not used: _check
+    # What others may have made there is not used, as is seen below
     shared = "/dev/shm"  # nosec B108
-    return Path(named or f"{shared}/bt_actions-{os.geteuid()}")
-
-
-def _check(directory: Path) -> None:
-    """Raise OSError where others could have put something into it."""
-    seen = directory.lstat()
+    found = Path(named or f"{shared}/bt_actions-{os.geteuid()}")
+    if make:
+        found.mkdir(mode=0o700, parents=True, exist_ok=True)
+    seen = found.lstat()
     if not stat.S_ISDIR(seen.st_mode):
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(directory))
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(found))
     if seen.st_uid != os.geteuid() or seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PermissionError(errno.EPERM, "others may write there", str(directory))
+        raise PermissionError(errno.EPERM, "others may write there", str(found))
+    return found
 
 
 def _author(path: Path) -> Author | None:
