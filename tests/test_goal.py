@@ -875,7 +875,7 @@ def test_what_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_u
     assert Command.CANCEL in life.on(Event.ACCEPTED)
 
 
-def test_a_goal_that_is_owed_bars_its_server_and_whoever_wants_its_resources() -> None:
+def test_an_outstanding_goal_blocks_its_server_and_whoever_wants_its_resources() -> None:
     life = executing()
     base = Goal(b"2", "lift", LIMITS, life.now, resources=frozenset({"base"}))
     beside = Goal(b"3", "lift", LIMITS, life.now, resources=frozenset({"base"}), busy=Busy.SHARE)

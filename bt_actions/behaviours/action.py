@@ -215,14 +215,14 @@ class ActionBehaviour(Behaviour):
                     return Status.RUNNING
                 handle, begun = self._begin(backend), True
             traffic.advance(handle, self._make_message)
-            settled = traffic.is_decided(handle)  # then all of its feedback is here
+            decided = traffic.is_decided(handle)  # then all of its feedback is here
             for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
                 message = handle.feedback.popleft()
                 if self.on_feedback is not None and not self._is_over():
                     self.on_feedback(message)
             if self._is_over():
                 return Status.FAILURE
-            if not settled:
+            if not decided:
                 self.feedback_message = self._in_words(handle)
                 return Status.RUNNING
             record = self._judge(handle, backend)

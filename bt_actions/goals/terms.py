@@ -82,7 +82,7 @@ class Event(Enum):
 
     GRANTED = "the resources are ours"
     TAKEN = "the resources are taken, and waiting is not wanted"
-    SERVER_READY = "one live server is there, and owes us nothing"
+    SERVER_READY = "one live server is there, and nothing speaks against sending"
     SERVER_AMBIGUOUS = "two live servers are there; if it was sent, both may have it"
     INVALID = "the message could not be built"  # reason
     SEND_FAILED = "the request did not leave"  # reason

@@ -33,8 +33,8 @@ class Ended:
     asked_at: float = NEVER
 
 
-class Past:
-    """What has ended on one endpoint, the newest goals."""
+class EndedGoals:
+    """The newest goals that have ended on one endpoint."""
 
     def __init__(self, endpoint: Endpoint, host: Host) -> None:
         self._endpoint, self._host = endpoint, host

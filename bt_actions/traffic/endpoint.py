@@ -23,12 +23,12 @@ from bt_actions.goals.terms import (
     Now,
     State,
 )
-from bt_actions.servers.presence import PROBES_KEPT, Server, ServerWatch
+from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
 from bt_actions.servers.replies import Told
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.effect_runner import EffectRunner
 from bt_actions.traffic.effects import Before, Effect, what_follows
-from bt_actions.traffic.ended import Past
+from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.handle import GoalHandle, Reporter
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import Predecessors
@@ -79,12 +79,15 @@ class ActionEndpoint:
         self._probes = itertools.count(1)
         self._last_probes: deque[int] = deque()
         self._warned_of: set[str] = set()
-        self._past = Past(self, host)
+        self._ended = EndedGoals(self, host)
         self._effect_runner = EffectRunner(self, host, domain, self._warn_once)
         self._predecessors = Predecessors(name, host.log)
         self.transport = participant.open_transport(action_type, name, self)
         self.route = Route(self, self, host, domain)
         self.watcher = Watcher(self, host, domain, self.route)
+        self.in_doubt, self.holds_back = self.route.in_doubt, self.route.holds_back
+        self.observe, self.observe_and_tell = self.watcher.observe, self.watcher.observe_and_tell
+        self.run_due, self.ask_to_cancel = self.watcher.run_due, self._effect_runner.ask_to_cancel
 
     def __repr__(self) -> str:
         return f"<ActionEndpoint {self.name}, {len(self.goals)} goals>"
@@ -99,14 +102,14 @@ class ActionEndpoint:
                 told = handle.replies.answered(self.watch, self._host.steady(), answers)
                 self.pass_on(handle, told)
             elif answers[-1]:
-                self._past.accepted(goal_id, answers)
+                self._ended.accepted(goal_id, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
         with self._host.lock:
             handle = self.goals.get(goal_id)
             if handle is None:
-                self._past.runs(goal_id)
+                self._ended.runs(goal_id)
                 return
             now = self.heard_at = self._host.steady()
             self.watch.heard(now)
@@ -127,7 +130,7 @@ class ActionEndpoint:
                 told = handle.replies.canceled(self.watch, self._host.steady(), asked, answers)
                 self.pass_on(handle, told)
             else:
-                self._past.cancel_answered(goal_id, asked, answers[-1])
+                self._ended.cancel_answered(goal_id, asked, answers[-1])
 
     def result_came(
         self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
@@ -145,7 +148,7 @@ class ActionEndpoint:
             others = [each for each in statuses if each not in self.goals]
             running = [each for each in others if 0 < statuses[each] < STATUS_SUCCEEDED]
             for goal_id in running:
-                self._past.runs(goal_id)
+                self._ended.runs(goal_id)
             self._predecessors.see(running)
             for goal_id in [each for each in statuses if each in self.goals]:
                 status = statuses[goal_id]
@@ -228,13 +231,13 @@ class ActionEndpoint:
             if self.is_parents:
                 return
             if handle.paused_at is not None and not goal.sent:
-                handle.kept_since = None
+                handle.held_back_since = None
                 return
             self._give_back_time(handle, now.steady)
             if goal.due_in(now) == 0.0:
                 self.deliver_arrived()
                 now = self.participant.now()
-                self._bear_with(goal, now)
+                self._suspend_after_stall(goal, now)
             self._host.trace.polls(handle)
             for event in goal.due(now):
                 self._apply(handle, event, now)
@@ -242,12 +245,12 @@ class ActionEndpoint:
     def _give_back_time(self, handle: GoalHandle, now: float) -> None:
         """See to it that no deadline counts the time in which a goal is not sent on our account."""
         waits = handle.goal.state is State.WAITING_FOR_SERVER
-        if waits and handle.kept_since is not None:
-            handle.goal.postpone(now - handle.kept_since)
-        handle.kept_since = now if waits and self.holds_back(now) else None
+        if waits and handle.held_back_since is not None:
+            handle.goal.postpone(now - handle.held_back_since)
+        handle.held_back_since = now if waits and self.holds_back(now) else None
 
-    def _bear_with(self, goal: Goal, now: Now) -> None:
-        """Hold deadlines that have passed while a stall may be why nothing has come in."""
+    def _suspend_after_stall(self, goal: Goal, now: Now) -> None:
+        """Suspend deadlines that have passed while a stall may be why nothing has come in."""
         stalls = self._host.stalls
         waits = goal.state is State.WAITING_FOR_SERVER
         open_question = self.holds_back if waits else self.in_doubt
@@ -281,10 +284,6 @@ class ActionEndpoint:
         if (due := goal.due_in(now)) is not None:
             self._host.scheduler.wake_by(now.steady + due)
         self.domain.effects.run_all()
-
-    def ask_to_cancel(self, goal_id: bytes) -> None:
-        """Ask the server to cancel a goal, as soon as its queue has room."""
-        self._effect_runner.ask_to_cancel(goal_id)
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
@@ -329,7 +328,7 @@ class ActionEndpoint:
                 self.cancels.send_now(goal.id)  # nobody will ask again
             self.cancels.forget(goal.id)
             if goal.sent and goal.state is State.DONE:
-                self._past.keep(handle)
+                self._ended.keep(handle)
         if not self.goals:
             self.domain.open.pop(self, None)
             self._host.scheduler.remove(self)
@@ -341,26 +340,6 @@ class ActionEndpoint:
         """Return a leaf's goals that are open here, also what a second server took."""
         with self._host.lock:
             return [handle for handle in self.goals.values() if handle.owner is owner]
-
-    def run_due(self, now: float) -> float:
-        """Do what is due here, on nobody's tick; return the seconds until there is more."""
-        return self.watcher.run_due(now)
-
-    def observe_and_tell(self, now: float) -> Server:
-        """Observe the server, tell the goals what that means for them, and return its state."""
-        return self.watcher.observe_and_tell(now)
-
-    def observe(self) -> None:
-        """Observe who is in sight; what follows is for `observe_and_tell` to say."""
-        self.watcher.observe()
-
-    def in_doubt(self, now: float) -> float:
-        """Return for how many seconds a server that is silent may not have heard us; or 0."""
-        return self.route.in_doubt(now)
-
-    def holds_back(self, now: float) -> bool:
-        """Whether nothing is sent though a server is in sight."""
-        return self.route.holds_back(now)
 
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""

@@ -118,7 +118,7 @@ class GoalHandle:
     name: str
     """The leaf's."""
     begun_in: object = None
-    """What was ticking at the time (traffic/begun.py); None where nobody said it."""
+    """Which run it belongs to (traffic/begun.py); None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
@@ -128,8 +128,8 @@ class GoalHandle:
     told_gone: bool = False
     look_out_left: float | None = None
     """Seconds for which a server that went away with it is looked out for yet; None: none did."""
-    kept_since: float | None = None
-    """Since when it is not sent though a server is in sight (Route.holds_back), steady clock."""
+    held_back_since: float | None = None
+    """Since when (steady clock) it is not sent though a server is in sight (Route.holds_back)."""
     paused_at: float | None = None
     begun_at: float = NEVER
     """Seconds, steady clock."""

@@ -33,7 +33,7 @@ ON_TRIAL = 0
 
 
 class Route:
-    """The way of one endpoint to its server (transport.Seeker)."""
+    """How one endpoint reaches its server (a transport.Seeker)."""
 
     def __init__(self, endpoint: Endpoint, listener: Listener, host: Host, domain: Domain) -> None:
         self._endpoint, self._listener = endpoint, listener
@@ -98,7 +98,7 @@ class Route:
         if now - endpoint.participant.seen_since < TOO_NEW:
             return False
         if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.goals.values()):
-            return False  # nobody here wants it; it is remembered, as what is put away is
+            return False  # nobody here wants it; it is remembered, as what is parked is
         action = endpoint.name, endpoint.action_type
         known = self._domain.ever_lost_sight or action in self._domain.known
         running = (State.SENDING, State.EXECUTING, State.REPLACED)

@@ -40,7 +40,7 @@ class Watcher:
         self._look_at = 0.0
         self._looked_like = Server.ABSENT  # at the last look
         self._was_away = False  # seen between two looks
-        self._held_up = (True, True)  # by a server that has just come; by `Route.holds_back`
+        self._held_back = (True, True)  # as a server has just come; by `Route.holds_back`
         self._looked_out_at = host.steady()
         self._warned_crowd = False
 
@@ -116,10 +116,10 @@ class Watcher:
         if before is Server.ABSENT or self._was_away:
             endpoint.in_sight_since = now
         self._was_away = False
-        held_up = (now - endpoint.in_sight_since < BESIDE, self._route.holds_back(now))
-        if any(was and not still for was, still in zip(self._held_up, held_up, strict=True)):
-            endpoint.reporter.notify(None)  # what was held up for it may be sent
-        self._held_up = held_up
+        held_back = (now - endpoint.in_sight_since < BESIDE, self._route.holds_back(now))
+        if any(was and not still for was, still in zip(self._held_back, held_back, strict=True)):
+            endpoint.reporter.notify(None)  # what was held back for it may be sent
+        self._held_back = held_back
         if state is not before:
             endpoint.reporter.notify(None)
             self._domain.ever_lost_sight |= state is Server.ABSENT

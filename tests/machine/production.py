@@ -420,7 +420,7 @@ class Caller:
             if message.kind == "answer" and message.detail and not transport.closed:
                 self.judge.hears_acceptance(self.seen[message.goal_id], message.server)
             return
-        for each in self._lines_to(message.server.action):
+        for each in self._endpoints_to(message.server.action):
             if self.world.in_sight(message.server, int(each.participant.name)):
                 if message.kind == "feedback":
                     each.feedback_came(message.goal_id, message.detail)
@@ -500,7 +500,7 @@ class Caller:
     def endpoints(self) -> list[ActionEndpoint]:
         return [each for of_node in self._traffics.values() for each in of_node._endpoints.values()]
 
-    def _lines_to(self, action: str) -> list[ActionEndpoint]:
+    def _endpoints_to(self, action: str) -> list[ActionEndpoint]:
         return [each for each in self.endpoints if each.name == action]
 
     def accepted_on_server(self, job: Job) -> None:
@@ -512,7 +512,7 @@ class Caller:
 
         Not an excuse for goals that are lost already, where one comes back.
         """
-        for each in self._lines_to(action):
+        for each in self._endpoints_to(action):
             for real in each.goals.values():
                 handle = self.known(real.goal)
                 if handle is not None:
@@ -524,6 +524,6 @@ class Caller:
         return not any(
             lost.replies.sent_to & world.shown(action, wanted.node)
             and world.ready(action, wanted.node)
-            for each in self._lines_to(action)
+            for each in self._endpoints_to(action)
             if int(each.participant.name) == wanted.node
         )

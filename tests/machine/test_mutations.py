@@ -27,7 +27,7 @@ from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import admission, handover
 from bt_actions.traffic.admission import Admission
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.ended import Past
+from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.handle import GoalHandle
 from tests.machine.crowds import CrowdPlay, crowded_history
@@ -372,8 +372,8 @@ OF_CROWDS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
     "believes two of three": (replies, "_answers_wanted", lambda watch: 2),
     "waits for who is not there": (replies, "_answers_wanted", lambda watch: 3),
     "takes any answer for all": (replies.Replies, "_may_be_at_two", lambda self, watch: False),
-    "hears the first of two acceptances": (Past, "accepted", lambda self, *answer: None),
-    "forgets what has ended": (Past, "keep", lambda self, handle: None),
+    "hears the first of two acceptances": (EndedGoals, "accepted", lambda self, *answer: None),
+    "forgets what has ended": (EndedGoals, "keep", lambda self, handle: None),
 }
 
 

@@ -20,7 +20,7 @@ from bt_actions.ros.host import host as process
 from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic import route as way
+from bt_actions.traffic.route import Route
 from tests.support.trees import in_turn
 from tests.support.waiting import holds_for, until
 
@@ -46,12 +46,12 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
 @pytest.fixture(autouse=True)
 def nothing_else_is_missed(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """What the tests before this have lost is not looked for meanwhile."""
-    misses = way.Route.misses
-    monkeypatch.setattr(way.Route, "misses", lambda self: is_of(self, name) and misses(self))
+    misses = Route.misses
+    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name) and misses(self))
     until(nobody_looks, 10.0)
 
 
-def is_of(route: way.Route, name: str) -> bool:
+def is_of(route: Route, name: str) -> bool:
     return route._endpoint.name == name
 
 
@@ -159,7 +159,7 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     from rclpy.node import Node
 
     enclaves = list[str]()
-    monkeypatch.setattr(way.Route, "misses", lambda self: is_of(self, name))
+    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name))
     monkeypatch.setattr(node_participant, "look_for", lambda *to, at_once: enclaves.append(to[3]))
     context = Context()
     context.init(args=["--ros-args", flag, "/kitchen/robot"], domain_id=domain)
@@ -191,7 +191,7 @@ def test_where_names_are_remapped_nobody_looks(
     leaf = MoveRobot("m", 0.1, action_name=name)
     leaf.setup(node=remapped)
     looked_for = list[Any]()
-    monkeypatch.setattr(way.Route, "misses", lambda self: is_of(self, name))
+    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name))
     monkeypatch.setattr(node_participant, "look_for", lambda *to, at_once: looked_for.append(to))
     with process.lock:
         leaf._endpoint.route.seek(now())
