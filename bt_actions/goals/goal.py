@@ -110,7 +110,7 @@ class Goal(Facts):
 
     @property
     def lost(self) -> bool:
-        """Whether its server went away, or our node did."""
+        """Whether its server went away, or who sent it has left."""
         return self.state is State.LOST
 
     @property

@@ -38,7 +38,7 @@ class State(Enum):
     )
     NOT_RECEIVED = "Denied for so long that nobody waits for it; canceled should it turn up."
     LOST = (
-        "Its server went away, or its node was closed. The leaf is free; should its server be "
+        "Its server went away, or who sent it has left. The leaf is free; should its server be "
         "seen again, perhaps by another node of this process, it is canceled first of all."
     )
     DONE = "There is nothing left to do for it."

@@ -39,7 +39,7 @@ from bt_actions.utilities.plain_text import raised
 
 LOOKED_OUT_FOR = 3.0
 """Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
-went away: one that only stood still still runs its goal. Once for each goal."""
+went away: one that was only stopped still runs its goal. Once for each goal."""
 
 
 class ActionEndpoint:
