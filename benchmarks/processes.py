@@ -27,7 +27,8 @@ LOST = 3
 def environment() -> dict[str, str]:
     """Return what all of them have around them."""
     ours = {"ROS_DOMAIN_ID": DOMAIN, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    return {**os.environ, **ours, "PYTHONPATH": str(ROOT)}
+    kept = {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": ""}  # compiled once, as installed
+    return {**os.environ, **ours, **kept}
 
 
 def seconds(arguments: Sequence[str]) -> float:

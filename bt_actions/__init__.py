@@ -1,4 +1,10 @@
-"""A behaviour-tree task orchestrator for ROS 2 actions. These names are the public ones."""
+"""A behaviour-tree task orchestrator for ROS 2 actions. These names are the public ones.
+
+Each is imported when it is first asked for: a program pays for what it uses.
+"""
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from bt_actions.utilities.streams import open_closed_streams as _open_closed_streams
 
@@ -6,17 +12,19 @@ _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout
 
 # ruff: noqa: E402 - see above
 import bt_actions.behaviours.ports as _ports  # noqa: F401 - makes the tags of XML trees known
-from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.progress import Progress
-from bt_actions.behaviours.robot import Gripper, MoveRobot
-from bt_actions.behaviours.run_tree import RunTree
-from bt_actions.behaviours.variables import Var
-from bt_actions.document import load_tree
-from bt_actions.goals.attempts import AttemptRecord
-from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.running.goals import GoalReport
-from bt_actions.running.loop import TreeError
-from bt_actions.running.runner import TreeRunner
+
+if _TYPE_CHECKING:
+    from bt_actions.behaviours.action import ActionBehaviour
+    from bt_actions.behaviours.progress import Progress
+    from bt_actions.behaviours.robot import Gripper, MoveRobot
+    from bt_actions.behaviours.run_tree import RunTree
+    from bt_actions.behaviours.variables import Var
+    from bt_actions.document import load_tree
+    from bt_actions.goals.attempts import AttemptRecord
+    from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
+    from bt_actions.running.goals import GoalReport
+    from bt_actions.running.loop import TreeError
+    from bt_actions.running.runner import TreeRunner
 
 __all__ = [  # noqa: RUF022 - grouped by use
     # leaves
@@ -40,3 +48,30 @@ __all__ = [  # noqa: RUF022 - grouped by use
     "TreeError",
     "GoalReport",
 ]
+
+_PLACES = {
+    "behaviours.action": ["ActionBehaviour"],
+    "behaviours.progress": ["Progress"],
+    "behaviours.robot": ["Gripper", "MoveRobot"],
+    "behaviours.run_tree": ["RunTree"],
+    "behaviours.variables": ["Var"],
+    "document": ["load_tree"],
+    "goals.attempts": ["AttemptRecord"],
+    "goals.policy": ["Busy", "End", "Outcome", "Retry", "Timeouts"],
+    "running.goals": ["GoalReport"],
+    "running.loop": ["TreeError"],
+    "running.runner": ["TreeRunner"],
+}
+_PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _PLACE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(_import_module(f"{__name__}.{_PLACE_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

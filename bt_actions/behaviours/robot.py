@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+from py_trees.ports import PortsMixin
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.variables import Var
+from bt_actions.utilities.units import parse_duration
 
 
 class MoveRobot(ActionBehaviour):
@@ -50,3 +55,50 @@ class Gripper(ActionBehaviour):
             {"position": position, "max_effort": max_effort},
             **kwargs,
         )
+
+
+class ActionWithPorts(PortsMixin, ActionBehaviour):
+    """An action whose goal's fields are input ports, and its result's fields output ports.
+
+    Of py_trees' XML trees; their tags are in ports.py.
+    """
+
+    ACTION_TYPE: ClassVar[str]
+    SERVER: ClassVar[str]
+
+    def __init__(
+        self,
+        name: str,
+        action_name: str = "",
+        timeout: float | str | None = None,
+        attempts: int | str = 1,
+        behaviour_class_name: str | None = None,
+    ) -> None:
+        super().__init__(
+            name,
+            self.ACTION_TYPE,
+            action_name or self.SERVER,
+            self._read_goal,
+            timeout=None if timeout is None else parse_duration(timeout),
+            retry=int(attempts),  # an XML attribute is a text
+            behaviour_class_name=behaviour_class_name,
+        )
+
+    def _read_goal(self) -> dict[str, object]:
+        """The goal from the input ports; a port without data makes it INVALID_GOAL."""
+        return {port: self.get_input(port) for port in self.input_ports()}
+
+    def update(self) -> Status:
+        status: Status = super().update()
+        if status is Status.SUCCESS:
+            for port in self.output_ports():
+                self._set_output(port, getattr(self.result, port))
+        return status
+
+
+@functools.cache
+def leaf_of(tag: Any) -> type[ActionWithPorts]:
+    """Return the class of leaves that a tag of ports.py stands for."""
+    members = ("ACTION_TYPE", "SERVER", "INPUT_PORTS", "OUTPUT_PORTS")
+    own = {name: getattr(tag, name) for name in members}
+    return type(f"{tag.__name__}WithPorts", (ActionWithPorts,), own, register=False)

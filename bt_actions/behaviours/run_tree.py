@@ -18,8 +18,8 @@ from bt_actions.behaviours.variables import Var, resolve, variables_in
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
+from bt_actions.messages.interfaces import RUN_TREE
 
-TYPE = "bt_actions_interfaces/action/RunTree"
 CANCEL = 15.0
 """Seconds for a run to end when it is canceled: it sees its own goals to their ends first, within
 5 s each where their trees say nothing else."""
@@ -67,7 +67,7 @@ class RunTree(ActionBehaviour):
             timeout = Timeouts(result=timeout, cancel=CANCEL)
         super().__init__(
             name,
-            TYPE,
+            RUN_TREE,
             server,
             goal,
             timeout=timeout,

@@ -14,6 +14,8 @@ from typing import Literal
 
 from bt_actions.utilities.suggest import did_you_mean
 
+RUN_TREE = "bt_actions_interfaces/action/RunTree"
+"""The action of servers of trees."""
 Kind = Literal["action", "srv", "msg"]
 _WORDS: dict[str, str] = {"action": "action", "srv": "service", "msg": "message"}
 PARTS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",

@@ -7,7 +7,6 @@ from types import MappingProxyType
 
 from py_trees.timers import Timer
 
-from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.infer import FLOAT, INTEGER, named
 from bt_actions.document.findings import Related
@@ -18,6 +17,7 @@ from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import Node, span_of
 from bt_actions.messages.fields import FieldType, Listing, Message, Record, Scalar
+from bt_actions.messages.interfaces import RUN_TREE
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 __all__ = ["CHECKS"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable
 from typing import Protocol
 
-from bt_actions.behaviours.run_tree import TYPE as RUN_TREE
 from bt_actions.document.checking.infer import common_type, infer, type_of_literal
 from bt_actions.document.language.types import TypeNameError, parse_type
 from bt_actions.document.language.values import Computed, Interpolated
@@ -13,6 +12,7 @@ from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.reading.writes import Write
 from bt_actions.document.yaml.nodes import Node
 from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
+from bt_actions.messages.interfaces import RUN_TREE
 
 __all__ = ["Known", "infer_variables", "items_inside", "root_type", "type_of"]
 
