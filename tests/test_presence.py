@@ -138,13 +138,6 @@ def test_it_is_probed_now_and_then_while_the_question_is_open(watch: ServerWatch
     assert watch.wants_probe(1.0 + PROBE_EVERY)
 
 
-def test_it_is_gone_when_nobody_a_goal_was_sent_to_is_shown(watch: ServerWatch) -> None:
-    assert not watch.gone(0.0, gids(OLD))
-    watch.observe(1.0, True, gids(NEW))
-    assert watch.gone(1.0, gids(OLD))
-    assert not watch.gone(1.0, gids(OLD, NEW))
-
-
 def test_it_is_gone_when_it_is_not_ready_for_a_while_but_not_at_once(watch: ServerWatch) -> None:
     watch.observe(1.0, True, gids(OLD))
     watch.observe(1.2, False, gids(OLD))

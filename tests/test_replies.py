@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from bt_actions.goals.goal import Goal
@@ -218,23 +216,6 @@ def test_the_status_of_one_of_two_shows_no_end(said: replies.Replies, watch: Ser
     )
     said.sent_to = frozenset({ONE})
     assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 5)]
-
-
-@pytest.mark.parametrize(
-    ("word", "told"),
-    [
-        (lambda said, watch: said.answered(watch, 1.1, [False]), [Event.SERVER_AMBIGUOUS]),
-        (lambda said, watch: said.canceled(watch, 1.1, 0.9, [DENIED]), []),
-        (lambda said, watch: said.finished(watch, 1.1, 0.9, [UNKNOWN]), []),
-        (lambda said, watch: [(Event(e), s) for e, s in said.shown(watch, 1.1, 4) if s == 4], []),
-    ],
-    ids=["refused", "denied to cancel", "denied", "ended"],
-)
-def test_what_comes_when_one_has_just_left_may_be_its_word(
-    said: replies.Replies, watch: ServerWatch, word: Any, told: list[Event]
-) -> None:
-    watch.observe(1.0, True, frozenset({ONE}))
-    assert events(word(said, watch)) == told
 
 
 def told(said: replies.Replies, what: replies.Told, now: float) -> list[Event]:

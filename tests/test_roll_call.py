@@ -91,16 +91,6 @@ def test_each_server_has_to_answer() -> None:
     assert roll.known
 
 
-def test_one_that_was_known_may_go() -> None:
-    roll = Roll()
-    roll.shows(A)
-    roll.settle()
-    roll.shows()
-    assert roll.known
-    roll.begin(roll.now)
-    assert roll.known
-
-
 def test_one_that_comes_newly_begins_anew() -> None:
     roll = Roll()
     roll.shows(A)

@@ -71,15 +71,6 @@ def test_a_machine_that_was_suspended_stood_still_though_its_clock_did_not_go_on
     assert stalls.long_times == 1
 
 
-def test_a_time_in_which_this_process_worked_does_not_count() -> None:
-    work = 0.0
-    stalls = Stalls(lambda now: now - work)
-    stalls.lives(10.0)
-    work = 2.0
-    assert stalls.answers_take(12.0 + STOOD_STILL / 2) == 0.0
-    assert stalls.answers_take(15.0) == ANSWERS_TAKE, "it was stopped as well"
-
-
 def stand_still(stalls: Stalls, moment: float, seconds: float, then: float) -> float:
     """Do so from this moment, and live on; return the moment after that."""
     stalls.lives(moment)

@@ -214,10 +214,6 @@ def test_drop_result_once_answers_who_asks_again(serve: Any, bench: Bench) -> No
     assert goal.until_ended().status == SUCCEEDED
 
 
-def test_drop_part_is_nothing_to_a_server_without_one(serve: Any) -> None:
-    assert serve("1:drop_part").send().until_ended().status == SUCCEEDED
-
-
 @pytest.mark.parametrize(
     ("fault", "events"),
     [

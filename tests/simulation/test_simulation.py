@@ -144,16 +144,6 @@ def test_the_battery_is_published_and_empties_on_the_way(ros_bench: RosBench, sp
     ros_bench.client_node.destroy_subscription(subscription)
 
 
-@IN_VIRTUAL_TIME
-def test_a_relative_namespace_is_the_nodes_own(bench: Bench) -> None:
-    with Simulation(bench.node, namespaces=("", "r1", "/r2", "r3/")) as simulation:
-        names = [server.name for server in simulation.servers]
-    assert names == [
-        "/move_robot", "/gripper_control", "/r1/move_robot", "/r1/gripper_control",
-        "/r2/move_robot", "/r2/gripper_control", "/r3/move_robot", "/r3/gripper_control",
-    ]  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("settings", "error", "says"),
     [
