@@ -15,12 +15,13 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Duration, Status
+from py_trees.composites import Composite
 from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.running.goals import RunGoals
-from bt_actions.running.ticking import ChangeVisitor, Misbehaviour
+from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain
 from bt_actions.utilities.places import culprit_of, path_of
@@ -79,6 +80,9 @@ class TickLoop:
         self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.watch())
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._set_up = weakref.WeakSet[Behaviour]()
+        self._children: list[
+            tuple[Behaviour, list[Behaviour]]
+        ] = []  # as they were found, root last
         self._doing = "setup"
         self._stop_wanted = self.abandoned = self._pause_wanted = self._paused = False
         self._timeout: float | None = None
@@ -182,7 +186,10 @@ class TickLoop:
 
     def _set_up_missing(self) -> None:
         """Set up what was not yet: the tree, in the first run, or what is new in it."""
-        tree, done = self.tree, self._set_up
+        tree, done, found = self.tree, self._set_up, self._children
+        same_root = found and found[-1][0] is tree.root
+        if same_root and all(node.children == children for node, children in found):
+            return  # asked at each tick: about 10 ns a behaviour
         by_itself = type(tree).setup is not BehaviourTree.setup and not done
         while new := [each for each in tree.root.iterate() if each not in done]:
             self._doing = "setup"
@@ -194,12 +201,19 @@ class TickLoop:
                 done.add(behaviour)
             by_itself = False
         self._doing = "tick"
+        nodes = list(tree.root.iterate())
+        self._visitor.forget_others(set(nodes))
+        self._children = [
+            (node, list(node.children))
+            for node in nodes
+            if node.children or isinstance(node, Composite) or node is tree.root
+        ]
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
         try:
             with self.goals.begun_here():
-                self._guarded(self.tree.tick)
+                self._guarded(lambda: tick_once(self.tree))
         except _Abandoned:
             pass
         finally:
@@ -315,7 +329,7 @@ class TickLoop:
     # Who is told
 
     def _tell(self, changes: list[tuple[Behaviour, Status]]) -> None:
-        for node, status in changes:
+        for node, status in changes if self._observers else ():
             message = node.feedback_message
             self._emit(NodeChanged(self._now, path_of(node), node, status, message))
 

@@ -51,7 +51,8 @@ class Watchdog:
 
     def gives_up(self) -> bool:
         """Whether nobody waits for the rest of this thread's tick any more."""
-        if self.is_overdue(self._host.steady()) and not self._goals.wanted:
+        ends = self._ends_at < math.inf  # asked after each behaviour
+        if ends and self.is_overdue(self._host.steady()) and not self._goals.wanted:
             self._give_up()  # else it is for `run_due`, which bears with stalls
         return self.gave_up
 
