@@ -293,7 +293,7 @@ def test_what_a_runner_leaves_is_waited_for_by_another(
     record.outcome = "UNKNOWN; the other runner sent only when it had ended"
 
 
-def test_the_child_of_a_fork_minds_none_of_its_parents_goals(
+def test_the_child_of_a_fork_sees_to_none_of_its_parents_goals(
     host: Host, name: str, node: Any, record: Record
 ) -> None:
     """os.fork() beside a running goal, while another thread has the one lock"""
