@@ -920,22 +920,6 @@ def test_what_was_given_up_as_unknown_is_accounted_for_once_it_is_denied_for_goo
     life.is_free(Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED)
 
 
-@pytest.mark.parametrize(("away", "counts"), [(0.5, True), (5.0, False)])
-def test_denials_count_from_one_run_to_the_next(away: float, counts: bool) -> None:
-    """Each run of a program has a node of its own; the server is the same."""
-    life = denied_unconfirmed()
-    for _ in range(int(DENIED_FOR_GOOD / (away + 1.5)) + 1):
-        life.pass_time(1.5)
-        denied(life)
-        life.on(Event.PARKED)
-        life.pass_time(away)
-        life.on(Event.SERVER_RETURNED)
-    denied(life)
-    life.pass_time(2 * (life.goal.timeouts.accept or 0.0))
-    denied(life)
-    assert life.goal.may_still_be_accepted is not counts
-
-
 def test_an_unconfirmed_goal_whose_server_is_back_beside_another_is_canceled_again() -> None:
     life = denied_unconfirmed()
     assert CANCEL in life.on(Event.SERVER_CHANGED)

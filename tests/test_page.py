@@ -258,16 +258,6 @@ def test_a_page_of_2000_actions_is_small_because_they_share_what_they_say() -> N
     assert sum(title == "Timeouts" for title, _ in data["tables"]) == 1
 
 
-def test_a_chain_deeper_than_the_recursion_limit_becomes_a_page_of_bounded_size() -> None:
-    root = last = Sequence("0", memory=True)
-    for number in range(1, 3000):
-        child = Sequence(str(number), memory=True)
-        last.add_child(child)
-        last = child
-    data = _Reader(page(root)).data
-    assert [node["parent"] for node in data["nodes"]] == list(range(-1, 2999))
-
-
 def test_a_tree_too_large_for_a_browser_is_refused_with_a_way_out() -> None:
     root = Sequence("s", memory=True)
     root.add_children([py_trees.behaviours.Success("x") for _ in range(MOST_NODES)])

@@ -123,16 +123,6 @@ def test_an_end_may_be_that_of_the_one_that_has_gone_since(
     assert said.finished(watch, 1.2, 1.1, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
 
 
-def test_a_refusal_may_be_that_of_the_one_that_has_gone_since(
-    said: replies.Replies, watch: ServerWatch
-) -> None:
-    said.looked(watch, 0.0)
-    said.answered(watch, 0.0, [False])
-    watch.observe(1.0, True, frozenset({ONE}))
-    assert events(said.looked(watch, 1.0)) == [Event.SERVER_AMBIGUOUS]
-    assert events(said.answered(watch, 1.1, [False])) == [Event.SERVER_AMBIGUOUS]
-
-
 def test_what_one_denies_the_other_may_have(said: replies.Replies, watch: ServerWatch) -> None:
     assert said.canceled(watch, 0.0, 0.0, [DENIED]) == []
     assert said.canceled(watch, 0.0, 0.0, [DENIED, CANCELED]) == [(Event.CANCEL_ANSWERED, CANCELED)]
@@ -263,13 +253,3 @@ def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -
     now += NO_SECOND_AFTER
     assert told(said, said.looked(watch, now), now) == [Event.SERVER_LOST]
     assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"
-
-
-def test_two_that_accepted_it_both_have_to_tell_also_where_one_came_later(
-    watch: ServerWatch,
-) -> None:
-    said = sent(watch)
-    watch.observe(0.5, True, BOTH)
-    assert told(said, said.answered(watch, 0.6, [True, True]), 0.6) == [Event.SERVER_AMBIGUOUS]
-    assert said.sent_to == BOTH
-    assert said.finished(watch, 0.8, 0.7, [CANCELED_END]) == []

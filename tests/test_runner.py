@@ -380,15 +380,6 @@ class TestStart:
             with pytest.raises(TreeError, match="culprit"):
                 runner.wait(5.0)
 
-    def test_what_nobody_waited_for_is_told_at_shutdown(
-        self, node: Any, capfd: pytest.CaptureFixture[str]
-    ) -> None:
-        runner = TreeRunner(Raises("culprit", "update"), node=node)
-        runner.start()
-        until(lambda: not runner._running.locked())
-        runner.shutdown()
-        assert "the tree that was started raised TreeError: culprit: tick" in capfd.readouterr().err
-
     @pytest.mark.parametrize("last", [GoalChanged, TreeFinished])
     def test_shutdown_by_an_observer_is_refused(
         self, journal: Journal, name: str, node: Any, last: type[Event]

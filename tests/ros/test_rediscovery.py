@@ -22,7 +22,7 @@ from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.route import Route
 from tests.support.trees import in_turn
-from tests.support.waiting import holds_for, until
+from tests.support.waiting import until
 
 Blind = Callable[[MoveRobot], None]
 now = time.monotonic
@@ -116,18 +116,6 @@ def test_who_is_not_heard_after_a_stall_hears_of_its_goal_all_the_same(
         assert leaf._endpoint.transport is not client
     assert journal.ends() == ["canceled" if canceled else "succeeded"]
     until(nobody_looks)
-
-
-def test_nobody_looks_where_nothing_was_ever_lost(
-    name: str, node: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(_domain(node), "ever_lost_sight", False)
-    leaf = MoveRobot("m", 0.1, action_name=name, timeout=Timeouts(server=1.5))
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
-        assert holds_for(nobody_looks, 1.0)
-        runner.wait(5.0)
-    assert leaf.outcome is Outcome.SERVER_UNAVAILABLE
 
 
 def _domain(node: Any) -> Any:
