@@ -22,14 +22,14 @@ HEAD = """\
 
 <!-- Made by scripts/goal_doc.py from TABLE in bt_actions/goals/table.py. Do not edit. -->
 
-One goal on one action server, from wish to end. What happens is told to `Goal.on` as an event, or
-found out by `Goal.poll` when a deadline has passed; what to do comes back as commands. Every pair
-of state and event is decided. What is not in these tables came too late, or twice, to mean
-anything, and is dropped.
+One goal on one action server, from wish to end. What happens is told to `Goal.on` as an event, each
+deadline that has passed (`Goal.due`) as well; what to do comes back as commands. Every pair of
+state and event is decided. What is not in these tables came too late, or twice, to mean anything,
+and is dropped.
 
 As a rule it is QUEUED, WAITING_FOR_SERVER, SENDING, EXECUTING and DONE, with CANCELING before the
 end where it is not wanted any more. The other states are for what goes wrong: a request without an
-answer, a server that is lost. A leaf goes on as soon as its outcome is decided, and some goals live
+answer, a server that is lost. A leaf is free as soon as its outcome is decided, and some goals live
 on after that, so that they are canceled should they run all the same.
 
 `--json` and the terminal tell less finely: REPLACED is shown as EXECUTING there, and UNWANTED,

@@ -238,7 +238,7 @@ class ActionEndpoint:
                 self.deliver_arrived()
                 now = self.participant.now()
                 self._suspend_after_stall(goal, now)
-            self._host.trace.polls(handle)
+            self._host.trace.shows_time(handle)
             for event in goal.due(now):
                 self._apply(handle, event, now)
 

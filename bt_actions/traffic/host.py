@@ -90,7 +90,7 @@ class Trace:
     def does(self, effect: Effect) -> None:
         """What a goal has decided is about to be done."""
 
-    def polls(self, handle: GoalHandle) -> None:
+    def shows_time(self, handle: GoalHandle) -> None:
         """A goal is about to be shown the time."""
 
     def retired(self, handle: GoalHandle) -> None:

@@ -182,7 +182,7 @@ class Witness(Trace):
     def begun(self, handle: traffic.GoalHandle) -> None:
         self._caller.begun(handle)
 
-    def polls(self, handle: traffic.GoalHandle) -> None:
+    def shows_time(self, handle: traffic.GoalHandle) -> None:
         if known := self._caller.known(handle.goal):
             self._caller.judge.sees_clock(known)
 
