@@ -69,7 +69,6 @@ def cleanup(
     namespace: str = "",
     missing: Callable[[list[str], bool], None] = lambda actions, in_vain: None,
     stopped: Callable[[], bool] = lambda: False,
-    context: Any = None,
 ) -> Swept:
     """Cancel what dead orchestrators of this machine left; return it with its ends.
 
@@ -89,21 +88,20 @@ def cleanup(
 
     Where a server in sight does not answer, or this process stands still for long meanwhile, it may
     be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
-    with a new one, unless `context` is given.
+    with a new one, twice at most.
 
     Raises CannotStart, if nothing has been looked at yet; ValueError for a `look`, a `patience` or
-    an `accept` that is negative or no number, and for a name in `wanted` that is none; and what
-    rclpy raises where `context` is shut down meanwhile.
+    an `accept` that is negative or no number, and for a name in `wanted` that is none.
     """
     if not (look >= 0.0 and patience >= 0.0 and accept >= 0.0):
         given = f"look {look}, patience {patience}, accept {accept}"
         raise ValueError(f"{given}: seconds are 0 or more")
     sweep = _Sweep(look, patience, accept, found, sighted, elsewhere, missing, stopped)
-    for tries_left in (2, 1, 0) if context is None else (0,):
+    for tries_left in (2, 1, 0):
         still = Stalls()
         still.lives(time.monotonic())  # it counts from when the participant is made
         try:
-            with onlooker(context, namespace) as sight:
+            with onlooker(namespace) as sight:
                 sweep.begin(sight, wanted)
                 if sweep.goes_through(still, breaks_off=tries_left > 0):
                     break

@@ -13,7 +13,7 @@ from typing import Any
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from rclpy.context import Context
-from rclpy.exceptions import NameValidationException, NotInitializedException
+from rclpy.exceptions import NameValidationException
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -126,23 +126,21 @@ class Onlooker:
 
 
 @contextlib.contextmanager
-def onlooker(context: Context | None, namespace: str) -> Iterator[Onlooker]:
-    """Look from a node in `context`, or in one of its own. Raises CannotStart."""
-    own = Context() if context is None else context
+def onlooker(namespace: str) -> Iterator[Onlooker]:
+    """Look from a node in a context of its own. Raises CannotStart."""
+    context = Context()
     try:
-        if context is None:
-            own.init()
+        context.init()
         node = Node(
-            "bt_actions_cleanup", context=own, namespace=namespace, start_parameter_services=False
+            "bt_actions_cleanup",
+            context=context,
+            namespace=namespace,
+            start_parameter_services=False,
         )
-    except (RuntimeError, OSError, NameValidationException, NotInitializedException) as error:
-        if context is None:
-            own.try_shutdown()
+    except (RuntimeError, OSError, NameValidationException) as error:
+        context.try_shutdown()
         raise CannotStart(str(error).splitlines()[0]) from error
     try:
         yield Onlooker(node)
     finally:
-        if context is None:
-            participant.close(node, own)
-        else:
-            node.destroy_node()
+        participant.close(node, context)

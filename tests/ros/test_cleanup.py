@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 import pytest
-from rclpy.context import Context
 
 from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
@@ -143,9 +142,12 @@ def test_what_is_no_time_and_what_is_no_name_is_refused(
         cleanup(**{"look": 0.0, "patience": 0.0, **wrong})
 
 
-def test_a_context_that_is_not_initialised_is_refused(domain: int, no_leaks: None) -> None:
+def test_a_domain_that_is_none_is_refused(
+    domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "none")
     with pytest.raises(CannotStart):
-        cleanup(context=Context())
+        cleanup()
 
 
 def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
@@ -153,17 +155,14 @@ def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
 ) -> None:
     """What `ros2 launch` gives a node as its namespace is in force for relative names, too."""
     monkeypatch.setattr(module, "LOOK_LONGEST", 0.2)
-    context, told = Context(), list[tuple[list[str], bool]]()
-    context.init(args=["--ros-args", "-r", "__ns:=/r1"], domain_id=domain)
-    monkeypatch.setenv("ROS_DOMAIN_ID", "999")
+    told = list[tuple[list[str], bool]]()
+    monkeypatch.setattr("sys.argv", ["", "--ros-args", "-r", "__ns:=/r1"])
     swept = cleanup(
         look=0.1,
         patience=0.1,
         wanted={"move", "/r2/move"},
         missing=lambda actions, in_vain: told.append((actions, in_vain)),
-        context=context,
     )
-    context.shutdown()
     assert told == [(["/r1/move", "/r2/move"], False), (["/r1/move", "/r2/move"], True)]
     assert swept.domain == domain, "the one in force"
 

@@ -712,8 +712,6 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     launch: Launch, serve: Serve, tree: Tree, name: str, domain: int, record: Record
 ) -> None:
     """SIGKILL to the orchestrator while cleanup looks, and has seen its goal"""
-    from rclpy.context import Context
-
     from bt_actions.recovery.left_behind import LeftBehind
     from bt_actions.recovery.sweep import cleanup
 
@@ -721,14 +719,12 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     run = launch("run", str(tree(name, distance=9.0)))
     run.line("executing on")
     goal = journal.wait_for("accepted").goal
-    context, sighted, left = Context(), threading.Event(), list[LeftBehind]()
-    context.init(domain_id=domain)
+    sighted, left = threading.Event(), list[LeftBehind]()
     sweeps = threading.Thread(
         target=lambda: left.extend(
             cleanup(
                 look=8.0,
                 sighted=lambda action: sighted.set() if action == name else None,
-                context=context,
             ).left
         )
     )
@@ -741,7 +737,6 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     run.send(signal.SIGKILL)
     run.wait()
     sweeps.join()
-    context.shutdown()
     assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
     record.outcome = "CANCELED"
 
