@@ -45,6 +45,21 @@ def seconds(arguments: Sequence[str]) -> float:
     return time.perf_counter() - began
 
 
+def seconds_to(word: str, arguments: Sequence[str]) -> float:
+    """Return how long a Python process takes to a line that begins so; raises where it fails."""
+    command, took = [sys.executable, *arguments], 0.0
+    began = time.perf_counter()
+    with subprocess.Popen(
+        command, env=environment(), cwd=ROOT, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            took = took or (time.perf_counter() - began if line.startswith(word) else 0.0)
+    if process.returncode or not took:
+        raise Lost(f"{command} ended with {process.returncode}")
+    return took
+
+
 class Lost(Exception):
     """A side did not come to its end."""
 

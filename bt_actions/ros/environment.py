@@ -31,6 +31,11 @@ class Reach(Enum):
     nearby, nor these for them: it is private, whatever the user has set for robots."""
 
 
+def sees_nobody_else() -> bool:
+    """Whether a node that is made now sees those of this process alone."""
+    return os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == Reach.PROCESS.value
+
+
 def prepare(reach: Reach = Reach.NETWORK) -> None:
     """Let others notice within 3 s when this process dies, and set how far it may be seen.
 

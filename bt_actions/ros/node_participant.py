@@ -16,11 +16,12 @@ from typing import Any
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
-from bt_actions.goals.terms import Now
+from bt_actions.goals.terms import NEVER, Now
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
+from bt_actions.ros.environment import sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
 from bt_actions.ros.graph import enclave
 from bt_actions.ros.host import host
@@ -130,7 +131,9 @@ class NodeParticipant:
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
         """Become a client of an action."""
         self._warn_of_remapping(name)
-        return RosTransport(self.node, action_type, name, listener, self.seen_since)
+        is_private = sees_nobody_else()  # no server can come to be seen later than another
+        seen_since = NEVER if is_private else self.seen_since
+        return RosTransport(self.node, action_type, name, listener, seen_since)
 
     def _warn_of_remapping(self, name: str) -> None:
         """Say it, once for a name, where a rule would have it another: ROS remaps no action."""

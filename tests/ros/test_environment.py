@@ -11,7 +11,7 @@ import pytest
 
 from bt_actions import cli
 from bt_actions.cli.program import COMMANDS
-from bt_actions.ros.environment import SHORT_LEASE, Reach, prepare
+from bt_actions.ros.environment import SHORT_LEASE, Reach, prepare, sees_nobody_else
 from tests.support.middleware import on_loopback
 
 
@@ -63,6 +63,15 @@ def test_transports_that_the_user_chose_stand(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "LARGE_DATA")
     prepare()
     assert _get("FASTDDS_BUILTIN_TRANSPORTS") == "LARGE_DATA"
+
+
+@pytest.mark.parametrize("reach", Reach)
+def test_only_a_private_process_sees_nobody_else(
+    reach: Reach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+    prepare(reach)
+    assert sees_nobody_else() is (reach is Reach.PROCESS)
 
 
 @pytest.mark.parametrize("prepared", [True, False])
