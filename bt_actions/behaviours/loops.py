@@ -9,7 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Countdown
-from bt_actions.behaviours.gate import Gate
+from bt_actions.behaviours.decorators import Gate
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten

@@ -17,7 +17,7 @@ from py_trees.common import Status
 from py_trees.composites import Selector
 
 from bt_actions import document
-from bt_actions.behaviours.gate import Gate
+from bt_actions.behaviours.decorators import Gate
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.utilities.places import path_of

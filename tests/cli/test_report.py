@@ -343,6 +343,7 @@ def test_what_was_pruned_in_a_run_is_not_kept() -> None:
     def tick() -> None:
         ticking.tick()
         visitor.finish()
+        visitor.forget_others(set(root.iterate()))
 
     pruned = []
     for number in range(5):

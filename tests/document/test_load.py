@@ -13,8 +13,7 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.check import Check
-from bt_actions.behaviours.waiting import WaitUntil
+from bt_actions.behaviours.leaves import Check, WaitUntil
 from bt_actions.document import (
     DocumentError,
     InputError,

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from py_trees.common import Status
 
-from bt_actions.behaviours.limits import Deadline
+from bt_actions.behaviours.decorators import Deadline
 from bt_actions.cli import main
 from bt_actions.document import DocumentError, check_file, load_tree, place_of, tree_outputs
 

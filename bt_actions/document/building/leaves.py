@@ -11,12 +11,10 @@ from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure, Running, Success
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.check import Check
-from bt_actions.behaviours.doing import Log, SetValues
+from bt_actions.behaviours.leaves import Check, Log, SetValues, Wait, WaitUntil
 from bt_actions.behaviours.run_tree import CANCEL, RunTree, roots_of
 from bt_actions.behaviours.service import CallService
 from bt_actions.behaviours.topics import Publish, WaitForMessage
-from bt_actions.behaviours.waiting import Wait, WaitUntil
 from bt_actions.document.building.context import Context, Root, plain_name, table_of, written_text
 from bt_actions.document.language.classes import ClassError, make_behaviour, refusal
 from bt_actions.document.language.values import Computed, computed_in
