@@ -79,6 +79,9 @@ class _Question:
 class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typed
     """One action as one node sees it (transport.ActionTransport)."""
 
+    never_waits = True
+    """No code of a user's runs in it (workarounds/once_executor.py)."""
+
     def __init__(
         self,
         node: Node,
