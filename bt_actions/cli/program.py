@@ -122,7 +122,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _dispatch(argv: Sequence[str] | None) -> int:
     arguments = sys.argv[1:] if argv is None else list(argv)
     wanted = arguments[0] if arguments else ""
-    parser = build_parser(wanted if wanted in COMMANDS else "")
+    alone = wanted in COMMANDS and wanted != "completion"  # which tells of all of them
+    parser = build_parser(wanted if alone else "")
     if not arguments:
         parser.print_help()
         return Exit.BAD_INPUT
