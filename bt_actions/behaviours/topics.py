@@ -221,7 +221,8 @@ class Publish(Connected[Publisher]):
         backend, publisher = self._there()
         topic, listeners = publisher.topic, publisher.listeners
         if listeners < (self._subscribers or publisher.listener_may_come() > 0.0):
-            if self._subscribers and self._is_late(publisher):
+            discovered = publisher.listener_may_come() <= 0.0
+            if self._subscribers and discovered and self._countdown.left() <= 0.0:
                 self.feedback_message = (
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
                     f" {self._timeout:g} s{publisher.why_unheard()}"
@@ -239,10 +240,6 @@ class Publish(Connected[Publisher]):
             self.warning = f"nobody listens on {topic}{publisher.why_unheard()}"
         self.feedback_message = self.warning
         return Status.SUCCESS
-
-    def _is_late(self, publisher: Publisher) -> bool:
-        """Whether nobody more is waited for: the time is over, and who is there is discovered."""
-        return self._countdown.left() <= 0.0 and publisher.listener_may_come() <= 0.0
 
     def due_in(self) -> float | None:
         """Seconds until it looks again for who listens."""

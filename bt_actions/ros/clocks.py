@@ -6,6 +6,7 @@ that is set moves no deadline. Holds no deadline itself.
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -25,14 +26,11 @@ class Clocks:
         self._simulated = False
         self._offset = 0.0
         self._last = time.monotonic()
-        self._waits_since: float | None = None  # for the first message on /clock
-        self._warned = False
+        self._warn_at = 0.0  # that nothing has come on /clock; 0: it is not waited for yet
 
     def now(self) -> Now:
         """Return this moment."""
-        with (
-            host.lock
-        ):  # two threads that find simulated time switched on must not both make up for it
+        with host.lock:  # two threads that find time simulated must not both make up for it
             return self._now()
 
     def stamp(self) -> int:
@@ -57,10 +55,9 @@ class Clocks:
         return Now(steady, self._last)
 
     def _waits(self, steady: float) -> None:
-        if self._waits_since is None:
-            self._waits_since = steady
-        if steady - self._waits_since > MOMENT and not self._warned:
-            self._warned = True
+        self._warn_at = self._warn_at or steady + MOMENT
+        if steady > self._warn_at:
+            self._warn_at = math.inf
             log.warning(
                 f"use_sim_time is set, and nothing has come on /clock for {MOMENT:g} s: until then "
                 "no time passes for what waits by it; is the simulator there, and not paused?"

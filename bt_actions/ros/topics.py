@@ -68,7 +68,7 @@ class _Topic:
         return max(0.0, self._discovered_at - time.monotonic())
 
     def _why(self, *, publish: bool) -> str:
-        """What the graph shows that explains why nobody publishes, or listens."""
+        """What the graph shows that explains why nobody publishes, or listens; or ""."""
         kind = interface_name(self._type)
         return without_topic(self._node, self.topic, kind, self._qos, publish=publish)
 

@@ -55,9 +55,7 @@ class Row:
     """Seconds of the visits before the latest."""
     duration: float = 0.0
     """Seconds from the first wish to the last outcome of each visit, summed up."""
-    _open: dict[str, str] = field(default_factory=dict)  # goals without a known end: states
-    _gone: set[str] = field(default_factory=set)  # whose server went away
-    _doubtful: set[str] = field(default_factory=set)  # not begun, as far as their server knows
+    _goals: dict[str, GoalChanged] = field(default_factory=dict)  # of which more may come: latest
     _recent: deque[str] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
 
     @property
@@ -68,38 +66,30 @@ class Row:
     @property
     def live_goals(self) -> dict[str, str]:
         """The goals that may be running, by their ids: their states."""
-        return {each: state for each, state in self._open.items() if state not in UNSENT}
-
-    @property
-    def under_way(self) -> bool:
-        """Whether a goal of this leaf has no known end, be it that it was not sent yet."""
-        return bool(self._open)
+        latest = self._goals.values()
+        return {e.goal_id: e.state for e in latest if _is_open(e) and e.state not in UNSENT}
 
     @property
     def left_at_server(self) -> bool:
         """Whether a goal of this leaf had a server that went away, and may be back with it."""
-        return bool(self._gone)
+        return any(event.end is End.SERVER_GONE for event in self._goals.values())
 
     @property
     def in_doubt(self) -> bool:
         """Whether the latest goal has not begun as far as its server knows, which may change."""
-        return bool(self._recent) and self._recent[-1] in self._doubtful
+        return bool(self._recent) and _is_doubtful(self._goals.get(self._recent[-1]))
 
     @property
     def waited_for(self) -> int:
         """How many goals of this leaf a run that is over waits for."""
-        return len(self.live_goals) + len(self._doubtful)
+        return len(self.live_goals) + sum(map(_is_doubtful, self._goals.values()))
 
     def observe(self, event: GoalChanged) -> None:
         """Take in one event of a goal of this leaf."""
-        doubtful = event.state != DONE and event.outcome and event.end is End.NEVER_STARTED
-        (self._doubtful.add if doubtful else self._doubtful.discard)(event.goal_id)
-        (self._gone.add if event.end is End.SERVER_GONE else self._gone.discard)(event.goal_id)
-        told = event.outcome is not None and event.end not in (None, End.UNKNOWN)
-        if event.state == DONE or told:
-            self._open.pop(event.goal_id, None)
+        if _is_open(event) or _is_doubtful(event) or event.end is End.SERVER_GONE:
+            self._goals[event.goal_id] = event
         else:
-            self._open[event.goal_id] = event.state
+            self._goals.pop(event.goal_id, None)
         if event.goal_id not in self._recent:
             self._begin(event)
         elif event.goal_id != self._recent[-1]:
@@ -136,6 +126,18 @@ class Row:
 
     def _count(self, event: GoalChanged) -> None:
         self.duration = self.counted + max(0.0, event.time - self.begun)
+
+
+def _is_open(event: GoalChanged) -> bool:
+    """Whether its goal has no known end, be it that it was not sent yet."""
+    return event.state != DONE and (event.outcome is None or event.end in (None, End.UNKNOWN))
+
+
+def _is_doubtful(event: GoalChanged | None) -> bool:
+    """Whether its goal has not begun as far as its server knows, which may change."""
+    if event is None or event.state == DONE or event.outcome is None:
+        return False
+    return event.end is End.NEVER_STARTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +233,7 @@ class Report:
 
     def seconds(self, row: Row) -> float:
         """Return how long `row` took so far, a visit that is not over included."""
-        if row.outcome is not None or not row.under_way:
+        if row.outcome is not None or not row.visits:
             return row.duration
         return row.counted + max(0.0, self.now - row.begun)
 
