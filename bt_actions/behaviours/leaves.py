@@ -12,11 +12,9 @@ from py_trees.common import Status
 from bt_actions.behaviours.connected import Countdown, limit
 from bt_actions.behaviours.variables import read
 from bt_actions.expressions.expression import Expression, ExpressionError
-from bt_actions.traffic.backend import Backend
+from bt_actions.traffic.backend import LEVELS, Backend
 from bt_actions.utilities.units import parse_duration
 from bt_actions.wiring import backend_of
-
-LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 
 
 class Wait(Behaviour):
@@ -182,7 +180,7 @@ class Log(Behaviour):
             return Status.FAILURE
         self.feedback_message = line
         if self._backend is None:
-            logging.getLogger("bt_actions").log(LEVELS[self._level], "%s", line)
+            logging.getLogger("bt_actions").log(LEVELS[self._level], line)
         else:
             self._backend.log(self._level, line)
         return Status.SUCCESS

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
 
 MOST = 10_000
@@ -27,7 +28,6 @@ WITHIN = 1.0
 LONGEST = 3000
 """Bytes of a line; a pipe that has room at all has room for 4,096."""
 STDERR = 2
-LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 BY_RCLPY: dict[str, Callable[[Any, str], object]] = {
     "debug": lambda logger, text: logger.debug(text),
     "info": lambda logger, text: logger.info(text),

@@ -13,9 +13,9 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
 
-LEVELS = {"info": 20, "error": 40}
 LINGER = 0.5
 """Seconds, at most, for the last line to be acknowledged by those who listen."""
 

@@ -16,7 +16,10 @@ from bt_actions.goals.terms import Now
 if TYPE_CHECKING:
     from bt_actions.traffic.traffic import Traffic
 
-__all__ = ["Backend", "Clock", "Publisher", "Service", "Subscription"]
+__all__ = ["LEVELS", "Backend", "Clock", "Publisher", "Service", "Subscription"]
+
+LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
+"""What lines of a log may be called, and Python's numbers for it."""
 
 
 class Clock(Protocol):
@@ -139,4 +142,4 @@ class Backend(Protocol):
         """Have whoever runs a tree here tick it soon; callable from any thread."""
 
     def log(self, level: str, text: str) -> None:
-        """Write a line of the tree's: debug, info, warn, error or fatal."""
+        """Write a line of the tree's; `level` is one of `LEVELS`."""

@@ -18,7 +18,8 @@ import pytest
 import rclpy.logging
 
 from bt_actions.ros import log as module
-from bt_actions.ros.log import BY_RCLPY, LEVELS, LONGEST, MOST, Log
+from bt_actions.ros.log import BY_RCLPY, LONGEST, MOST, Log
+from bt_actions.traffic.backend import LEVELS
 from tests.support.waiting import until
 
 _numbers = itertools.count()
