@@ -18,7 +18,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 
 import bt_actions
-from bt_actions import document, events
+from bt_actions import document, events, testing
 
 PATH = Path(__file__).resolve().parent.parent / "docs" / "python.md"
 
@@ -27,7 +27,7 @@ HEAD = """\
 
 <!-- Made by scripts/python_doc.py from the docstrings. Do not edit. -->
 
-`import bt_actions` gives the names on this page, but for the two parts at its end. How a tree of
+`import bt_actions` gives the names on this page, but for the three parts at its end. How a tree of
 your own is made of them and run stands in the [README](../README.md#in-your-own-py_trees-tree), and
 how they live in a program of yours in [embedding.md](embedding.md). `bt_actions.testing` runs them
 in virtual time ([testing.md](testing.md)). Times are seconds.
@@ -81,6 +81,11 @@ EVENTS_HEAD = """\
 ## Events
 
 What `TreeRunner.observe` tells, from `bt_actions.events`. All of them are values."""
+TESTING = ["VirtualNetwork", "VirtualRunner", "VirtualBackend", "ScriptedServer", "Script"]
+TESTING_HEAD = """\
+## Tests in virtual time
+
+From `bt_actions.testing`; how they are used stands in [testing.md](testing.md)."""
 BY_PY_TREES = {"setup", "initialise", "update", "terminate", "shutdown"}
 BY_OURSELVES = {
     "ActionBehaviour.due_in",
@@ -88,6 +93,22 @@ BY_OURSELVES = {
     "ActionBehaviour.open_handles",
     "Retry.pause",
     "TreeRunner.catch_up",
+    "ScriptedServer.begin",
+    "ScriptedServer.failure",
+    "ScriptedServer.feedback",
+    "ScriptedServer.refusal",
+    "ScriptedServer.result",
+    "VirtualBackend.log",
+    "VirtualBackend.publisher",
+    "VirtualBackend.service",
+    "VirtualBackend.subscription",
+    "VirtualBackend.wake",
+    "VirtualNetwork.expand",
+    "VirtualNetwork.publish",
+    "VirtualNetwork.serve",
+    "VirtualNetwork.service",
+    "VirtualNetwork.timer",
+    "VirtualNetwork.topic",
 }
 """Public because other parts call them, and of no use to who uses the library."""
 
@@ -208,6 +229,8 @@ def page() -> str:
     parts += [entry(name, getattr(document, name)) for name in DOCUMENT]
     parts.append(EVENTS_HEAD)
     parts += [entry(kind.__name__, kind) for kind in EVENTS]
+    parts.append(TESTING_HEAD)
+    parts += [entry(name, getattr(testing, name)) for name in TESTING]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 

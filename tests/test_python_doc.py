@@ -6,6 +6,7 @@ import runpy
 from pathlib import Path
 
 import bt_actions
+from bt_actions import testing
 
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "python_doc.py"))
@@ -25,4 +26,4 @@ def test_every_public_name_is_on_the_page() -> None:
 def test_what_is_left_out_is_there_to_be_left_out() -> None:
     for hidden in SCRIPT["BY_OURSELVES"]:
         kind, _, name = hidden.partition(".")
-        assert name in vars(getattr(bt_actions, kind))
+        assert name in vars(getattr(bt_actions, kind, None) or getattr(testing, kind))

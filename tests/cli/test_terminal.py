@@ -105,7 +105,7 @@ DEMO = ("run", "pick_and_place", "--sim", "--speed", "10")
 def test_the_tree_is_drawn_live_and_leaves_the_report(
     terminal: Callable[..., Terminal], mark: str
 ) -> None:
-    demo = terminal(*DEMO)
+    demo = terminal(*DEMO[:-1], "2")  # so slow that each state is on the screen for long
     demo.until("▶ To the part  executing, attempt 1 of 3, ")
     demo.until(" s left for feedback, current_pose")
     drawn = [line for line in demo.screen.display if line.strip()]

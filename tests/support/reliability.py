@@ -27,7 +27,9 @@ view is not believed. It stands beside that as the outcome, with the end of a go
 another. The time is the one from what was done to the outcome, where it was measured, rounded. All
 talk over UDP (on loopback, or on the link between two network namespaces) but the servers "with
 Fast DDS as it comes". How to get the short lease for servers of your own:
-[reliability-settings.md](reliability-settings.md).
+[reliability-settings.md](reliability-settings.md). One row again: `python -m pytest tests/scenarios
+-m "" -k killed_with_the_short_lease`, the words of its name. By hand: `bt-actions sim --fault
+move_robot:1:die` in one terminal, `bt-actions run` in another.
 """
 ON_A_BUSY_MACHINE = 3.0
 """Times longer than a scenario's limit is good enough where no report is written: `make test` runs
