@@ -77,7 +77,7 @@ python:
 $(VENV)/interfaces.stamp: $(INTERFACES) | python
 	@scripts/compiler.sh
 	@rm -rf $(VENV)/wheels
-	@scripts/pip.sh $(VENV) "Building the ROS interfaces" wheel --no-deps --wheel-dir $(VENV)/wheels ./interfaces/*/
+	@scripts/pip.sh $(VENV) "Building the ROS interfaces" wheel --no-deps --wheel-dir $(VENV)/wheels ./interfaces/*_interfaces/
 	@scripts/pip.sh $(VENV) "Installing the ROS interfaces" install --no-deps --force-reinstall $(VENV)/wheels/*.whl
 	@touch $@
 
