@@ -94,6 +94,8 @@ class Server:
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._process = process
+        self.first_at = 0.0
+        """When the first goal came, by the monotonic clock; known with the journal."""
 
     def journal(self) -> dict[str, list[int]]:
         """Return the `order` of each goal that it ran, one after the other, by action."""
@@ -101,7 +103,9 @@ class Server:
         assert self._process.stdout is not None
         self._process.stdin.write("journal\n")
         self._process.stdin.flush()
-        said: dict[str, list[int]] = json.loads(self._process.stdout.readline())
+        said: dict[str, list[int]]
+        said, first = json.loads(self._process.stdout.readline())
+        self.first_at = max(first, default=0.0)
         return said
 
 

@@ -35,9 +35,12 @@ def main() -> None:
     rclpy.init()
     node = Node("benchmark_server")
     journal: dict[str, list[int]] = {name: [] for name in wanted.names}
+    first_at: list[float] = []
 
     def executing(name: str) -> Any:
         def execute(handle: Any) -> Any:
+            if not first_at:
+                first_at.append(time.monotonic())
             journal[name].append(handle.request.order)
             ends = time.monotonic() + wanted.feedback
             while time.monotonic() < ends:
@@ -62,7 +65,7 @@ def main() -> None:
     spinning.start()
     print("ready", flush=True)
     for _ in sys.stdin:
-        print(json.dumps(journal), flush=True)
+        print(json.dumps([journal, first_at]), flush=True)
     executor.shutdown()
     spinning.join()
     node.destroy_node()
