@@ -8,6 +8,7 @@ holds of a goal that they deny: one that was sent, and not accepted yet, may tur
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 
 ASK_AGAIN = 1.0
@@ -131,14 +132,14 @@ class Denial:
     def begin(self) -> None:
         """Go on in a new participant, of which the servers have been asked nothing."""
         self._asked: dict[int, tuple[float, Collection[bytes]]] = {}
-        self._denials: dict[int, int] = {}
+        self._denials = Counter[int]()
         self._last: tuple[float, Collection[bytes]] | None = None  # question that all denied
         self.lasted = 0.0
         """Seconds for which all have denied it, the last time too."""
 
     def asked(self, number: int, of: Collection[bytes], now: float) -> None:
         """The question of this number was asked, `of` these servers."""
-        self._asked[number], self._denials[number] = (now, of), 0
+        self._asked[number] = now, of
         for oldest in list(self._asked)[:-QUESTIONS]:
             del self._asked[oldest], self._denials[oldest]
 

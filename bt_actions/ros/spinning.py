@@ -93,7 +93,12 @@ class Spinner:
             raise
         self._traffic = traffic_of(self.node)
         self._own_executor = given is None
-        self.executor: Executor = given or _make(executor, context)
+        if given is not None:
+            self.executor: Executor = given
+        elif executor == "single":
+            self.executor = SingleThreadedExecutor(context=context)
+        else:
+            self.executor = OnceExecutor(THREADS, context=context)
         self._added = self.node.executor is None
         if self._added:
             self.executor.add_node(self.node)
@@ -224,12 +229,6 @@ class Spinner:
                 participant.close(self.node, self._context)
             else:
                 self.node.destroy_node()
-
-
-def _make(kind: Executor | str | None, context: Context) -> Executor:
-    if kind == "single":
-        return SingleThreadedExecutor(context=context)
-    return OnceExecutor(THREADS, context=context)
 
 
 def node_beside(node: Node, name: str) -> Node:

@@ -16,8 +16,6 @@ from bt_actions.goals.terms import Now
 if TYPE_CHECKING:
     from bt_actions.traffic.traffic import Traffic
 
-__all__ = ["LEVELS", "Backend", "Clock", "Publisher", "Service", "Subscription"]
-
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 """What lines of a log may be called, and Python's numbers for it."""
 
