@@ -52,7 +52,7 @@ soak: dev ## 20,000 goals with every fault; an hour or two
 bench: dev ## measure everything beside a yardstick, twenty minutes or so; writes docs/performance.md
 	$(BIN)/python -m benchmarks --page docs/performance.md
 
-bench-short: dev ## measure rows 1, 3, 5 and 8; fails where one is far beyond its limit
+bench-short: dev ## measure the rows that CI holds us to; fails where one is far beyond its limit
 	$(BIN)/python -m benchmarks --short
 
 types: dev ## mypy --strict
