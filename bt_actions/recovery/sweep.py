@@ -33,7 +33,7 @@ TURN = 0.05
 GLANCE = 0.1
 """and, at least, between two looks at the graph, and for who is still alive."""
 LOOK_LONGEST = 30.0
-"""Seconds for which servers may take to answer, in all: a ghost is shown for 20."""
+"""Seconds for which servers may take to answer, in all: a dead server is shown for 20."""
 AWAIT_LONGER = LOOK_LONGEST + 2 * SETTLE
 """Seconds by which a goal is awaited longer, at most, than it has to be denied."""
 LOOK_AGAIN = 10.0
