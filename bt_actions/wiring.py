@@ -21,9 +21,15 @@ __all__ = ["backend_of", "ended_by_signals", "log", "spinner"]
 
 
 def backend_of(node: Any) -> Backend:
-    """Return what a node gives; what is a Backend itself is returned as it is."""
+    """Return what a node gives; what is a Backend itself is returned as it is.
+
+    Raises TypeError where it is neither.
+    """
     if isinstance(node, Backend):
         return node
+    if not hasattr(node, "create_client"):
+        remedy = "in virtual time give VirtualBackend(network)"
+        raise TypeError(f"{node!r} is neither an rclpy node nor a backend; {remedy}")
     from bt_actions.recovery.ledger import Ledger
     from bt_actions.ros.host import host
     from bt_actions.ros.node_participant import NodeParticipant

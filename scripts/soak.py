@@ -199,7 +199,7 @@ def compare(said: Path, record: Path) -> list[str]:
     ends = {goal: End(end) for goal, end, _ in lines}
     outcomes = Counter(outcome for _, _, outcome in lines)
     entries = journal.read(record)
-    known = {goal: str(end) for goal, end in journal.ends(entries).items()}
+    known = {goal: str(end) for (_, goal), end in journal.ends(entries).items()}
     print("outcomes:", dict(outcomes))
     print("the journal's ends:", dict(Counter(known.values())))
     wrong = [f"{g}: {e}, and we said nothing" for g, e in known.items() if g not in ends]
@@ -213,7 +213,7 @@ def compare(said: Path, record: Path) -> list[str]:
         for goal, end in ends.items()
         if goal not in known and end not in SAID["None"]
     ]
-    twice = [goal for goal, times in journal.executions(entries).items() if times > 1]
+    twice = [goal for (_, goal), times in journal.executions(entries).items() if times > 1]
     return wrong + [f"{goal}: executed twice" for goal in twice]
 
 

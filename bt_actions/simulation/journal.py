@@ -197,38 +197,52 @@ def max_live(
     *,
     killed: Mapping[int, float] | None = None,
 ) -> int:
-    """Return how many goals were live at once, at most, on `server` (or on all together)."""
-    intervals = live_intervals(entries, server, killed=killed)
-    edges = [(interval.start, 1) for interval in intervals]
-    edges += [(interval.end, -1) for interval in intervals if interval.end is not None]
-    live = most = 0
-    for _, change in sorted(edges):
-        live += change
-        most = max(most, live)
+    """Return how many goals were live at once, at most, on `server` (or on all together).
+
+    The order of the lines counts: in virtual time, many are of one moment.
+    """
+    killed = killed or {}
+    live: set[tuple[int, str, str]] = set()
+    most = 0
+    for entry in entries:
+        if server is not None and entry.server != server:
+            continue
+        live -= {key for key in live if key[0] in killed and killed[key[0]] <= entry.t}
+        key = (entry.pid, entry.server, entry.goal)
+        if entry.event is Event.ACCEPTED:
+            live.add(key)
+        elif entry.event in ENDS:
+            live.discard(key)
+        most = max(most, len(live))
     return most
 
 
-def ends(entries: Iterable[Entry], server: str | None = None) -> dict[str, Event | None]:
-    """Return how each goal that was received ended: by goal id, in the order of their coming.
+def ends(
+    entries: Iterable[Entry], server: str | None = None
+) -> dict[tuple[str, str], Event | None]:
+    """Return how each goal that was received ended.
 
-    None: it is still live, or was never answered.
+    By server and goal id, in the order of their coming. None: it is still live, or was never
+    answered.
     """
-    found: dict[str, Event | None] = {}
+    found: dict[tuple[str, str], Event | None] = {}
     for entry in entries:
         if not entry.goal or (server is not None and entry.server != server):
             continue
-        if entry.event is Event.CANCEL_REQUESTED and entry.goal not in found:
+        key = (entry.server, entry.goal)
+        if entry.event is Event.CANCEL_REQUESTED and key not in found:
             continue  # of a goal that is not known here
-        found.setdefault(entry.goal, None)
+        found.setdefault(key, None)
         if entry.event in ENDS or entry.event is Event.REJECTED:
-            found[entry.goal] = entry.event
+            found[key] = entry.event
     return found
 
 
-def executions(entries: Iterable[Entry]) -> dict[str, int]:
-    """Return how often each goal was accepted: more than once is a goal executed twice."""
-    counted: dict[str, int] = {}
+def executions(entries: Iterable[Entry]) -> dict[tuple[str, str], int]:
+    """Return how often each goal, by server and id, was accepted: twice is executed twice."""
+    counted: dict[tuple[str, str], int] = {}
     for entry in entries:
         if entry.event is Event.ACCEPTED:
-            counted[entry.goal] = counted.get(entry.goal, 0) + 1
+            key = (entry.server, entry.goal)
+            counted[key] = counted.get(key, 0) + 1
     return counted

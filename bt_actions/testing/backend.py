@@ -21,11 +21,12 @@ class VirtualBackend:
     def __init__(
         self, network: VirtualNetwork, *, seed: int = 0, host: VirtualHost | None = None
     ) -> None:
-        """Goal ids, and the pauses before retries, depend on `seed` alone.
+        """Goal ids, and the pauses before retries, depend on `seed` and the number on the network.
 
         `host` is that of another backend, where both stand for nodes of one process.
         """
         self.network = network
+        seed += next(network.numbers) << 64  # what two make from one seed differs
         self.host = host or VirtualHost(network.timeline, network.log, seed)
         self.participant = VirtualParticipant(network, "tree", network.namespace)
         self.traffic = Traffic(self.host, self.participant)

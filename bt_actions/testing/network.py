@@ -5,6 +5,7 @@ The Platform of simulation/platform.py, with topics and services. It decides not
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -51,6 +52,8 @@ class VirtualNetwork(Medium):
         """`namespace` is that of the servers on it, and of trees that are run on it."""
         super().__init__(Timeline())
         self.log = Lines()
+        self.numbers = itertools.count()
+        """Those of its participants."""
         self.namespace = f"/{namespace.strip('/')}"
         self._topics: dict[str, _Topic] = {}
         self._services: dict[str, tuple[type, Callable[[Any], Any], float]] = {}

@@ -19,6 +19,7 @@ from bt_actions.utilities.stepping import Done
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, Observer
+    from bt_actions.goals.attempts import AttemptRecord
     from bt_actions.goals.policy import Outcome
     from bt_actions.running.goals import GoalReport
 
@@ -41,21 +42,26 @@ class VirtualRunner:
 
         Without a `network` the tree is alone.
         """
+        if not isinstance(network, VirtualNetwork | None):
+            raise TypeError(f"{network!r} is no VirtualNetwork, on which servers and trees are")
         tree = root_or_behaviour_tree
         self.tree = tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree)
         self.network = network or VirtualNetwork()
         self.backend = VirtualBackend(self.network, seed=seed)
         self.events: list[Event] = []
         """What happened in all runs; times are virtual."""
+        self._histories: dict[str, list[AttemptRecord]] = {}
+        """Of each goal: where its leaf files what becomes of it."""
         self._woken = self._goes_on = False
         self._status: Status | None = None
+        """None before the first run."""
         self._loop = TickLoop(
             self.tree,
             self.backend,
             heartbeat=heartbeat,
             wake=self._wake,
         )
-        self._loop.observe(self.events.append)
+        self._loop.observe(self._note)
 
     def __repr__(self) -> str:
         return f"<VirtualRunner of {self.tree.root.name!r} at {self.now:g} s>"
@@ -67,16 +73,23 @@ class VirtualRunner:
 
     @property
     def outcomes(self) -> list[tuple[str, Outcome]]:
-        """Of each goal that its leaf has stopped waiting for, in that order: the leaf, and why."""
+        """Of each attempt that is over, in that order: the leaf, and what it says of it."""
         ended: dict[str, tuple[str, Outcome]] = {}
         for event in self.events:
             if isinstance(event, GoalChanged) and event.outcome is not None:
-                ended.setdefault(event.goal_id, (event.behaviour.name, event.outcome))
+                filed = {each.goal_id: each.outcome for each in self._histories[event.goal_id]}
+                outcome = filed.get(event.goal_id, event.outcome)
+                ended.setdefault(event.goal_id, (event.behaviour.name, outcome))
         return list(ended.values())
 
     @property
     def unaccounted(self) -> list[GoalReport]:
-        """Goals that may still be running, as nobody knows their end."""
+        """Goals that may still be running, as nobody knows their end.
+
+        Raises RuntimeError while a run goes on, as its goals have to end yet.
+        """
+        if self._goes_on:
+            raise RuntimeError("the run goes on: let it end first, with run(), or interrupt()")
         return self._loop.goals.unaccounted
 
     def observe(self, callback: Observer) -> None:
@@ -98,14 +111,16 @@ class VirtualRunner:
         """Begin a run, for `advance` to go on with."""
         self._loop.begin(self.now, timeout)
         self._woken = self._goes_on = True
-        self._status, self._next = None, self.now
+        self._status, self._next = Status.INVALID, self.now
 
     def advance(self, seconds: float) -> Status | None:
         """Let so much time pass; return the tree's status if it has ended by then.
 
         It returns when the tree ends; after that, time passes without it. INVALID means that it
-        was interrupted. Raises what `run` raises.
+        was interrupted. Raises what `run` raises, and RuntimeError before the first `start`.
         """
+        if self._status is None:
+            raise RuntimeError("no run was begun: call start() before advance()")
         until = self.now + seconds
         while self._goes_on:
             while not self._woken and self.network.timeline.advance(min(self._next, until)):
@@ -131,6 +146,12 @@ class VirtualRunner:
         self._loop.shutdown()
         self.backend.traffic.destroy()
         self._loop.close(self.now)
+
+    def _note(self, event: Event) -> None:
+        self.events.append(event)
+        if isinstance(event, GoalChanged):
+            history: list[AttemptRecord] = getattr(event.behaviour, "history", [])
+            self._histories.setdefault(event.goal_id, history)
 
     def _wake(self) -> None:
         self._woken = True

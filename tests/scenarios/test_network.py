@@ -296,6 +296,6 @@ def agrees(run: Process, journal: Journal) -> None:
     """Every goal that the server accepted is in the report, with the end that the server knows."""
     assert journal.executed_twice == []
     reported = {goal["goal_id"]: goal["end"] for goal in goals(run)}
-    for goal, end in journal_ends(journal.entries()).items():
+    for (_, goal), end in journal_ends(journal.entries()).items():
         assert end is not None, goal
         assert reported[goal] == str(end).upper(), goal

@@ -20,7 +20,7 @@ class Report:
 
 def compare(report: Report, entries: list[Entry]) -> dict[str, str]:
     """Fail unless report and journal agree on every goal; return the ends by goal."""
-    journal = {goal: str(end) for goal, end in ends(entries).items()}
+    journal = {goal: str(end) for (_, goal), end in ends(entries).items()}
     unknown = {goal for goal, event in report.goals.items() if event.end is End.UNKNOWN}
     assert unknown == set()
     never = {g for g, event in report.goals.items() if event.end is End.NEVER_STARTED}

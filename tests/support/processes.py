@@ -180,7 +180,7 @@ class Journal:
     @property
     def executed_twice(self) -> list[str]:
         """The goals that were accepted more than once."""
-        return [goal for goal, times in journal.executions(self.entries()).items() if times > 1]
+        return [goal for (_, goal), n in journal.executions(self.entries()).items() if n > 1]
 
 
 class Host(Process):

@@ -125,8 +125,9 @@ def summary(journals: Iterable[Journal]) -> str:
         entries = each.entries()
         known = journal.ends(entries)
         for entry in entries:
-            if entry.goal in known and entry.event not in ("step", "cancel_accepted"):
-                goals.setdefault((entry.server, entry.goal), []).append(str(entry.event))
+            key = (entry.server, entry.goal)
+            if key in known and entry.event not in ("step", "cancel_accepted"):
+                goals.setdefault(key, []).append(str(entry.event))
         ends += Counter(str(end or "never answered") for end in known.values())
         twice += sum(times > 1 for times in journal.executions(entries).values())
         most = max(most, journal.max_live(entries, killed=each.killed))

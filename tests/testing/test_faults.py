@@ -1,15 +1,14 @@
 """What servers do wrong on the virtual network is told as on a real one."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot as Move
 
-from bt_actions import End, MoveRobot, Outcome, Timeouts, load_tree
+from bt_actions import End, MoveRobot, Outcome, Timeouts
 from bt_actions.events import GoalChanged
-from bt_actions.simulation import Script, ScriptedServer, Simulation
+from bt_actions.simulation import Script, ScriptedServer
 from bt_actions.testing import VirtualNetwork, VirtualRunner
 
 TIMEOUTS = Timeouts(server=2.0, accept=1.0, result=5.0, feedback=2.0, cancel=2.0)
@@ -68,11 +67,3 @@ def test_where_nobody_serves_it_says_who_does() -> None:
     assert runner.run() is Status.FAILURE
     assert runner.outcomes == [("move", Outcome.SERVER_UNAVAILABLE)]
     assert "move_robots" in runner.tree.root.feedback_message
-
-
-def test_a_robot_that_drops_the_part_brings_it_nowhere(tmp_path: Path) -> None:
-    network = VirtualNetwork("r1")
-    simulation = Simulation(network, faults=["move_robot:2:drop_part"], seed=1)
-    runner = VirtualRunner(load_tree("trees/pick_and_place.yaml"), network)
-    runner.run()
-    assert "at no station" in simulation.describe()

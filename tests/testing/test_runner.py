@@ -2,13 +2,16 @@
 
 import math
 from pathlib import Path
+from typing import Any
+from unittest import mock
 
 import py_trees
 import pytest
 from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot as Move
 
-from bt_actions import MoveRobot, Outcome, TreeError, load_tree
+from bt_actions import MoveRobot, Outcome, Retry, TreeError, load_tree
+from bt_actions.events import GoalChanged
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 
 
@@ -16,10 +19,14 @@ def test_it_stands_still_between_two_steps_and_drains_what_is_interrupted() -> N
     network = VirtualNetwork()
     server = ScriptedServer(network, Move, "move_robot", Script(duration=60.0))
     runner = VirtualRunner(MoveRobot("To the shelf", 5.0), network)
+    with pytest.raises(RuntimeError, match=r"start\(\)"):
+        runner.advance(10.0)
     runner.start()
     assert runner.advance(10.0) is None
     assert runner.now == 10.0
     assert len(server.live_goals) == 1
+    with pytest.raises(RuntimeError, match="the run goes on"):
+        print(runner.unaccounted)
     runner.interrupt()
     assert runner.advance(1.0) is Status.INVALID
     assert server.live_goals == []
@@ -45,3 +52,41 @@ def test_a_behaviour_that_raises_fails_the_run() -> None:
 
     with pytest.raises(TreeError, match=r"Broken.*a mistake"):
         VirtualRunner(Broken("Broken")).run()
+
+
+def test_an_outcome_is_what_its_leaf_made_of_the_attempt() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robot", faults=["move_robot:1:abort"])
+    leaf = MoveRobot("m", 1.0, expect=lambda result: False, retry=Retry(2, outcomes=["ABORTED"]))
+    runner = VirtualRunner(leaf, network)
+    assert [runner.run(), runner.run()] == [Status.FAILURE] * 2
+    expected = [Outcome.ABORTED, Outcome.UNEXPECTED_RESULT, Outcome.UNEXPECTED_RESULT]
+    assert [outcome for _, outcome in runner.outcomes] == expected
+
+
+def test_two_on_one_network_make_goals_of_their_own() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robot")
+    runners = [VirtualRunner(MoveRobot("move", 1.0), network, seed=3) for _ in range(2)]
+    assert [runner.run() for runner in runners] == [Status.SUCCESS] * 2
+    events = [event for runner in runners for event in runner.events]
+    assert len({event.goal_id for event in events if isinstance(event, GoalChanged)}) == 2
+
+
+def test_timers_of_py_trees_read_the_virtual_time_that_they_are_given() -> None:
+    network = VirtualNetwork()
+    limited = py_trees.decorators.Timeout("Limit", py_trees.behaviours.Running("Runs"), 7.0)
+    tree = py_trees.composites.Sequence("Both", memory=True)
+    tree.add_children([py_trees.timers.Timer("Waits", 5.0), limited])
+    runner = VirtualRunner(tree, network)
+    with mock.patch("time.monotonic", network.now), mock.patch("time.time", network.now):
+        assert runner.run() is Status.FAILURE
+    assert runner.now == pytest.approx(12.0, abs=0.5)
+
+
+def test_what_is_no_backend_and_what_is_no_network_is_told() -> None:
+    network: Any = VirtualNetwork()
+    with pytest.raises(TypeError, match=r"give VirtualBackend\(network\)"):
+        MoveRobot("move", 1.0).setup(node=network)
+    with pytest.raises(TypeError, match="no VirtualNetwork"):
+        VirtualRunner(MoveRobot("move", 1.0), ScriptedServer(network, Move, "move_robot"))  # type: ignore[arg-type]
