@@ -18,21 +18,13 @@ def test_a_step_covers_a_tenth_of_what_is_left() -> None:
     assert robot.move_step() == pytest.approx(0.38)
 
 
-def test_it_is_ready_then_moving_then_completed() -> None:
-    robot = RobotSimulator()
-    assert robot.get_status() is RobotStatus.READY
-    robot.set_goal(1.0)
-    assert robot.get_status() is RobotStatus.MOVING
-    for _ in range(100):
-        robot.move_step()
-    assert robot.get_status() is RobotStatus.COMPLETED
-
-
 def test_it_does_not_move_before_a_goal_nor_after_it_was_stopped() -> None:
     robot = RobotSimulator(1.0)
     assert robot.move_step() == 1.0
+    assert robot.get_status() is RobotStatus.READY
     robot.set_goal(2.0)
     robot.move_step()
+    assert robot.get_status() is RobotStatus.MOVING
     robot.stop()
     stopped_at = robot.current_pose
     assert robot.move_step() == stopped_at
