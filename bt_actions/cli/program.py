@@ -10,45 +10,31 @@ import contextlib
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from types import ModuleType
 
 from bt_actions.cli.arguments.parser import Parser
-from bt_actions.cli.commands import (
-    call,
-    check,
-    cleanup,
-    completion,
-    explain,
-    list_trees,
-    render,
-    run,
-    schema,
-    send,
-    serve,
-    sim,
-)
-from bt_actions.cli.commands import format_trees as format_
 from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.results import give_stdout_back, results
 from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note, write
 from bt_actions.ros.environment import Reach, prepare
 
-COMMANDS: dict[str, ModuleType] = {
-    "run": run,
-    "send": send,
-    "serve": serve,
-    "list": list_trees,
-    "call": call,
-    "sim": sim,
-    "cleanup": cleanup,
-    "check": check,
-    "explain": explain,
-    "format": format_,
-    "schema": schema,
-    "render": render,
-    "completion": completion,
+COMMANDS = {
+    "run": "run",
+    "send": "send",
+    "serve": "serve",
+    "list": "list_trees",
+    "call": "call",
+    "sim": "sim",
+    "cleanup": "cleanup",
+    "check": "check",
+    "explain": "explain",
+    "format": "format_trees",
+    "schema": "schema",
+    "render": "render",
+    "completion": "completion",
 }
-"""In the order in which --help lists them."""
+"""Each with its module in `commands/`, in the order in which --help lists them."""
 
 _EPILOG = """\
 examples:
@@ -84,10 +70,14 @@ def build_parser(only: str = "") -> Parser:
         "--version", action=_Version, nargs=0, help="show program's version number and exit"
     )
     subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
-    for name, module in COMMANDS.items():
-        if only in ("", name):
-            module.add_parser(subparsers)
+    for name in [only] if only else COMMANDS:
+        _module(name).add_parser(subparsers)
     return parser
+
+
+def _module(command: str) -> ModuleType:
+    """Imported when it is wanted: a command does not wait for what the others need."""
+    return import_module(f"bt_actions.cli.commands.{COMMANDS[command]}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -130,7 +120,7 @@ def _dispatch(argv: Sequence[str] | None) -> int:
     args = parser.parse(arguments)
     prepare(_reach(args))
     os.environ.pop("RCUTILS_LOGGING_USE_STDOUT", None)  # standard output is for results
-    return int(COMMANDS[args.command].run(args))
+    return int(_module(args.command).run(args))
 
 
 def _reach(args: argparse.Namespace) -> Reach:

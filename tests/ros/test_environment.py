@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -50,11 +49,10 @@ def test_each_of_our_programs_has_the_short_lease_before_it_does_anything(
     monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", profile)
     given = list[str]()
     command = words.split()[0]
-    does = SimpleNamespace(
-        add_parser=COMMANDS[command].add_parser,
-        run=lambda _: given.append(_get("FASTRTPS_DEFAULT_PROFILES_FILE")) or 0,
+    monkeypatch.setattr(
+        f"bt_actions.cli.commands.{COMMANDS[command]}.run",
+        lambda _: given.append(_get("FASTRTPS_DEFAULT_PROFILES_FILE")) or 0,
     )
-    monkeypatch.setitem(COMMANDS, command, does)
     assert cli.main(words.split()) == 0
     assert given == [profile or str(SHORT_LEASE)]
 
