@@ -9,6 +9,7 @@ mistakes.
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -249,6 +250,7 @@ class _Composer:
             self._source.report("BT109", span_of(node), message, hint=hint)
             frame.refused = True
             return _REFUSED
+        node.text = sys.intern(node.text)  # a tree has few keys, and says them often
         first = frame.keys.setdefault(node.text, node)
         if first is not node:
             place = Place(self._source.name, first.line, first.column)
@@ -300,8 +302,10 @@ def _nothing(event: Any) -> None:
 
 def _place(node: Node, event: Any) -> None:
     start, end = event.start_mark, event.end_mark
-    node.line, node.column = start.line + 1, start.column + 1
-    node.end_line, node.end_column = end.line + 1, end.column + 1
+    node.line = line = start.line + 1
+    node.column = start.column + 1
+    node.end_line = line if end.line == start.line else end.line + 1  # one number for both
+    node.end_column = end.column + 1
 
 
 def _event_span(event: Any) -> Span:
