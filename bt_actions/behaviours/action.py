@@ -2,8 +2,7 @@
 
 It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-What happens to the goal is decided in goals/goal.py and carried out in traffic/traffic.py; here
-stand only the visit to the leaf, its attempts, and what the tree sees of them.
+goals/ decides what happens to the goal; here stand the visit to the leaf and its attempts.
 """
 
 from __future__ import annotations
@@ -58,6 +57,9 @@ class ActionBehaviour(Behaviour):
 
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
+
+    __slots__ = ("_attempts", "_backend", "_endpoint", "_handle", "_left_behind", "_outcome",
+                 "_reading", "_shown_feedback", "_started", "_tree_closed")  # fmt: skip
 
     def __init__(
         self,
@@ -134,8 +136,7 @@ class ActionBehaviour(Behaviour):
     @property
     def reason(self) -> str:
         """The outcome in words, or an empty text."""
-        history = self.history  # a new visit begins a new one
-        return history[-1].reason if history else ""
+        return history[-1].reason if (history := self.history) else ""  # of this visit alone
 
     @property
     def server(self) -> str:
@@ -144,8 +145,7 @@ class ActionBehaviour(Behaviour):
 
     def progress(self) -> Progress:
         """Return what the action is doing at this moment; safe to call from any thread."""
-        handle, backend = self._handle, self._backend
-        attempts = self.retry.attempts
+        handle, backend, attempts = self._handle, self._backend, self.retry.attempts
         if backend is None or handle is None:
             return Progress("IDLE", self.attempt, attempts, None, None, "")
         now = backend.clock.now()

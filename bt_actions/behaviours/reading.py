@@ -54,6 +54,8 @@ def condition_of(
 class Reading:
     """The `expect`, `save` and `retry.when` of an action; a result is read first, saved later."""
 
+    __slots__ = ("_expect", "_expect_text", "_given", "_names", "_save", "to_save", "when")
+
     def __init__(
         self,
         expect: Given | None,
