@@ -136,6 +136,8 @@ def left_behind(
         if author is None or (author.here and alive.setdefault(author, author.alive)):
             continue
         with contextlib.suppress(FileNotFoundError):  # another cleanup was faster
+            if path.stat().st_size == 0:
+                continue  # killed before it was written, and so before the goal was sent
             try:
                 yield _read(path, author)
             except OSError as error:
