@@ -35,6 +35,7 @@ class Terminal:
         if self.pid == 0:
             os.chdir(ROOT)
             command = [sys.executable, "-m", "bt_actions.cli", *arguments]
+            os.environ.pop("COLUMNS", None)  # of the terminal in which the tests run
             own = {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT), **environment}
             os.execve(sys.executable, command, {**os.environ, **own})
         fcntl.ioctl(self._end, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
@@ -105,7 +106,7 @@ DEMO = ("run", "pick_and_place", "--sim", "--speed", "10")
 def test_the_tree_is_drawn_live_and_leaves_the_report(
     terminal: Callable[..., Terminal], mark: str
 ) -> None:
-    demo = terminal(*DEMO[:-1], "2")  # so slow that each state is on the screen for long
+    demo = terminal(*DEMO)
     demo.until("▶ To the part  executing, attempt 1 of 3, ")
     demo.until(" s left for feedback, current_pose")
     drawn = [line for line in demo.screen.display if line.strip()]

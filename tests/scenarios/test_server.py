@@ -319,14 +319,8 @@ class TestStopped:
         assert journal.max_live == 1
         record.outcome = "SERVER_LOST; back: canceled first, then the next goal SUCCEEDED"
 
-    @pytest.mark.parametrize(
-        "ends",
-        [
-            "by-itself",
-            pytest.param("interrupted", marks=pytest.mark.chaos),
-            pytest.param("interrupted-late", marks=pytest.mark.chaos),
-        ],
-    )
+    @pytest.mark.chaos
+    @pytest.mark.parametrize("ends", ["by-itself", "interrupted", "interrupted-late"])
     def test_stopped_for_a_little_longer_than_its_lease_when_nobody_wants_more(
         self, new_host: HostFactory, name: str, node: Any, ends: str, record: Record
     ) -> None:
