@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.goals.facts import PATIENCE, Facts
+from bt_actions.goals.facts import PATIENCE
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import CANCEL_UNKNOWN_GOAL, ENDS, Command, Event, State
 from tests.machine.parts import Before, GoalHandle, Leaf, Ledger
@@ -444,8 +444,3 @@ class Judge:
         if not kept:
             self._violation = self._violation or Violation(rule)
             raise self._violation
-
-
-def _given_up(goal: Facts) -> bool:
-    """Whether it may still be accepted, and nobody waits for that any more."""
-    return goal.may_still_be_accepted and goal.drain_gave_up and not goal.claims_resources
