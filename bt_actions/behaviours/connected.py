@@ -1,15 +1,16 @@
-"""What leaves are set up with: the Backend of a node, and time that runs out on its clock."""
+"""What leaves have in common: the Backend of their node, time that runs out, and how they fail."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
 from py_trees.behaviour import Behaviour
+from py_trees.common import Status
 
-from bt_actions.traffic.backend import Backend, Clock
+from bt_actions.traffic.backend import Backend
 from bt_actions.wiring import backend_of
 
 
@@ -21,39 +22,65 @@ def backend_in(arguments: Mapping[str, Any], leaf: Behaviour) -> Backend:
     return backend_of(node)
 
 
-def limit(seconds: float | None) -> float:
-    """Seconds that a countdown begins with; None is never."""
-    return math.inf if seconds is None else seconds
+class Stopwatch:
+    """Seconds since it was made; a clock that jumps back takes none of them away."""
+
+    __slots__ = ("_now", "_passed", "_seen")
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now, self._passed, self._seen = now, 0.0, now()
+
+    def passed(self) -> float:
+        """The seconds until now."""
+        now = self._now()
+        self._passed += max(0.0, now - self._seen)
+        self._seen = now
+        return self._passed
 
 
-class Countdown:
-    """Seconds that run out; a clock that jumps back leaves what remained.
+class Timed(Behaviour):
+    """A behaviour with a time that runs out.
 
-    They are seconds of the node's clock where there is a node, of the steady clock elsewhere.
+    In seconds of the node's clock where there is a node, of the steady clock elsewhere.
     """
 
-    def __init__(self) -> None:
-        self._clock: Clock | None = None
-        self._left = 0.0
-        self._seen = 0.0
+    _backend: Backend | None = None
 
-    def setup(self, node: Any) -> None:
-        """Read `node`'s clock from now on; None keeps to the steady clock."""
-        self._clock = None if node is None else backend_of(node).clock
+    def setup(self, **kwargs: Any) -> None:
+        node = kwargs.get("node")
+        self._backend = None if node is None else backend_of(node)
 
-    def start(self, seconds: float) -> None:
-        """Begin anew."""
-        self._left, self._seen = seconds, self._now()
+    def give(self, seconds: float | None) -> None:
+        """Begin anew, with so many seconds; None is for ever."""
+        self._seconds = math.inf if seconds is None else seconds
+        self._watch = Stopwatch(self._now)
 
     def left(self) -> float:
         """The seconds that remain; zero when they have run out."""
-        now = self._now()
-        self._left = max(0.0, self._left - max(0.0, now - self._seen))
-        self._seen = now
-        return self._left
+        return max(0.0, self._seconds - self._watch.passed())
+
+    def due_in(self) -> float | None:
+        """Seconds until it needs a tick though nothing has happened."""
+        return self.left()
 
     def _now(self) -> float:
-        return time.monotonic() if self._clock is None else self._clock.now().ros
+        return time.monotonic() if self._backend is None else self._backend.clock.now().ros
+
+
+class Leaf(Timed):
+    """A leaf that says in `do` what it does, and fails where that raises ValueError."""
+
+    def do(self) -> Status:
+        """Do what a tick does; may raise ValueError (ExpressionError is one)."""
+        raise NotImplementedError
+
+    def update(self) -> Status:
+        self.feedback_message = ""
+        try:
+            return self.do()
+        except ValueError as error:
+            self.feedback_message = str(error)
+            return Status.FAILURE
 
 
 class Thing(Protocol):
@@ -66,21 +93,20 @@ class Thing(Protocol):
 T = TypeVar("T", bound=Thing)
 
 
-class Connected(Behaviour, Generic[T]):
+class Connected(Leaf, Generic[T]):
     """A leaf that cannot do without a node, and has one thing of its own there."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
-        self._countdown = Countdown()
-        self._backend: Backend | None = None
-        self._own: T | None = None
+    _own: T | None = None
+    _timeout: float | None = None
+
+    def initialise(self) -> None:
+        self.give(self._timeout)
 
     def setup(self, **kwargs: Any) -> None:
         """Connect to the node given as ``node=``; again for the same node: fine."""
         backend = backend_in(kwargs, self)
         if backend is not self._backend:
             self.shutdown()
-            self._countdown.setup(backend)
             self._own, self._backend = self._make(backend), backend
 
     def _make(self, backend: Backend) -> T:

@@ -7,14 +7,13 @@ more than once are in loops.py.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.connected import Countdown
+from bt_actions.behaviours.connected import Timed
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.utilities.units import parse_duration
 
@@ -51,6 +50,10 @@ class Gate(Decorator):
         status: Status = self.decorated.status
         return status
 
+    def due_in(self) -> float | None:
+        """Zero when the child can begin anew at once."""
+        return None if self.decorated.status is Status.RUNNING else 0.0
+
     def tick(self) -> Iterator[Behaviour]:
         if self.status is not Status.RUNNING:
             self.initialise()
@@ -67,7 +70,7 @@ class Gate(Decorator):
         yield self
 
 
-class Deadline(Gate):
+class Deadline(Timed, Gate):
     """Stops its child after some seconds, and fails when what it stopped has ended.
 
     py_trees' Timeout fails at once, so that whatever comes next runs beside a goal that is still
@@ -83,20 +86,13 @@ class Deadline(Gate):
     def __init__(self, name: str, child: Behaviour, after: Callable[[], object]) -> None:
         super().__init__(name, child)
         self._after = after
-        self._countdown = Countdown()
-        self._expired = False
-        self._limit = 0.0
-
-    def setup(self, **kwargs: Any) -> None:
-        self._countdown.setup(kwargs.get("node"))
 
     def begin(self) -> None:
         self._expired = False
-        self._limit = parse_duration(self._after())
-        self._countdown.start(self._limit)
+        self.give(parse_duration(self._after()))
 
     def gate(self) -> Status | None:
-        if not self._expired and self._countdown.left() <= 0.0:
+        if not self._expired and self.left() <= 0.0:
             self._expired = True
             self.decorated.stop(Status.INVALID)
         if not self._expired:
@@ -104,9 +100,11 @@ class Deadline(Gate):
         below = [node for node in self.decorated.iterate() if isinstance(node, ActionBehaviour)]
         stopping = [node.name for node in below if node.draining]
         if stopping:
-            self.feedback_message = f"{self._limit:g} s are over; waiting for {stopping[0]} to end"
+            self.feedback_message = (
+                f"{self._seconds:g} s are over; waiting for {stopping[0]} to end"
+            )
             return Status.RUNNING
-        self.feedback_message = f"not done within {self._limit:g} s"
+        self.feedback_message = f"not done within {self._seconds:g} s"
         unknown = [node.name for node in below if not node.drained]
         if unknown:
             self.feedback_message += f"; the end of {', '.join(unknown)} is not known"
@@ -114,7 +112,7 @@ class Deadline(Gate):
 
     def due_in(self) -> float | None:
         """Seconds until the deadline."""
-        return None if self._expired else self._countdown.left()
+        return None if self._expired else self.left()
 
 
 class While(Gate):
@@ -132,14 +130,11 @@ class While(Gate):
 
     def gate(self) -> Status | None:
         try:
-            holds, why = self._condition(), "the condition does not hold"
+            holds = self._condition()
+            self.feedback_message = "" if holds else "the condition does not hold"
         except ExpressionError as error:
-            holds, why = False, error.message
-        if holds:
-            self.feedback_message = ""
-            return None
-        self.feedback_message = why
-        return Status.FAILURE
+            holds, self.feedback_message = False, error.message
+        return None if holds else Status.FAILURE
 
 
 class Subtree(Gate):

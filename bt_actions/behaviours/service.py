@@ -7,8 +7,9 @@ from typing import Any
 
 from py_trees.common import Status
 
-from bt_actions.behaviours.connected import Connected, Countdown, limit
+from bt_actions.behaviours.connected import Connected
 from bt_actions.behaviours.reading import condition_of
+from bt_actions.behaviours.topics import LOOKS
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
 from bt_actions.messages.conversion import fill
@@ -31,116 +32,109 @@ class CallService(Connected[Service]):
         response: seconds to wait for the answer; None waits for ever.
         retry: how often; its outcomes are not looked at, a service knows only one failure.
         expect: what the answer must be; raising ExpressionError counts as no.
-        save: called with the answer; raising ExpressionError fails.
+        save: called with the answer; raising ValueError fails.
     """
 
     def __init__(
         self,
         name: str,
-        service_type: type | str,
+        service_type: Any,
         service_name: str,
         request: Callable[[], object],
         *,
-        server: float | None = 5.0,
-        response: float | None = 5.0,
-        retry: Retry | int = 1,
-        expect: Callable[[Any], bool] | None = None,
-        save: Callable[[Any], None] | None = None,
+        server: float | None,
+        response: float | None,
+        retry: Retry,
+        expect: Callable[[Any], bool] | None,
+        save: Callable[[Any], None] | None,
     ) -> None:
         super().__init__(name)
         self.service_type = service_type
-        self.service_name = service_name
-        self.retry = Retry.of(retry)
-        self.response: Any = None
-        self.attempt = 0
+        self.retry = retry
+        self._name = service_name
         self._request = request
-        self._limits = limit(server), limit(response)
+        self._timeout, self._patience = server, response
         self._expect = expect
-        self._when = condition_of(self.retry.when, "retry.when")
+        self._when = condition_of(retry.when, "retry.when")
         self._save = save
-        self._pause = Countdown()
 
     def _make(self, backend: Backend) -> Service:
-        self._pause.setup(backend)
         self.service_type = interface(self.service_type, "srv")
-        return backend.service(self.service_type, self.service_name)
+        return backend.service(self.service_type, self._name)
 
     def initialise(self) -> None:
         _, client = self._there()
         client.drop()
-        self.attempt = 1
-        self.response = None
-        self._pause.start(0.0)
-        self._countdown.start(self._limits[0])
+        self._tries = 0
+        self._pausing = False
+        super().initialise()
 
     def update(self) -> Status:
+        if self._pausing:
+            if self.left() > 0.0:
+                return Status.RUNNING
+            self._pausing = False
+            self.give(self._timeout)
+        self._response: Any = None
+        status = super().update()
+        if status is Status.FAILURE and self._again():
+            return Status.RUNNING
+        return status
+
+    def do(self) -> Status:
         backend, client = self._there()
-        if self._pause.left() > 0.0:
-            return Status.RUNNING
-        if not client.calling:
-            return self._try_to_call(backend, client)
-        if not client.answered:
-            self.feedback_message = f"waiting for an answer of {client.name}"
-            if self._countdown.left() <= 0.0:
-                client.drop()
-                return self._failed(f"no answer within {self._limits[1]:g} s")
-            return Status.RUNNING
-        try:
-            self.response = client.answer()
-            if self._expect is not None and not self._expect(self.response):
-                return self._failed("the answer is not what was expected")
+        if client.answered:
+            self._response = client.answer()
+            if self._expect is not None and not self._expect(self._response):
+                raise ValueError("the answer is not what was expected")
             if self._save is not None:
-                self._save(self.response)
-        except ValueError as error:  # ExpressionError, or what is saved does not fit
-            return self._failed(str(error))
-        self.feedback_message = ""
-        return Status.SUCCESS
+                self._save(self._response)
+            return Status.SUCCESS
+        if client.calling:
+            self.feedback_message = f"waiting for an answer of {client.name}"
+            if self.left() <= 0.0:
+                client.drop()
+                raise ValueError(f"no answer within {self._patience:g} s")
+        elif client.ready:
+            try:
+                fields = self._request()
+                request: Any = fill(self.service_type.Request, fields, now=backend.clock.stamp)
+            except ValueError:
+                self._tries = self.retry.attempts  # no other try would get further
+                raise
+            client.call(request)
+            self.give(self._patience)
+            self.feedback_message = f"called {client.name}"
+        else:
+            self.feedback_message = f"waiting for the service {client.name}"
+            if self.left() <= 0.0:
+                why = client.why_absent()
+                raise ValueError(f"no service {client.name} within {self._timeout:g} s{why}")
+        return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
         if self._own is not None:
             self._own.drop()
 
     def due_in(self) -> float | None:
-        """Seconds until the next deadline or try."""
-        if self._pause.left() > 0.0:
-            return self._pause.left()
-        if self._own is None or not self._own.calling:
-            return 0.05  # nothing announces that a service has come up
-        return self._countdown.left()
+        """Seconds until the next deadline, try or look."""
+        known = self._pausing or self._own is None or self._own.calling
+        return self.left() if known else LOOKS
 
-    def _try_to_call(self, backend: Backend, client: Service) -> Status:
-        if not client.ready:
-            self.feedback_message = f"waiting for the service {client.name}"
-            if self._countdown.left() <= 0.0:
-                why = client.why_absent()
-                return self._failed(f"no service {client.name} within {self._limits[0]:g} s{why}")
-            return Status.RUNNING
-        service_type: Any = self.service_type
-        try:
-            request: Any = fill(service_type.Request, self._request(), now=backend.clock.stamp)
-        except ValueError as error:
-            self.feedback_message = str(error)
-            return Status.FAILURE
-        client.call(request)
-        self._countdown.start(self._limits[1])
-        self.feedback_message = f"called {client.name}"
-        return Status.RUNNING
-
-    def _failed(self, reason: str) -> Status:
-        self.feedback_message = reason
-        if self.attempt >= self.retry.attempts or not self._worth_it():
-            return Status.FAILURE
-        self._pause.start(self.retry.pause(self.attempt, self._there()[0].randomness))
-        self.attempt += 1
-        self.response = None
-        self._countdown.start(self._limits[0] + self._pause.left())
-        return Status.RUNNING
+    def _again(self) -> bool:
+        """Whether what has failed is tried again; the pause before that begins."""
+        self._tries += 1
+        if self._tries >= self.retry.attempts or not self._worth_it():
+            return False
+        self._pausing = True
+        self.give(self.retry.pause(self._tries, self._there()[0].randomness))
+        return True
 
     def _worth_it(self) -> bool:
-        if self._when is None or self.response is None:
+        if self._when is None or self._response is None:
             return True
         try:
-            return bool(self._when(self.response))
+            return bool(self._when(self._response))
         except ExpressionError as error:  # counts as no, as in goals/attempts.py
             self.feedback_message += f"; retry.when: {error.message}"
             return False

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.connected import Connected, limit
-from bt_actions.behaviours.latest import Latest
+from bt_actions.behaviours.connected import Connected, Stopwatch
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
@@ -17,7 +17,37 @@ from bt_actions.traffic.backend import Backend, Publisher
 from bt_actions.wiring import backend_of
 
 LOOKS = 0.05
-"""Seconds between two looks for somebody who listens: nothing announces that."""
+"""Seconds between two looks for somebody who listens, or serves: nothing announces that."""
+KEPT = 100
+"""Messages kept for who waits for one of them; older ones are dropped."""
+
+
+class Latest:
+    """The latest message of a topic, and what is kept of the others. Touches nothing of a tree."""
+
+    def __init__(self, backend: Backend, message_type: type | str, topic: str, qos: str) -> None:
+        self.backend = backend
+        self.came = 0
+        """How many messages have come."""
+        self.newest: tuple[Any, Stopwatch] | None = None
+        """The latest one, and how old it is on the node's clock."""
+        self.kept: deque[Any] = deque(maxlen=0)
+        kind = interface(message_type, "msg")
+        self.subscription = backend.subscription(kind, topic, qos, self._take)
+        self.close = self.subscription.close
+
+    def keep(self, *, with_newest: bool = False) -> None:
+        """From now on keep each message in `kept`, the newest hundred."""
+        self.kept = deque(maxlen=KEPT)
+        if with_newest and self.newest is not None:
+            self.kept.append(self.newest[0])  # twice, should it come at this moment
+
+    def _take(self, message: Any) -> None:
+        clock = self.backend.clock
+        self.newest = message, Stopwatch(lambda: clock.now().ros)
+        self.came += 1
+        self.kept.append(message)
+        self.backend.wake()
 
 
 class TopicValue:
@@ -48,22 +78,25 @@ class TopicValue:
 
     def read(self) -> object:
         """The latest message. Raises ExpressionError when there is none, or it is too old."""
-        message, age, topic, why = None, 0.0, self._given[1], ""
-        if (latest := self._latest) is not None:
-            (message, age), topic = latest.get(), latest.topic
+        latest = self._latest
+        if latest is None:
+            raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
+        topic = latest.subscription.topic
+        if latest.newest is None:
             now = latest.backend.clock.now().steady
-            if message is None and now >= self._look_again_at:  # a tree may ask at each tick
-                self._said, self._look_again_at = latest.why_silent(), now + 1.0
-            why = self._said
-        if message is None:
-            raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){why}")
+            if now >= self._look_again_at:  # a tree may ask at each tick
+                self._said, self._look_again_at = latest.subscription.why_silent(), now + 1.0
+            raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._said}")
+        message, since = latest.newest
+        age = since.passed()
         if self._max_age is not None and age > self._max_age:
             raise ExpressionError(f"the last message on {topic} is {age:.1f} s old (${self.name})")
         return message
 
     def first_may_come(self) -> float:
         """Seconds for which the first message may be on its way; 0 afterwards."""
-        return 0.0 if self._latest is None else self._latest.first_may_come()
+        latest = self._latest
+        return 0.0 if latest is None or latest.came else latest.subscription.first_may_come()
 
 
 def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
@@ -123,9 +156,8 @@ class WaitForMessage(Connected[Latest]):
         super().__init__(name)
         self._given = message_type, topic, qos
         self._until = until
-        self._timeout = limit(timeout)
+        self._timeout = timeout
         self._save = save
-        self._came_before = 0
 
     def _make(self, backend: Backend) -> Latest:
         latest = Latest(backend, *self._given)
@@ -134,15 +166,17 @@ class WaitForMessage(Connected[Latest]):
         return latest
 
     def initialise(self) -> None:
+        super().initialise()
         _, latest = self._there()  # what a latched topic delivered before is as good as new
-        latest.keep(with_latest=self._given[2] == "latched")
         self._came_before = latest.came
-        self._countdown.start(self._timeout)
+        latest.keep(with_newest=self._given[2] == "latched")
 
-    def update(self) -> Status:
+    def do(self) -> Status:
         _, latest = self._there()
-        self.feedback_message = f"waiting for a message on {latest.topic}"
-        for message in latest.take():
+        topic = latest.subscription.topic
+        self.feedback_message = f"waiting for a message on {topic}"
+        for _ in range(len(latest.kept)):  # not what comes meanwhile: a tick must end
+            message = latest.kept.popleft()
             try:
                 if self._until is None or self._until(message):
                     if self._save is not None:
@@ -152,21 +186,16 @@ class WaitForMessage(Connected[Latest]):
                 self.feedback_message = "a message came, but not the one waited for"
             except ValueError as error:  # ExpressionError, or what is saved does not fit
                 self.feedback_message = str(error)
-        if self._countdown.left() <= 0.0:
-            topic, before = latest.topic, self._came_before
-            why = f"; {before} came before it began" if before else ""
-            why = why if latest.came else latest.why_silent()
-            self.feedback_message = f"no such message on {topic} within {self._timeout:g} s{why}"
-            return Status.FAILURE
-        return Status.RUNNING
+        if self.left() > 0.0:
+            return Status.RUNNING
+        why = "" if latest.came else latest.subscription.why_silent()
+        if self._came_before:
+            why = f"; {self._came_before} came before it began"
+        raise ValueError(f"no such message on {topic} within {self._timeout:g} s{why}")
 
     def terminate(self, new_status: Status) -> None:
         if self._own is not None:
-            self._own.keep_no_more()
-
-    def due_in(self) -> float | None:
-        """Seconds until it fails."""
-        return self._countdown.left()
+            self._own.kept = deque(maxlen=0)
 
 
 class Publish(Connected[Publisher]):
@@ -185,56 +214,49 @@ class Publish(Connected[Publisher]):
         qos: as the tree language calls it.
         subscribers: so many must listen before it publishes.
         timeout: seconds on the node's clock after which it fails where fewer do, and not while the
-            node is new; never where not given.
+            node is new; None: never.
     """
+
+    warning = ""
+    """What a SUCCESS does not say: that nobody listened."""
 
     def __init__(
         self,
         name: str,
-        message_type: type | str,
+        message_type: Any,
         topic: str,
         data: Callable[[], object],
         *,
-        qos: str = "default",
-        subscribers: int = 0,
-        timeout: float | None = None,
+        qos: str,
+        subscribers: int,
+        timeout: float | None,
     ) -> None:
         super().__init__(name)
-        self.warning = ""
-        """What a SUCCESS does not say: that nobody listened."""
-        self._type: Any = message_type
+        self._type = message_type
         self._topic = topic
         self._data = data
         self._qos = qos
         self._subscribers = subscribers
-        self._timeout = limit(timeout)
+        self._timeout = timeout
 
     def _make(self, backend: Backend) -> Publisher:
         self._type = interface(self._type, "msg")
         return backend.publisher(self._type, self._topic, self._qos)
 
-    def initialise(self) -> None:
-        self.warning = ""
-        self._countdown.start(self._timeout)
-
-    def update(self) -> Status:
+    def do(self) -> Status:
         backend, publisher = self._there()
         topic, listeners = publisher.topic, publisher.listeners
-        if listeners < (self._subscribers or publisher.listener_may_come() > 0.0):
-            discovered = publisher.listener_may_come() <= 0.0
-            if self._subscribers and discovered and self._countdown.left() <= 0.0:
-                self.feedback_message = (
+        some_may_come = publisher.listener_may_come() > 0.0
+        self.warning = ""
+        if listeners < (self._subscribers or some_may_come):
+            if self._subscribers and not some_may_come and self.left() <= 0.0:
+                raise ValueError(
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
                     f" {self._timeout:g} s{publisher.why_unheard()}"
                 )
-                return Status.FAILURE
             self.feedback_message = f"waiting for who listens on {topic}"
             return Status.RUNNING
-        try:
-            message: Any = fill(self._type, self._data(), now=backend.clock.stamp)
-        except ValueError as error:
-            self.feedback_message = str(error)
-            return Status.FAILURE
+        message: Any = fill(self._type, self._data(), now=backend.clock.stamp)
         publisher.publish(message)
         if not listeners:
             self.warning = f"nobody listens on {topic}{publisher.why_unheard()}"

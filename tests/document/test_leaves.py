@@ -120,7 +120,8 @@ def test_a_visit_begins_when_no_topic_is_waited_for_any_more(
         """
     )
     begun: list[Status] = []
-    root.initialise = lambda: begun.append(root.status)
+    initialise = root.initialise
+    root.initialise = lambda: (begun.append(root.status), initialise())
     for _ in range(2):
         root.tick_once()
         assert (root.status, root.due_in()) == (Status.RUNNING, 0.3)

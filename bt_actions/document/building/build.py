@@ -31,6 +31,7 @@ from bt_actions.document.reading.inputs import check_inputs
 from bt_actions.document.reading.settings import join_names, settings_of, text_of
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.reading.writes import writes_of
+from bt_actions.goals.policy import Retry
 from bt_actions.utilities.shorten import shorten
 
 __all__ = ["BUILDERS", "build"]
@@ -135,7 +136,7 @@ def _retry(node: TreeNode, context: Context) -> Behaviour:
     values: dict[str, Any] = node.values
     given = {key: values[key] for key in ("backoff", "factor", "max_backoff") if key in values}
     attempts = context.value(values["attempts"]) if "attempts" in values else None
-    return RetryChild(node.name, _child(node, context), attempts, **given)
+    return RetryChild(node.name, _child(node, context), attempts, Retry(**given))
 
 
 def _repeat(node: TreeNode, context: Context) -> Behaviour:

@@ -101,7 +101,7 @@ def _check(node: TreeNode, context: Context) -> Behaviour:
     written = node.values["check"]
     assert isinstance(written, Computed)
     name = node.name or plain_name(written.expression.text)
-    return Check(name, written.expression, variable=context.read)
+    return Check(name, written.expression, context.read)
 
 
 def _saver(node: TreeNode, context: Context, root: str) -> Callable[[Any], None] | None:
@@ -174,7 +174,7 @@ def _set(node: TreeNode, context: Context) -> Behaviour:
     written = table_of(node.values["set"])
     name = node.name or plain_name(f"set {', '.join(written)}")
     compute = context.value(written)
-    return SetValues(name, lambda: table_of(compute()), context.write)
+    return SetValues(name, lambda: context.write(table_of(compute())))
 
 
 def _log(node: TreeNode, context: Context) -> Behaviour:
