@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from bt_actions.document.checking.infer import BOOL, TEXT, infer, named
+from bt_actions.document.checking.infer import BOOL, TEXT, Report, infer, named
 from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
 from bt_actions.document.checking.variables import infer_variables, items_inside, type_of
-from bt_actions.document.findings import Related
+from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.types import TypeNameError, fits, interface_of, misfits
 from bt_actions.document.language.values import (
@@ -30,26 +30,16 @@ from bt_actions.document.reading.settings import when_of
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.reading.writes import Write, writes_of
-from bt_actions.document.yaml.inner import inner_span
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
-from bt_actions.expressions.expression import ExpressionError
+from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.messages.fields import Either, FieldType, Message
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
     from bt_actions.document.language.classes import Python
 
-__all__ = ["Checker", "Read"]
-
-
-class Read(NamedTuple):
-    """A variable that an expression reads, and where."""
-
-    name: str
-    computed: Computed
-    start: int
-    end: int
+__all__ = ["Checker"]
 
 
 Types = MappingType[str, FieldType | None]
@@ -70,12 +60,13 @@ class Checker:
         self.python = python
         self.variables: dict[str, FieldType | None] = {}
         self.declared_at: dict[str, Declared] = {}
-        self.reads: dict[int, list[Read]] = {}
-        """What each node reads, by the node's id; an alias's own reads under the alias's."""
+        self.reads: dict[int, list[Computed]] = {}
+        """What reads variables in each node, by the node's id; an alias's own under the alias's."""
         self.reader: object = document
         self._writes: dict[int, tuple[Write, ...]] = {}
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
+        self._inferred: dict[tuple[object, ...], FieldType | None] = {}
 
     def interface(
         self, name: str, kind: str, node: Node, source: Source | None = None
@@ -259,32 +250,53 @@ class Checker:
     def expression(self, computed: Computed, roots: Types) -> FieldType | None:
         """Check what an expression reads and does; return its type, or None."""
         expression = computed.expression
-        for name, (start, end) in expression.variable_spans:
-            self.reads.setdefault(id(self.reader), []).append(Read(name, computed, start, end))
-            if name not in self.variables:
-                self._unknown(name, computed, start, end)
+        if expression.variables:
+            self.reads.setdefault(id(self.reader), []).append(computed)
+            if not self.variables.keys() >= expression.names:
+                self._unknown(computed)
 
         def report(code: str, message: str, start: int, end: int) -> None:
-            span = inner_span(
-                computed.node, self.source, computed.start + start, computed.start + end
-            )
-            self.source.report(code, span, message)
+            self.source.report(code, computed.span(self.source, start, end), message)
 
-        if not expression.names and not expression.roots and not expression.constants:
+        if not expression.variables and not expression.roots and not expression.constants:
             try:
                 computed.evaluate(lambda _name: None)
             except ExpressionError as error:
                 report("BT206", error.message, error.column, error.end_column)
                 return None
-        if not self.types and not roots and not expression.names:
+        if not self.types and not roots and not expression.variables:
             return None
-        variable = self.types_at(self.reader)
-        return infer(expression, roots, variable, report, types=self.types)
+        return self.infer(expression, roots, self.reader, report)
 
-    def _unknown(self, name: str, computed: Computed, start: int, end: int) -> None:
-        if self.document.root is None or self.doubts.declares(name):
+    def infer(
+        self, expression: Expression, roots: Types, reader: object, report: Report
+    ) -> FieldType | None:
+        """The type of an expression; worked out once for all of its form and with such types."""
+        variable = self.types_at(reader)
+        key = (expression.form, *roots.items(), *map(variable, expression.variables))
+        if key not in self._inferred:
+            wrong: list[tuple[str, str, int, int]] = []
+
+            def note(*what: Any) -> None:
+                wrong.append(what)
+
+            kind = infer(expression, roots, variable, note, types=self.types)
+            for what in wrong:
+                report(*what)
+            if wrong:
+                return kind
+            self._inferred[key] = kind
+        return self._inferred[key]
+
+    def _unknown(self, computed: Computed) -> None:
+        """Report the variables that an expression reads and nobody declares or writes."""
+        for name, span in computed.expression.variable_spans:
+            if name not in self.variables and not self.doubts.declares(name):
+                self._report_unknown(name, computed, computed.span(self.source, *span))
+
+    def _report_unknown(self, name: str, computed: Computed, span: Span) -> None:
+        if self.document.root is None:
             return  # a library's words are read with the names of whoever imports it
-        span = inner_span(computed.node, self.source, computed.start + start, computed.start + end)
         if name in computed.expression.roots:
             bare = f"write '{name}' without a dollar sign"
             self.source.report("BT202", span, f"there is no variable ${name}", hint=bare)

@@ -5,6 +5,7 @@ Looks at one checked document (and at what it includes, where a hazard spans bot
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 
 from bt_actions.document.checking.checker import Checker
@@ -218,15 +219,21 @@ class _Hazards:
         if not kinds <= {"sequence", "fallback", "check"}:
             return
         reads = (read for inner in asked for read in self._checker.reads.get(id(inner), ()))
-        first = next((read for read in reads if read.name in self._document.topics), None)
+        of_topics = (
+            (name, read)
+            for read in reads
+            for name in read.expression.variables
+            if name in self._document.topics
+        )
+        topic, first = next(of_topics, ("", None))
         if first is None or self._doubts.below(node):
             return
         hint = "write 'not' in the check itself, which fails while it has no value"
-        if asked[0].values.get("check") is first.computed:
-            text = first.computed.expression.text.strip()
+        if asked[0].values.get("check") is first:
+            text = first.expression.text.strip()
             hint = f"check: not {text if names_value(text) else f'({text})'}"
         self._report(
-            "BT314", span_of(node.key), f"this succeeds, too, while nobody knows ${first.name}",
+            "BT314", span_of(node.key), f"this succeeds, too, while nobody knows ${topic}",
             hint=hint,
         )  # fmt: skip
 
@@ -249,7 +256,8 @@ class _Hazards:
 
     def _unused(self) -> None:
         checker, document, doubts = self._checker, self._document, self._doubts
-        read = {one.name for reads in checker.reads.values() for one in reads}
+        reads = itertools.chain.from_iterable(checker.reads.values())
+        read = {name for one in reads for name in one.expression.variables}
         written = {w.name for node in document.nodes() for w in self._checker.writes_of(node)}
         if not doubts.unknown_variable:
             self._unread(read)

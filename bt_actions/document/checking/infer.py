@@ -26,7 +26,10 @@ from bt_actions.messages.fields import (
 from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = ["BOOL", "FLOAT", "INTEGER", "TEXT", "common_type", "infer", "named", "type_of_literal"]
+__all__ = [
+    "BOOL", "FLOAT", "INTEGER", "TEXT", "Report", "common_type", "infer", "named",
+    "type_of_literal",
+]  # fmt: skip
 
 BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
 Report = Callable[[str, str, int, int], None]
@@ -137,7 +140,9 @@ class _Inference:
                 return type_of_literal(value)
             case ast.Name(id=name):
                 return self._name(node, name)
-            case ast.Attribute() if (constant := self._expression.constant_of(node)) is not None:
+            case ast.Attribute() if (
+                constant := self._expression.form.constant_of(node)
+            ) is not None:
                 return self._constant(node, constant)
             case ast.Attribute(value=inner, attr=attr):
                 return self._field(node, self.any_type_of(inner), attr)
@@ -184,7 +189,7 @@ class _Inference:
         if not self._types:
             return None
         try:
-            return type_of_literal(self._expression.constant(name))
+            return type_of_literal(self._expression.form.constant(name))
         except UnknownClass as error:
             self._report("BT203", str(error), *self._expression.span(node.value))
         except ValueError as error:

@@ -16,7 +16,6 @@ from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Span
 from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.reading.unread import Doubts
-from bt_actions.document.yaml.inner import inner_span
 from bt_actions.document.yaml.nodes import span_of
 
 __all__ = ["find_early_reads"]
@@ -117,15 +116,16 @@ class _Order:
     def _reads(self, node: TreeNode, own: frozenset[str], around: frozenset[str]) -> None:
         checker = self._checker
         for read in checker.reads.get(id(node), ()):
-            if not self._may_be_written(read.name, own, around):
-                written, start = read.computed.node, read.computed.start
-                span = inner_span(written, checker.source, start + read.start, start + read.end)
-                self._report(read.name, span, f"nothing has written ${read.name} when this is read")
+            for at, name in enumerate(read.expression.variables):
+                if not self._may_be_written(name, own, around):
+                    span = read.span(checker.source, *read.expression.variable_spans[at][1])
+                    self._report(name, span, f"nothing has written ${name} when this is read")
         declared = checker.document.actions.get(node.alias) if node.alias is not None else None
         for read in checker.reads.get(id(declared), ()) if declared is not None else ():
-            if not self._may_be_written(read.name, own, around):
-                text = f"nothing has written ${read.name} when {node.alias!r} reads it here"
-                self._report(read.name, span_of(node.key), text)
+            for name in read.expression.variables:
+                if not self._may_be_written(name, own, around):
+                    text = f"nothing has written ${name} when {node.alias!r} reads it here"
+                    self._report(name, span_of(node.key), text)
 
     def _may_be_written(self, name: str, own: frozenset[str], around: frozenset[str]) -> bool:
         doubts = self._doubts

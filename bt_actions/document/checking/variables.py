@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from typing import Protocol
 
-from bt_actions.document.checking.infer import common_type, infer, type_of_literal
+from bt_actions.document.checking.infer import Report, common_type, type_of_literal
 from bt_actions.document.language.types import TypeNameError, parse_type
 from bt_actions.document.language.values import Computed, Interpolated
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.reading.writes import Write
 from bt_actions.document.yaml.nodes import Node
+from bt_actions.expressions.expression import Expression
 from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
 from bt_actions.messages.interfaces import RUN_TREE
 
 __all__ = ["Known", "infer_variables", "items_inside", "root_type", "type_of"]
 
+Types = Mapping[str, FieldType | None]
 _ROUNDS = 8
 """How far a type is followed from variable to variable, before none is taken for known."""
 
@@ -27,8 +29,10 @@ class Known(Protocol):
     document: Document
     variables: dict[str, FieldType | None]
 
-    def types_at(self, reader: object) -> Callable[[str], FieldType | None]:
-        """Gives the type of a variable as a node reads it."""
+    def infer(
+        self, expression: Expression, roots: Types, reader: object, report: Report
+    ) -> FieldType | None:
+        """The type of an expression, as a node reads it."""
         ...
 
     def interface(self, name: str, kind: str, node: Node) -> type | None:
@@ -51,8 +55,11 @@ def type_of(write: Write, known: Known) -> FieldType | None:
     if not isinstance(write.value, Computed):
         return type_of_literal(write.value)
     roots = {} if write.root is None else {write.root: root_type(write.node, write.root, known)}
-    return infer(write.value.expression, roots, known.types_at(write.node), lambda *_: None,
-                 types=known.types)  # fmt: skip
+    return known.infer(write.value.expression, roots, write.node, _silent)
+
+
+def _silent(_code: str, _message: str, _start: int, _end: int) -> None:
+    """Leave out what is told where the node is checked."""
 
 
 def _item_type(write: Write, known: Known) -> FieldType | None:
@@ -61,8 +68,7 @@ def _item_type(write: Write, known: Known) -> FieldType | None:
         return common_type([type_of_literal(item) for item in write.value])
     if not isinstance(write.value, Computed):
         return None
-    kind = infer(write.value.expression, {}, known.types_at(write.node), lambda *_: None,
-                 types=known.types)  # fmt: skip
+    kind = known.infer(write.value.expression, {}, write.node, _silent)
     return kind.item if isinstance(kind, Listing) else None
 
 

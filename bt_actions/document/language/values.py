@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from bt_actions.document.findings import DocumentError
+from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.bounds import MAX_ITEMS, refuse_large
 from bt_actions.document.yaml.braces import report_braces
@@ -76,6 +76,10 @@ class Computed:
     def evaluate(self, variable: Lookup) -> object:
         """The value. Raises ExpressionError."""
         return self.expression.evaluate({}, variable)
+
+    def span(self, source: Source, start: int, end: int) -> Span:
+        """Where some columns of the expression are written."""
+        return inner_span(self.node, source, self.start + start, self.start + end)
 
 
 @dataclass(frozen=True, slots=True)
