@@ -10,8 +10,8 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
+from bt_actions.goals.facts import Step, drop
 from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Outcome
-from bt_actions.goals.steps.step import Step, drop
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import Command, Event, State
 

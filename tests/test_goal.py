@@ -18,10 +18,9 @@ from bt_actions.goals.asking import (
     RESULT_QUESTIONS,
     UNHEARD,
 )
-from bt_actions.goals.facts import PATIENCE
+from bt_actions.goals.facts import PATIENCE, drop
 from bt_actions.goals.goal import Goal, turned_up_again
 from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
-from bt_actions.goals.steps.step import drop
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import (
     CANCEL_ACCEPTED,

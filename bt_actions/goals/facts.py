@@ -1,19 +1,30 @@
-"""What is known of one goal, and the small tools with which the steps of the table change it.
+"""What is known of one goal, and what a step of the table is, which changes it.
 
 Whoever has a goal reads these facts. Its steps (goals/steps) write them, by the tools below, which
 are said once where several steps do the same; `Goal.on` writes the state that a step has led to.
-A caller may add to `reason`.
+A caller may add to `reason`. A step sends nothing: what is to be done is left in `commands`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from bt_actions.goals.asking import Asking, LostResult
 from bt_actions.goals.deadlines import Deadlines
 from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
-from bt_actions.goals.terms import ACCEPTED, ENDS, MAY_STILL_BE_ACCEPTED, Command, Event, Now, State
+from bt_actions.goals.terms import (
+    ACCEPTED,
+    CANCEL_ACCEPTED,
+    CANCEL_REJECTED,
+    ENDS,
+    MAY_STILL_BE_ACCEPTED,
+    Command,
+    Event,
+    Now,
+    State,
+)
 
 PATIENCE = 5.0
 """Seconds for an answer that nobody wants any more, where the user gave no deadline."""
@@ -94,6 +105,20 @@ class Facts:
         """Seconds of the steady clock, as of the last moment that was told."""
         return self.deadlines.now.steady
 
+    @property
+    def cancel_said(self) -> str:
+        """What its server has said of the request to cancel it, to follow a reason; or ""."""
+        gone = self.state is State.LOST and self.end is not End.UNKNOWN  # else only its node is
+        if gone or self.asking.asked_at is None or self.state is State.DONE:
+            return ""
+        words = {
+            None: "has not answered the request to cancel it",
+            CANCEL_ACCEPTED: "has agreed to cancel it, and it has not ended",
+            CANCEL_REJECTED: "refuses to cancel it",
+        }
+        said = words.get(self.asking.answer)
+        return f"; {self.server} {said}" if said else ""
+
     # For the steps
 
     def say(self, why: str, detail: Any = None) -> str:
@@ -147,3 +172,34 @@ class Facts:
         if self.accepted:
             self.commands.append(Command.ASK_RESULT)
         self.deadlines.arm(Event.POLL_DUE, self.asking.ask(self.steady))
+
+
+Does = Callable[[Facts, Any], State | None]
+"""Takes the goal and what came with the event; returns the next state, if it is another one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One decision: what is done, in words too, and which states may follow."""
+
+    does: Does
+    to: frozenset[State]
+    """Beside the state in which it is made."""
+    says: str
+
+    def __call__(self, goal: Facts, detail: Any = None) -> State:
+        """Make it; return the state that follows."""
+        return self.does(goal, detail) or goal.state
+
+
+def leads_to(*to: State) -> Callable[[Does], Step]:
+    """Make a function a step, which leads to one of these states or stays where it is.
+
+    What docs/goal.md says of it is the first line of the function's docstring.
+    """
+    return lambda does: Step(does, frozenset(to), (does.__doc__ or "").splitlines()[0].rstrip("."))
+
+
+@leads_to()
+def drop(goal: Facts, detail: Any) -> None:
+    """Nothing: it came too late, or twice, to mean anything."""

@@ -22,7 +22,7 @@ from typing import Any
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.facts import PATIENCE, Facts
 from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
-from bt_actions.goals.steps.canceling import NEVER_DONE, cancel_said
+from bt_actions.goals.steps.canceling import NEVER_DONE
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
@@ -149,11 +149,6 @@ class Goal(Facts):
         if self.accepted:
             return cancel
         return max(cancel + (self.timeouts.accept or 0.0), 2 * self.patience)
-
-    @property
-    def cancel_said(self) -> str:
-        """What its server has said of the request to cancel it, to follow a reason; or ""."""
-        return cancel_said(self)
 
 
 def turned_up_again(

@@ -6,9 +6,9 @@ terms.py.
 
 from __future__ import annotations
 
+from bt_actions.goals.facts import Step, drop
 from bt_actions.goals.policy import Outcome
-from bt_actions.goals.steps import canceling, lost, requested, running, unsent
-from bt_actions.goals.steps.step import Step, drop
+from bt_actions.goals.steps import canceling, requested, running
 from bt_actions.goals.terms import ACCEPTED, MAY_STILL_BE_ACCEPTED, Event, State
 
 TABLE: dict[tuple[State, Event], Step] = {
@@ -29,33 +29,35 @@ def _in(*states: State, **steps: Step) -> None:
 _in(
     State.QUEUED,
     State.WAITING_FOR_SERVER,
-    INTERRUPTED=unsent.give_up(Outcome.CANCELED, "interrupted before the goal was sent"),
-    ABANDONED=unsent.give_up(Outcome.CANCELED, "its node was closed"),
+    INTERRUPTED=requested.give_up(Outcome.CANCELED, "interrupted before the goal was sent"),
+    ABANDONED=requested.give_up(Outcome.CANCELED, "its node was closed"),
 )
 _in(
     State.QUEUED,
-    GRANTED=unsent.granted,
-    TAKEN=unsent.give_up(Outcome.SERVER_BUSY, "{names} is in use by another goal"),
-    QUEUE_DUE=unsent.give_up(Outcome.SERVER_BUSY, "{names} was not free within {limits.queue:g} s"),
+    GRANTED=requested.granted,
+    TAKEN=requested.give_up(Outcome.SERVER_BUSY, "{names} is in use by another goal"),
+    QUEUE_DUE=requested.give_up(
+        Outcome.SERVER_BUSY, "{names} was not free within {limits.queue:g} s"
+    ),
 )
 _in(
     State.WAITING_FOR_SERVER,
-    SERVER_READY=unsent.send,
-    INVALID=unsent.give_up(Outcome.INVALID_GOAL, "{detail}"),
-    SERVER_AMBIGUOUS=unsent.give_up(
+    SERVER_READY=requested.send,
+    INVALID=requested.give_up(Outcome.INVALID_GOAL, "{detail}"),
+    SERVER_AMBIGUOUS=requested.give_up(
         Outcome.SERVER_AMBIGUOUS,
         "two action servers answer to {server}: a goal would be executed twice",
     ),
-    SERVER_DUE=unsent.give_up(
+    SERVER_DUE=requested.give_up(
         Outcome.SERVER_UNAVAILABLE, "no action server {server} within {limits.server:g} s"
     ),
-    REPLACED=unsent.give_up(Outcome.CANCELED, "replaced by a newer goal before it was sent"),
+    REPLACED=requested.give_up(Outcome.CANCELED, "replaced by a newer goal before it was sent"),
 )
 
 # Sent, and wanted
 _in(
     State.SENDING,
-    SEND_FAILED=unsent.send_failed,
+    SEND_FAILED=requested.send_failed,
     ACCEPTED=requested.begin,
     REJECTED=requested.rejected,
     ACCEPT_DUE=requested.accept_due,
@@ -117,7 +119,7 @@ _in(
     ACCEPTED=requested.turned_up,
     REJECTED=requested.rejected,
 )
-_in(State.UNWANTED, SEND_FAILED=unsent.send_failed, ACCEPT_DUE=requested.accept_due)
+_in(State.UNWANTED, SEND_FAILED=requested.send_failed, ACCEPT_DUE=requested.accept_due)
 _in(State.UNCONFIRMED, ACCEPT_DUE=requested.presume)
 _in(  # a denial: by any other answer `Goal.on` has made it accepted first
     State.PRESUMED_NOT_RECEIVED,
@@ -128,23 +130,23 @@ _in(  # a denial: by any other answer `Goal.on` has made it accepted first
 _in(
     *ACCEPTED,
     *MAY_STILL_BE_ACCEPTED,
-    SERVER_CHANGED=lost.ask_another,
+    SERVER_CHANGED=canceling.ask_another,
 )
 _in(
     State.SENDING,
     *ACCEPTED,
     *MAY_STILL_BE_ACCEPTED,
     State.NOT_RECEIVED,
-    SERVER_LOST=lost.server_lost,
-    PARKED=lost.parked,
+    SERVER_LOST=canceling.server_lost,
+    PARKED=canceling.parked,
 )
-_in(State.NOT_RECEIVED, ABANDONED=lost.abandoned)
+_in(State.NOT_RECEIVED, ABANDONED=canceling.abandoned)
 _in(
     State.LOST,
-    SERVER_LOST=lost.server_lost,
-    SERVER_RETURNED=lost.returned,
-    ACCEPTED=lost.runs,
+    SERVER_LOST=canceling.server_lost,
+    SERVER_RETURNED=canceling.returned,
+    ACCEPTED=canceling.runs,
     RESULT=canceling.finished,
-    DRAIN_GAVE_UP=lost.drain_gave_up,
-    ABANDONED=lost.abandoned,
+    DRAIN_GAVE_UP=canceling.drain_gave_up,
+    ABANDONED=canceling.abandoned,
 )

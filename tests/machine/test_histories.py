@@ -10,8 +10,8 @@ import os
 
 import pytest
 
+from bt_actions.goals.facts import drop
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.goals.steps.step import drop
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import Event, State
 from tests.machine.conftest import THOROUGH

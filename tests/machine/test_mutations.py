@@ -14,12 +14,11 @@ import pytest
 from bt_actions.goals.asking import Asking
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.deadlines import Deadlines
-from bt_actions.goals.facts import Facts
+from bt_actions.goals.facts import Does, Facts, Step, drop
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.resources import Answer, Resources
-from bt_actions.goals.steps import canceling, lost, requested, running
-from bt_actions.goals.steps.step import Does, Step, drop
+from bt_actions.goals.steps import canceling, requested, running
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import MAY_STILL_BE_ACCEPTED, Command, Event, State
 from bt_actions.servers import replies
@@ -179,7 +178,7 @@ def ignores_that_the_server_was_lost(patch: Patch) -> None:
 @mutation
 def forgets_a_lost_goal(patch: Patch) -> None:
     def lose(goal: Facts, detail: Any) -> State:
-        lost.server_lost(goal, detail)
+        canceling.server_lost(goal, detail)
         return State.DONE
 
     decide(patch, Event.SERVER_LOST, lose, State.EXECUTING)

@@ -1,1 +1,1 @@
-"""The steps of the table, by phase. What a step is stands in step.py."""
+"""The steps of the table, by phase. What a step is stands in goals/facts.py."""

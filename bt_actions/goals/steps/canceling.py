@@ -1,7 +1,10 @@
-"""Steps of a goal that is not wanted any more: the server is asked to cancel it until it has ended.
+"""Steps of a goal that is not wanted any more, or whose server is lost, until it has ended.
 
-`timeout.cancel` runs to the end of the goal, not to an answer. When it has passed the leaf is free;
-the questions are repeated all the same.
+The server is asked to cancel it. `timeout.cancel` runs to the end of the goal, not to an answer.
+When it has passed the leaf is free; the questions are repeated all the same.
+
+A server that is lost may only be out of reach, and still run the goal. So the leaf is free at once,
+and the goal is kept: where its server is seen again, it is canceled first of all.
 """
 
 from __future__ import annotations
@@ -9,13 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
-from bt_actions.goals.facts import Facts
+from bt_actions.goals.facts import Facts, Step, leads_to
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.goals.steps.step import Step, leads_to
+from bt_actions.goals.steps import requested
 from bt_actions.goals.terms import (
-    CANCEL_ACCEPTED,
     CANCEL_REJECTED,
     STATUS_SUCCEEDED,
+    Command,
     Event,
     State,
 )
@@ -48,29 +51,26 @@ def _plan_anew(goal: Facts, outcome: Outcome, why: str) -> None:
 
 
 @leads_to()
-def interrupted(goal: Facts, detail: Any) -> State:
+def interrupted(goal: Facts, detail: Any) -> None:
     """Whatever it was canceled for, its outcome will be CANCELED."""
     asked_at = goal.asking.asked_at
     is_news = goal.outcome is not None or goal.planned is not Outcome.CANCELED
     if is_news and asked_at is not None and goal.steady - asked_at >= ASK_AGAIN:
         goal.ask()  # now somebody waits for it
     _plan_anew(goal, Outcome.CANCELED, "interrupted by the tree")
-    return goal.state
 
 
 @leads_to()
-def replaced(goal: Facts, detail: Any) -> State:
+def replaced(goal: Facts, detail: Any) -> None:
     """Whatever it was canceled for, it must not be tried again beside the newer one."""
     _plan_anew(goal, Outcome.CANCELED, "replaced by a newer goal")
-    return goal.state
 
 
 @leads_to()
-def taken_by_two(goal: Facts, detail: Any) -> State:
+def taken_by_two(goal: Facts, detail: Any) -> None:
     """Cancel, at both; it must not count as done, or be tried again."""
     _plan_anew(goal, Outcome.SERVER_AMBIGUOUS, "both of two servers may have it")
     goal.ask()
-    return goal.state
 
 
 @leads_to(State.DONE)
@@ -79,16 +79,15 @@ def finished(goal: Facts, detail: Any) -> State:
     if goal.take_result(detail) == STATUS_SUCCEEDED and goal.planned not in NEVER_DONE:
         goal.settle(Outcome.SUCCEEDED, f"late: {goal.reason}")
     if goal.outcome is None and goal.asking.answer == CANCEL_REJECTED:
-        goal.reason += cancel_said(goal)
+        goal.reason += goal.cancel_said
     goal.settle_as_planned()
     return State.DONE
 
 
 @leads_to()
-def cancel_answered(goal: Facts, detail: Any) -> State:
+def cancel_answered(goal: Facts, detail: Any) -> None:
     """Take note of it: what counts is how the goal ends, or how long it is denied."""
     goal.asking.answered(detail, goal.steady)
-    return goal.state
 
 
 @leads_to(State.DONE)
@@ -127,15 +126,67 @@ def drain_gave_up(goal: Facts, detail: Any) -> State:
     return goal.state
 
 
-def cancel_said(goal: Facts) -> str:
-    """What its server has said of the request to cancel it, to follow a reason; or ""."""
-    gone = goal.state is State.LOST and goal.end is not End.UNKNOWN  # else only its node is gone
-    if gone or goal.asking.asked_at is None or goal.state is State.DONE:
-        return ""
-    words = {
-        None: "has not answered the request to cancel it",
-        CANCEL_ACCEPTED: "has agreed to cancel it, and it has not ended",
-        CANCEL_REJECTED: "refuses to cancel it",
-    }
-    said = words.get(goal.asking.answer)
-    return f"; {goal.server} {said}" if said else ""
+@leads_to(State.LOST, State.DONE)
+def server_lost(goal: Facts, detail: Any) -> State:
+    """Free the leaf: SERVER_LOST; keep the goal, in case the server is not dead."""
+    goal.settle_as_planned(Outcome.SERVER_LOST, str(detail))
+    goal.asking.denied_since = None
+    if goal.phase is not State.NOT_RECEIVED:  # what was denied for less may have come since
+        goal.end = End.SERVER_GONE
+    return _keep(goal)
+
+
+@leads_to(State.LOST, State.DONE)
+def parked(goal: Facts, detail: Any) -> State:
+    """Keep the goal for the next node that sees its server; what is not known stays UNKNOWN."""
+    goal.settle_as_planned(Outcome.CANCELED, "its node was closed")
+    if goal.may_still_be_accepted:
+        goal.end = End.UNKNOWN
+    return _keep(goal)
+
+
+def _keep(goal: Facts) -> State:
+    if goal.lost_result.status is not None:
+        return goal.end_by_status()
+    goal.deadlines.clear()
+    goal.release()
+    return State.LOST
+
+
+@leads_to(State.CANCELING, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED, State.NOT_RECEIVED)
+def returned(goal: Facts, detail: Any) -> State:
+    """Cancel what it may still run."""
+    goal.asking.begin_anew(goal.steady)
+    if goal.phase is State.NOT_RECEIVED:  # nor will it; to ask does no harm
+        goal.commands.append(Command.CANCEL)
+        return State.NOT_RECEIVED
+    goal.end = End.UNKNOWN
+    goal.drain_gave_up = False  # there is somebody again who can tell
+    goal.ask()
+    if goal.accepted:
+        return State.CANCELING
+    if goal.phase is State.PRESUMED_NOT_RECEIVED:  # until it is denied once more
+        return State.PRESUMED_NOT_RECEIVED
+    goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience)
+    return State.UNCONFIRMED
+
+
+@leads_to(State.CANCELING)
+def runs(goal: Facts, detail: Any) -> State:
+    """It runs, so its server is back: canceled at once."""
+    return (returned if goal.accepted else requested.turned_up)(goal)
+
+
+@leads_to()
+def ask_another(goal: Facts, detail: Any) -> None:
+    """Ask for the result; what is to be canceled, is asked to cancel again, too."""
+    if goal.state not in (State.EXECUTING, State.REPLACED):
+        goal.commands.append(Command.CANCEL)
+    if goal.accepted:
+        goal.commands.append(Command.ASK_RESULT)
+
+
+@leads_to(State.DONE)
+def abandoned(goal: Facts, detail: Any) -> State:
+    """Forget it; what is not known by now stays so."""
+    return State.DONE

@@ -8,10 +8,9 @@ from __future__ import annotations
 from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN, ASK_IN_ANY_CASE, DOUBTS, LostResult
-from bt_actions.goals.facts import PATIENCE, Facts
+from bt_actions.goals.facts import PATIENCE, Facts, leads_to
 from bt_actions.goals.policy import Outcome
 from bt_actions.goals.steps import canceling
-from bt_actions.goals.steps.step import leads_to
 from bt_actions.goals.terms import (
     ENDS,
     OUTCOMES,
@@ -24,26 +23,24 @@ from bt_actions.goals.terms import (
 
 
 @leads_to()
-def feedback(goal: Facts, detail: Any) -> State:
+def feedback(goal: Facts, detail: Any) -> None:
     """The silence is over; timeout.feedback begins anew."""
     still_runs(goal, detail)
     if goal.lost_result.status is None:
         goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback)
-    return State.EXECUTING
 
 
 @leads_to()
-def still_runs(goal: Facts, detail: Any) -> State:
+def still_runs(goal: Facts, detail: Any) -> None:
     """It runs, whoever has denied it, or, long ago, shown that it had ended."""
     goal.feedback = detail
     goal.lost_result.denials = 0
     if goal.lost_result.questions > 0:
         goal.lost_result = LostResult()
-    return goal.state
 
 
 @leads_to()
-def status(goal: Facts, detail: Any) -> State:
+def status(goal: Facts, detail: Any) -> None:
     """If it has ended, its result is due, and asked for again in case it was lost."""
     if detail not in ENDS:
         goal.lost_result = LostResult()
@@ -51,7 +48,6 @@ def status(goal: Facts, detail: Any) -> State:
         goal.lost_result.status = detail
         goal.deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended
         goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)
-    return goal.state
 
 
 @leads_to(State.DONE)
