@@ -58,8 +58,8 @@ def alone(watch: ServerWatch) -> float:
 
 def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
     said = sent(watch)
-    assert said.answered(watch, 0.0, [True]) == [(Event.ACCEPTED, None)]
-    assert said.answered(watch, 0.0, [False]) == [(Event.REJECTED, None)]
+    assert said.accepted(watch, 0.0, [True]) == [(Event.ACCEPTED, None)]
+    assert said.accepted(watch, 0.0, [False]) == [(Event.REJECTED, None)]
     assert said.canceled(watch, 0.0, 0.0, [DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
     assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
     assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == [(Event.RESULT_UNKNOWN, None)]
@@ -69,27 +69,27 @@ def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    assert events(said.answered(watch, 0.0, [True])) == [Event.ACCEPTED]
-    assert events(said.answered(watch, 0.0, [True, True])) == [Event.SERVER_AMBIGUOUS]
+    assert events(said.accepted(watch, 0.0, [True])) == [Event.ACCEPTED]
+    assert events(said.accepted(watch, 0.0, [True, True])) == [Event.SERVER_AMBIGUOUS]
     assert watch.both_live
 
 
 def test_one_server_that_accepts_twice_is_one_server(watch: ServerWatch) -> None:
     said = replies.Replies(Goal(b"1", "move", Timeouts(), Now(0.0, 0.0)))
     said.sent_to = frozenset({ONE})
-    assert said.answered(watch, 0.0, [True, True]) == []
+    assert said.accepted(watch, 0.0, [True, True]) == []
     assert not watch.both_live
 
 
 def test_what_one_refuses_the_other_may_accept(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered(watch, 0.0, [False]) == []
-    assert events(said.answered(watch, 0.0, [False, True])) == [Event.ACCEPTED]
-    assert said.answered(watch, 0.0, [True, False]) == []
-    assert events(said.answered(watch, 0.0, [False, False])) == [Event.REJECTED]
+    assert said.accepted(watch, 0.0, [False]) == []
+    assert events(said.accepted(watch, 0.0, [False, True])) == [Event.ACCEPTED]
+    assert said.accepted(watch, 0.0, [True, False]) == []
+    assert events(said.accepted(watch, 0.0, [False, False])) == [Event.REJECTED]
 
 
 def test_a_refusal_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered(watch, 0.0, [False]) == []
+    assert said.accepted(watch, 0.0, [False]) == []
     assert said.looked(watch, 0.0) == []
     assert events(said.looked(watch, alone(watch))) == [Event.REJECTED]
 
@@ -229,7 +229,7 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
     """It was too busy to be heard, accepts, and is too busy again; the newcomer denies the goal."""
     said = beside_a_newcomer(watch)
     now = alone(watch)
-    assert told(said, said.answered(watch, now, [True]), now) == [Event.ACCEPTED]
+    assert told(said, said.accepted(watch, now, [True]), now) == [Event.ACCEPTED]
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
     later = now + NO_SECOND_AFTER

@@ -275,24 +275,20 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                     self._listener.all_delivered()
             return any_came
 
-    def _tell(self, kind: str, about: Any, detail: Any) -> None:
+    def _tell(self, kind: Any, about: Any, detail: Any) -> None:
         tell = self._listener
-        if kind in ("goal", "result", "cancel", "probe"):
+        if kind not in ("feedback", "status"):
             self.reachability.answered(asked=detail[0])
         if self.on_trial and kind != "status":
             return
         if kind == "feedback":
             tell.feedback_came(about, detail)
-        elif kind == "goal":
-            tell.goal_answered(about, detail[1])
-        elif kind == "result":
-            tell.result_came(about, *detail)
-        elif kind == "cancel":
-            tell.cancel_answered(about, *detail)
         elif kind == "status":
             tell.statuses_came(about)
-        else:
+        elif kind == "probe":
             tell.probe_answered(about)
+        else:
+            tell.answered(kind, about, *detail)
 
     @property
     def has_more(self) -> bool:

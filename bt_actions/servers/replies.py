@@ -31,6 +31,8 @@ from bt_actions.servers.presence import GID, Server, ServerWatch
 Told = list[tuple[Event, Any]]
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
+DENIALS = (CANCEL_UNKNOWN_GOAL, (0, None))
+"""Answers to a cancel request, and to a question for the result: the server has no such goal."""
 OVERTAKEN = 1.0
 """Seconds after a newcomer is shown within which a word of who was there before may be older."""
 
@@ -81,7 +83,16 @@ class Replies:
 
     # Told by the servers
 
-    def answered(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
+    def answered(
+        self, request: str, watch: ServerWatch, now: float, asked: float, answers: Sequence[Any]
+    ) -> Told:
+        """Take an answer to a request: "goal", "cancel" or "result"."""
+        if request == "goal":
+            return self.accepted(watch, now, answers)
+        take = self.canceled if request == "cancel" else self.finished
+        return take(watch, now, asked, answers)
+
+    def accepted(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
         """Take an answer to the goal request: accepted or not."""
         self._note_changes(watch, now)
         if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 from bt_actions.goals.terms import Now
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.servers.presence import GID
 from bt_actions.servers.reachability import Reachability
 from bt_actions.testing.medium import Medium, Served, VirtualRequest
-from bt_actions.traffic.transport import GOALS_KEPT, Listener, Seeker
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, Seeker
 from bt_actions.utilities.suggest import did_you_mean
 
 LONG_AGO = float("-inf")
@@ -23,7 +23,7 @@ LONG_AGO = float("-inf")
 
 @dataclass(slots=True, eq=False)
 class _Question:
-    kind: Literal["goal", "cancel", "result"]
+    kind: Request
     about: bytes | int
     """A goal's id, or a probe's number."""
     asked: float
@@ -107,17 +107,12 @@ class VirtualTransport:
         tell, about = self._listener, question.about
         self.reachability.answered(question.asked)
         question.answers.append(answer)
-        answers = tuple(question.answers)
         if self.on_trial:
             return
         if isinstance(about, int):
             tell.probe_answered(about)
-        elif question.kind == "goal":
-            tell.goal_answered(about, answers)
-        elif question.kind == "cancel":
-            tell.cancel_answered(about, question.asked, answers)
         else:
-            tell.result_came(about, question.asked, answers)
+            tell.answered(question.kind, about, question.asked, tuple(question.answers))
         tell.all_delivered()
 
     def hear_feedback(self, goal_id: bytes, feedback: Any) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.goal import turned_up_again
@@ -17,7 +18,7 @@ from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, NEVER, Even
 from bt_actions.servers.presence import GID
 from bt_actions.traffic.handle import Endpoint, GoalHandle
 from bt_actions.traffic.host import Host
-from bt_actions.traffic.transport import GOALS_KEPT
+from bt_actions.traffic.transport import GOALS_KEPT, Request
 
 
 @dataclass(slots=True)
@@ -59,26 +60,30 @@ class EndedGoals:
             del self._ended[oldest]
             self._endpoint.transport.forget(oldest)
 
-    def accepted(self, goal_id: bytes, answers: Sequence[bool]) -> None:
-        """Take an acceptance: it may have been overtaken by the result, or have come twice."""
-        ended = self._get(goal_id)
+    def answered(
+        self, request: Request, goal_id: bytes, asked: float, answers: Sequence[Any]
+    ) -> None:
+        """Take an answer. An acceptance may have been overtaken by the result, or have come twice.
+
+        And whoever has ended a goal neither agrees nor refuses to cancel it.
+        """
+        ended = self._ended.get(goal_id)
         if ended is None:
             return
-        is_news = not ended.accepted and sum(answers) == 1
-        if is_news or self._may_be_several(ended):
-            self._turns_up(goal_id, ended)
-        elif sum(answers) > 1:  # by one, twice, or by one that is not shown yet
-            self._ask(goal_id, ended)
-
-    def cancel_answered(self, goal_id: bytes, asked: float, code: int) -> None:
-        """Take an answer to a cancel request: who has ended a goal neither agrees nor refuses."""
-        ended = self._get(goal_id)
-        if ended is not None and asked > ended.since and code in (CANCEL_ACCEPTED, CANCEL_REJECTED):
-            self._turns_up(goal_id, ended)
+        if request == "cancel":
+            knows_it = answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED)
+            if knows_it and asked > ended.since:
+                self._turns_up(goal_id, ended)
+        elif request == "goal" and answers[-1]:
+            is_news = not ended.accepted and sum(answers) == 1
+            if is_news or self._may_be_several(ended):
+                self._turns_up(goal_id, ended)
+            elif sum(answers) > 1:  # by one, twice, or by one that is not shown yet
+                self._ask(goal_id, ended)
 
     def runs(self, goal_id: bytes) -> None:
         """Take feedback, or a status that shows that the goal runs: is it older than its end?"""
-        ended = self._get(goal_id)
+        ended = self._ended.get(goal_id)
         if ended is not None and self._may_be_several(ended):
             self._ask(goal_id, ended)
 
@@ -87,10 +92,6 @@ class EndedGoals:
         if now - ended.asked_at >= ASK_AGAIN:
             ended.asked_at = now
             self._endpoint.ask_to_cancel(goal_id)
-
-    def _get(self, goal_id: bytes) -> Ended | None:
-        """Return what has ended; in the child of a fork nothing has, it is the parent's."""
-        return None if self._endpoint.is_parents else self._ended.get(goal_id)
 
     def _may_be_several(self, ended: Ended) -> bool:
         self._endpoint.observe()

@@ -17,14 +17,13 @@ from typing import Any
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import (
-    CANCEL_UNKNOWN_GOAL,
     STATUS_SUCCEEDED,
     Event,
     Now,
     State,
 )
 from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
-from bt_actions.servers.replies import Told
+from bt_actions.servers.replies import DENIALS, Told
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.effect_runner import EffectRunner
 from bt_actions.traffic.effects import Before, Effect, what_follows
@@ -33,7 +32,7 @@ from bt_actions.traffic.handle import GoalHandle, Reporter
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import Predecessors
 from bt_actions.traffic.route import Route
-from bt_actions.traffic.transport import ActionTransport, Participant
+from bt_actions.traffic.transport import ActionTransport, Participant, Request
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING, Watcher
 from bt_actions.utilities.plain_text import raised
 
@@ -94,79 +93,56 @@ class ActionEndpoint:
 
     # What the server says (transport.Listener)
 
-    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        """Pass on an answer to a goal request; see to one that has ended and is accepted again."""
-        with self._host.lock:
-            handle = self._heard_of(goal_id)
-            if handle is not None:
-                told = handle.replies.answered(self.watch, self._host.steady(), answers)
-                self.pass_on(handle, told)
-            elif answers[-1]:
-                self._ended.accepted(goal_id, answers)
+    def answered(
+        self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
+    ) -> None:
+        """Pass on an answer about a goal; see to one that has ended, and may run again."""
+        if self.is_parents:
+            return
+        now = self._host.steady()
+        if request == "cancel":
+            self.cancels.answered(goal_id, now)
+        handle = self._heard_of(goal_id, denies=answers[-1] in DENIALS)
+        if handle is None:
+            self._ended.answered(request, goal_id, asked, answers)
+        else:
+            told = handle.replies.answered(request, self.watch, now, asked, answers)
+            self.pass_on(handle, told)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
-        with self._host.lock:
-            handle = self.goals.get(goal_id)
-            if handle is None:
-                self._ended.runs(goal_id)
-                return
-            now = self.heard_at = self._host.steady()
-            self.watch.heard(now)
-            handle.replies.spoke(self.watch, now)
-            self.tell(handle, Event.FEEDBACK, feedback)
-            if handle.keeps_feedback and handle.goal.outcome is None:
-                handle.feedback.append(feedback)
-                self.reporter.notify(None)
-
-    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
-        """Pass on an answer to a cancel request."""
-        with self._host.lock:
-            if self.is_parents:
-                return
-            self.cancels.answered(goal_id, self._host.steady())
-            handle = self._heard_of(goal_id, denies=answers[-1] == CANCEL_UNKNOWN_GOAL)
-            if handle is not None:
-                told = handle.replies.canceled(self.watch, self._host.steady(), asked, answers)
-                self.pass_on(handle, told)
-            else:
-                self._ended.cancel_answered(goal_id, asked, answers[-1])
-
-    def result_came(
-        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
-    ) -> None:
-        """Pass on a result."""
-        with self._host.lock:
-            handle = self._heard_of(goal_id, denies=answers[-1][0] == 0)
-            if handle is not None:
-                told = handle.replies.finished(self.watch, self._host.steady(), asked, answers)
-                self.pass_on(handle, told)
+        handle = self.goals.get(goal_id)
+        if handle is None:
+            self._ended.runs(goal_id)
+            return
+        now = self.heard_at = self._host.steady()
+        self.watch.heard(now)
+        handle.replies.spoke(self.watch, now)
+        self.tell(handle, Event.FEEDBACK, feedback)
+        if handle.keeps_feedback and handle.goal.outcome is None:
+            handle.feedback.append(feedback)
+            self.reporter.notify(None)
 
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
-        with self._host.lock:
-            others = [each for each in statuses if each not in self.goals]
-            running = [each for each in others if 0 < statuses[each] < STATUS_SUCCEEDED]
-            for goal_id in running:
+        running = []
+        for goal_id, status in statuses.items():
+            handle = self._heard_of(goal_id) if status > 0 else None
+            if handle is not None:
+                self.pass_on(handle, handle.replies.shown(self.watch, self._host.steady(), status))
+            elif 0 < status < STATUS_SUCCEEDED:
                 self._ended.runs(goal_id)
-            self._predecessors.see(running)
-            for goal_id in [each for each in statuses if each in self.goals]:
-                status = statuses[goal_id]
-                handle = self._heard_of(goal_id) if status > 0 else None
-                if handle is not None:
-                    told = handle.replies.shown(self.watch, self._host.steady(), status)
-                    self.pass_on(handle, told)
+                running.append(goal_id)
+        self._predecessors.see(running)
 
     def probe_answered(self, probe: int) -> None:
         """Pass on the answer to a probe."""
-        with self._host.lock:
-            self.watch.probe_answered(self._host.steady(), probe)
-            self.reporter.notify(None)
+        self.watch.probe_answered(self._host.steady(), probe)
+        self.reporter.notify(None)
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
-        with self._host.lock:
-            self._unused(self)
+        self._unused(self)
 
     def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight.

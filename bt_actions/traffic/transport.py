@@ -7,7 +7,7 @@ lock, but for what takes messages from the middleware.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from bt_actions.goals.terms import Now
 from bt_actions.servers.presence import GID
@@ -16,25 +16,23 @@ from bt_actions.servers.reachability import Reachability
 GOALS_KEPT = 20
 """Goal requests, of those that are forgotten, of which a further acceptance is told all the same: a
 server that wakes up has the last ten in its queue."""
+Request = Literal["goal", "cancel", "result"]
+"""What a server can be asked of a goal: to take it, to cancel it, and for its result."""
 
 
 class Listener(Protocol):
-    """Who is told what the servers say: under the host's lock, from whichever thread delivers.
+    """Who is told what the servers say: under the host's lock, from whichever thread delivers."""
 
-    `answers` are all that one question has had by now, the newest last: one of each server, and
-    none says whose it is. `asked` is when it was asked (seconds, steady clock).
-    """
-
-    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        """The goal request was answered: accepted or not. Told of forgotten goals, too."""
-
-    def result_came(
-        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    def answered(
+        self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
-        """Status and result came; status 0 means that the server does not know the goal."""
+        """A server answered a request that was sent at `asked` (seconds, steady clock).
 
-    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
-        """A cancel request was answered, with a return code of action_msgs/srv/CancelGoal."""
+        `answers` are all that it has had by now, the newest last: one of each server, and none says
+        whose it is. To a goal request: accepted or not, told of forgotten goals, too. To a cancel
+        request: a return code of action_msgs/srv/CancelGoal. To a question for the result: status
+        and result; 0 and None mean that the server does not know the goal.
+        """
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Feedback came, of a goal that may be anybody's."""

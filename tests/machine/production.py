@@ -45,8 +45,8 @@ class ModelTransport:
         self._caller, self._node, self._name, self._listener = caller, node, name, listener
         self.closed = False
         self.reachability = Reachability()
-        self._asked: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
-        self._past: dict[int, tuple[str, Any, float, dict[bytes, Any]]] = {}
+        self._asked: dict[int, tuple[Any, Any, float, dict[bytes, Any]]] = {}
+        self._past: dict[int, tuple[Any, Any, float, dict[bytes, Any]]] = {}
 
     def ready(self) -> bool:
         return self._caller.world.ready(self._name, self._node)
@@ -118,13 +118,9 @@ class ModelTransport:
             return
         by_server[message.server.gid] = message.detail
         answers = tuple(by_server.values())
-        if kind == "goal":
-            self._listener.goal_answered(about, answers)
-        elif kind == "cancel":
-            self._listener.cancel_answered(about, asked, answers)
-        else:
-            results = tuple((status, None) for status in answers)
-            self._listener.result_came(about, asked, results)
+        if kind == "result":
+            answers = tuple((status, None) for status in answers)
+        self._listener.answered(kind, about, asked, answers)
 
 
 class ModelParticipant:

@@ -371,7 +371,7 @@ OF_CROWDS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
     "believes two of three": (replies, "_answers_wanted", lambda watch: 2),
     "waits for who is not there": (replies, "_answers_wanted", lambda watch: 3),
     "takes any answer for all": (replies.Replies, "_may_be_at_two", lambda self, watch: False),
-    "hears the first of two acceptances": (EndedGoals, "accepted", lambda self, *answer: None),
+    "hears the first of two acceptances": (EndedGoals, "answered", lambda self, *answer: None),
     "forgets what has ended": (EndedGoals, "keep", lambda self, handle: None),
 }
 

@@ -17,6 +17,7 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 from bt_actions import Gripper, MoveRobot
 from bt_actions.ros import action_transport
 from bt_actions.ros.action_transport import RosTransport
+from bt_actions.traffic.transport import Request
 from tests.support.processes import Host
 from tests.support.waiting import until
 
@@ -36,18 +37,11 @@ class Heard:
         self.probes: list[int] = []
         self.so_far: tuple[Any, ...] = ()
 
-    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        self.goals.append((goal_id, answers[-1]))
-        self.so_far = answers
-
-    def result_came(
-        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    def answered(
+        self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
-        self.results.append((goal_id, *answers[-1]))
-        self.so_far = answers
-
-    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
-        self.cancels.append((goal_id, answers[-1]))
+        told = answers[-1] if request == "result" else (answers[-1],)
+        self.answers(request).append((goal_id, *told))
         self.so_far = answers
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
@@ -218,11 +212,13 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
 def test_a_listener_that_raises_does_not_end_the_spin(
     client: RosTransport, node: Node, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
-        raise RuntimeError("on purpose")
+    def fails(request: Request, *answer: Any) -> None:
+        if request == "cancel":
+            raise RuntimeError("on purpose")
+        heard.results.append((b"", 0, None))
 
     with monkeypatch.context() as patch, single(node):
-        patch.setattr(heard, "cancel_answered", fails)
+        patch.setattr(heard, "answered", fails)
         request(client, "cancel")
         request(client, "result")
         until(lambda: heard.results)

@@ -23,6 +23,7 @@ from bt_actions.simulation import journal
 from bt_actions.simulation.journal import Entry, Event
 from bt_actions.testing import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
+from bt_actions.traffic.transport import Request
 from tests.support.waiting import until
 
 STEPS = {Event.STEP, Event.OPENED, Event.CLOSED}
@@ -181,18 +182,18 @@ class VirtualClient(Client):
     def cancel(self, goal: Goal) -> None:
         self._transport.cancel(bytes.fromhex(goal.goal_id))
 
-    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        self._goals[goal_id].accepted = answers[-1]
-        if answers[-1]:
-            self._transport.ask_result(goal_id)
-
-    def result_came(
-        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    def answered(
+        self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
-        self._goals[goal_id].status, self._goals[goal_id].result = answers[-1]
-
-    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
-        self._goals[goal_id].cancels.append(answers[-1])
+        goal = self._goals[goal_id]
+        if request == "result":
+            goal.status, goal.result = answers[-1]
+        elif request == "cancel":
+            goal.cancels.append(answers[-1])
+        else:
+            goal.accepted = answers[-1]
+            if goal.accepted:
+                self._transport.ask_result(goal_id)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         self._goals[goal_id].feedback.append(feedback)

@@ -23,7 +23,7 @@ from bt_actions.goals.terms import (
 from bt_actions.simulation import Script, ScriptedServer
 from bt_actions.testing import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic.transport import ActionTransport, Participant
+from bt_actions.traffic.transport import ActionTransport, Participant, Request
 from tests.support.waiting import until
 
 NUMBERS = itertools.count(1)
@@ -103,16 +103,12 @@ class Heard:
         self.feedback: list[tuple[bytes, Any]] = []
         self.delivered = 0
 
-    def goal_answered(self, goal_id: bytes, answers: tuple[bool, ...]) -> None:
-        self.told.append(("goal", goal_id, answers))
-
-    def result_came(
-        self, goal_id: bytes, asked: float, answers: tuple[tuple[int, Any], ...]
+    def answered(
+        self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
-        self.told.append(("result", goal_id, tuple(status for status, _ in answers)))
-
-    def cancel_answered(self, goal_id: bytes, asked: float, answers: tuple[int, ...]) -> None:
-        self.told.append(("cancel", goal_id, answers))
+        if request == "result":
+            answers = tuple(status for status, _ in answers)
+        self.told.append((request, goal_id, answers))
 
     def probe_answered(self, probe: int) -> None:
         self.told.append(("probe", probe))
