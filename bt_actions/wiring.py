@@ -40,11 +40,13 @@ def backend_of(node: Any) -> Backend:
         return NodeParticipant.of(node)
 
 
-def spinner(node: Any, executor: Any, **given: Any) -> Spinner:
-    """Return a node that is spun, made here where none is given; see ros/spinning.py."""
+def spinner(died: Callable[[], None], **given: Any) -> Spinner:
+    """Return a node that is spun: of all who give nothing it is one; see ros/spinning.py."""
     from bt_actions.ros.spinning import Spinner
 
-    return Spinner(node, executor, **given)
+    if any(each not in (None, "") for each in given.values()):
+        return Spinner(**given, died=died)
+    return Spinner.shared(died)
 
 
 def ended_by_signals(

@@ -40,7 +40,7 @@ What holds everywhere:
 - **Somebody must spin the node** while the tree runs. `TreeRunner` does, unless it was given a node
   that is in an executor. No behaviour may: `rclpy.spin_until_future_complete(node, ...)` takes the
   node out of its executor, and the run ends with a TreeError that names the behaviour.
-- **In a callback** of anybody's executor a `TreeRunner` with a node of its own can `run()`. On the
+- **In a callback** of anybody's executor a `TreeRunner` that was given no node can `run()`. On the
   node that the callback belongs to it can where another thread of the executor is free for the
   answers; else `start()` it, and take the status in a done callback of its `future`.
 - **`shutdown()` cancels and waits** until each goal is accounted for, at most as long as its

@@ -171,27 +171,77 @@ class TestInACallback:
     def test_of_the_executor_that_this_thread_has_to_spin_it_says_what_to_do(
         self, node: Any, whose: str
     ) -> None:
-        def within(runner: TreeRunner) -> Status:
-            with runner:
-                return runner.run()
-
         def waits(runner: TreeRunner) -> Status:
             runner.start()
             return runner.wait()
 
+        def within(runner: TreeRunner) -> Status:
+            with runner:
+                return runner.run()
+
         with contextlib.ExitStack() as stack:
             if whose == "the user's":
                 stack.enter_context(spun(node))
-            runner = stack.enter_context(TreeRunner(Gate(), node=node))
-            runner.start()
-            runner.interrupt()  # it spins from now on
-            runner.wait()
-            for call in within, waits:
+            runner = stack.enter_context(TreeRunner(py_trees.behaviours.Success("s"), node=node))
+            runner.run()  # it spins from now on
+            for call in [waits, within] if whose == "the user's" else [within]:
                 error = called(runner.executor, lambda call=call: call(runner))
                 assert isinstance(error, RuntimeError)
                 assert "in a done callback of `future`" in str(error)
-                if whose == "the user's":
-                    break  # it is shut down: nothing of that has to wait for the thread
+
+
+class TestWithNothingSaid:
+    def test_runners_share_a_node_and_a_spin_thread_until_the_last_is_shut_down(
+        self, journal: Journal, name: str
+    ) -> None:
+        closed = list[bool]()
+        leaves = [MoveRobot(f"m{at}", 0.1, action_name=name, busy="wait") for at in range(3)]
+        first, *others = runners = [TreeRunner(leaf) for leaf in leaves]
+        assert {runner.node for runner in others} == {first.node}
+        first.on_close(lambda: closed.append("bt_actions-spin" in names_of_threads()))
+        for runner in runners:
+            runner.start()
+        assert {runner.wait(9.0) for runner in runners} == {Status.SUCCESS}
+        assert names_of_threads().count("bt_actions-spin") == 1
+        first.shutdown()
+        assert closed == [False]
+        for runner in others:
+            assert runner.run(9.0) is Status.SUCCESS
+            runner.shutdown()
+        assert not first.node.context.ok()
+        assert journal.ends() == ["succeeded"] * 5
+
+    def test_one_that_says_something_or_finds_other_settings_has_a_node_of_its_own(
+        self, domain: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        with contextlib.ExitStack() as stack:
+            first = stack.enter_context(TreeRunner(Gate()))
+            named = stack.enter_context(TreeRunner(Gate(), name="named"))
+            monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+            unseen = stack.enter_context(TreeRunner(Gate()))
+            assert len({first.node, named.node, unseen.node}) == 3
+
+    def test_they_run_in_callbacks_of_the_executor_that_they_share(
+        self, journal: Journal, name: str
+    ) -> None:
+        """More of them than that has threads."""
+        leaves = [MoveRobot(f"m{at}", 0.1, action_name=name, busy="wait") for at in range(4)]
+        runners, statuses = [TreeRunner(leaf) for leaf in leaves], list[Status]()
+        with TreeRunner(Gate()) as outer:
+            outer.start()
+            for each in runners:
+                outer.executor.create_task(lambda each=each: statuses.append(each.run(9.0)))
+            until(lambda: len(statuses) == len(leaves), 20.0)
+            within = called(outer.executor, lambda: TreeRunner(Gate()))
+            assert within.node is not outer.node, "who made it may wait for it"
+            for runner in [*runners, within]:
+                runner.shutdown()
+            outer.interrupt()
+        assert statuses == [Status.SUCCESS] * len(leaves)
+
+
+def names_of_threads() -> list[str]:
+    return [each.name for each in threading.enumerate()]
 
 
 class TestFuture:

@@ -1,8 +1,9 @@
 """A node of our own and the thread that spins it, with the one order of shutdown that is clean.
 
 Other orders gave errors about invalid handles, segmentation faults, or leaked a thread pool:
-executor, spin thread, thread pool, clients, node, context. Nothing here knows of trees or goals
-beyond closing the node's traffic.
+executor, spin thread, thread pool, clients, node, context. Users who say nothing share one: the
+first makes it, and it is stopped with the last. Nothing here knows of trees or goals beyond closing
+the node's traffic.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Iterator
 from types import FrameType
 
 from rclpy.context import Context
@@ -21,6 +23,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.node import Node
 from rclpy.task import Task
 
+from bt_actions.ros.alive import is_valid
 from bt_actions.ros.naming import named_node
 from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.workarounds import participant
@@ -35,6 +38,9 @@ PATIENCE_SPUN = 5.0
 spin_once now and then, and a slow callback must be no false alarm."""
 
 _number = itertools.count(1)
+_shared: weakref.WeakValueDictionary[object, Spinner] = weakref.WeakValueDictionary()
+_users_lock = threading.Lock()
+os.register_at_fork(after_in_child=_users_lock._at_fork_reinit)  # type: ignore[attr-defined]  # noqa: SLF001 - as threading does
 
 
 class Spinner:
@@ -45,8 +51,8 @@ class Spinner:
     - An executor that holds nodes already is somebody's, who spins it; it is never spun here.
 
     `executor` may be ``"multi"`` (the default) or ``"single"``. `context`, for a node that is made
-    here, is shut down here as well. `died` is called on the spin
-    thread when it ends by an error.
+    here, is shut down here as well. `died` is its first user's, and is called on the spin thread
+    when that ends by an error.
     """
 
     def __init__(
@@ -57,9 +63,13 @@ class Spinner:
         name: str = "",
         namespace: str = "",
         context: Context | None = None,
-        died: Callable[[BaseException], None] = lambda error: None,
+        died: Callable[[], None] = lambda: None,
     ) -> None:
-        self._died = died
+        self._users = [died]
+        self.error: BaseException | None = None
+        """What the spin thread died of."""
+        self._lock = threading.RLock()
+        """Of starting and stopping: what is called in between may shut down another user."""
         self._thread: threading.Thread | None = None
         self._stopping = False
         self._alive = threading.Event()
@@ -103,16 +113,40 @@ class Spinner:
         if self._added:
             self.executor.add_node(self.node)
 
+    @classmethod
+    def shared(cls, died: Callable[[], None]) -> Spinner:
+        """Return the one of all who say nothing, as long as what ROS goes by is the same.
+
+        Another one where it cannot be used any more, and in a callback of its own: who made that
+        may be waiting for it to end.
+        """
+        settings = os.getpid(), *sys.argv, *sorted(os.environ.items())
+        with _users_lock:
+            found = _shared.get(settings)
+            if found is None or not found.takes(died):
+                found = _shared[settings] = cls(None, None, died=died)
+            return found
+
+    def takes(self, died: Callable[[], None]) -> bool:
+        """Count another user, who gives `died`, unless there is a reason not to."""
+        usable = self._users and self.error is None and is_valid(self.node) and not self._left()
+        if not usable or self.is_called():
+            return False
+        self._users.append(died)
+        return True
+
     def start(self, give_up: Callable[[], bool] = lambda: False) -> None:
         """Begin to spin; where somebody else should be spinning, make sure that they do.
 
         Raises RuntimeError when nobody does, for 5 s; not where `give_up` says so before.
         """
         if self.spins:
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._spin, name="bt_actions-spin")
-                self._thread.daemon = True  # a crash of the main thread must not hang the process
-                self._thread.start()
+            with self._lock:
+                if self._thread is None:
+                    self._stopping = False
+                    self._thread = threading.Thread(target=self._spin, name="bt_actions-spin")
+                    self._thread.daemon = True  # a crash of the main thread must not hang it
+                    self._thread.start()
             return
         self._ask_for_life()
         while not self._alive.wait(0.05) and not give_up():
@@ -122,12 +156,12 @@ class Spinner:
         """Make sure now and then that whoever spins our node still does.
 
         Raises RuntimeError when nobody has for 5 s, as where the executor is in callbacks that do
-        not return, or the node was taken out of it. Out of one that is spun here: calls `died`.
+        not return, or the node was taken out of it. Out of one that is spun here: sets `error`.
         """
         if not self.spins:
             self._check()
         elif self._left():
-            self._died(self._gone())
+            self._dies(self._gone())
 
     def taken_away(self) -> str:
         """Say that our node has been put into another executor; empty where it has not, in 0.1 us.
@@ -143,16 +177,30 @@ class Spinner:
         )
 
     def is_here(self) -> bool:
-        """Whether our node is not spun while this thread waits.
+        """Whether our node is not spun while this thread waits, as it is the one that spins it."""
+        return any(_spins(self.executor, frame) for frame in _frames())
 
-        This thread spins it, or, where it is spun by us, was called by the executor.
-        """
-        frame: FrameType | None = sys._getframe()  # noqa: SLF001 - documented
-        while frame is not None:
-            if _spins(self.executor, frame) or (self.spins and _calls(self.executor, frame)):
-                return True
-            frame = frame.f_back
-        return False
+    def is_called(self) -> bool:
+        """Whether this thread was called by an executor that is spun here."""
+        executor = self.executor
+        return self.spins and any(_spins(executor, f) or _calls(executor, f) for f in _frames())
+
+    @property
+    def is_stopped_by_one(self) -> bool:
+        """Whether it has one user left."""
+        return len(self._users) == 1
+
+    @contextlib.contextmanager
+    def replaced(self) -> Iterator[None]:
+        """Have another thread call callbacks while this one, if it was called by ours, waits."""
+        lends = isinstance(self.executor, OnceExecutor) and self.is_called()
+        if lends:
+            self.executor.add_threads(1)
+        try:
+            yield
+        finally:
+            if lends:
+                self.executor.add_threads(-1)
 
     def _check(self) -> None:
         if self._moved() or getattr(self.executor, "_is_shutdown", False):  # rclpy's name of it
@@ -200,29 +248,54 @@ class Spinner:
                     raise ExternalShutdownException
         except BaseException as error:  # noqa: BLE001 - a dead spin thread must not go unnoticed
             if not self._stopping:
-                self._died(self._gone() if self._left() else error)
+                self._dies(self._gone() if self._left() else error)
         else:
             if not self._stopping:
-                self._died(self._gone())
+                self._dies(self._gone())
 
-    def stop(self, before_nodes: Callable[[], None]) -> None:
-        """Shut down what is ours, in the clean order; goals must be drained before.
+    def _dies(self, error: BaseException) -> None:
+        self.error = error
+        for died in list(self._users):
+            died()
 
-        `before_nodes` is called when nothing spins any more, while nodes and context still live.
+    def stop(self, died: Callable[[], None], before_nodes: Callable[[], None] | None) -> None:
+        """Count the user off who gave `died`; with the last one, shut down what is ours.
+
+        In the clean order; the user's goals must be drained before. `before_nodes` is called when
+        nothing spins, while nodes and context still live.
         """
-        if self.spins:
-            self._stopping = True
-            if self._thread is not None:
-                with contextlib.suppress(Exception):  # of a guard whose context is gone
-                    self.executor.create_task(int)  # does nothing: spin_once returns after it
-                self._thread.join()
-            if self._own_executor:
-                if isinstance(self.executor, OnceExecutor):
-                    self.executor.finish()  # what it still runs needs the executor's guard
-                self.executor.shutdown()
+        with self._lock:
+            with _users_lock:
+                self._users.remove(died)
+            if not self._users:
+                self._close(before_nodes)
+            elif before_nodes is not None:
+                was_spun = self._halt()
+                before_nodes()
+                if was_spun:
+                    self.start()
+
+    def _halt(self) -> bool:
+        """End the spin thread; return whether there was one."""
+        thread, self._thread = self._thread, None
+        if thread is None:
+            return False
+        self._stopping = True
+        with contextlib.suppress(Exception):  # of a guard whose context is gone
+            self.executor.create_task(int)  # does nothing: spin_once returns after it
+        thread.join()
+        return True
+
+    def _close(self, before_nodes: Callable[[], None] | None) -> None:
+        self._halt()
+        if self.spins and self._own_executor:
+            if isinstance(self.executor, OnceExecutor):
+                self.executor.finish()  # what it still runs needs the executor's guard
+            self.executor.shutdown()
         if self._added and self.node.executor is self.executor:
             self.node.executor = None  # takes it out of the executor, and lets another have it
-        before_nodes()
+        if before_nodes is not None:
+            before_nodes()
         if self.owns_node:
             self._traffic.destroy()
             if self._context is not None:
@@ -237,6 +310,14 @@ def node_beside(node: Node, name: str) -> Node:
     What `--ros-args` says is about the other one, whose name it may not get too.
     """
     return Node(name, context=node.context, use_global_arguments=False)
+
+
+def _frames() -> Iterator[FrameType]:
+    """Those that this thread is in."""
+    frame: FrameType | None = sys._getframe(1)  # noqa: SLF001 - documented
+    while frame is not None:
+        yield frame
+        frame = frame.f_back
 
 
 def _spins(executor: Executor, frame: FrameType) -> bool:

@@ -320,6 +320,7 @@ class TickLoop:
                 shutdown()
             except Exception as error:  # noqa: BLE001 - the user's: any
                 self._log.error(f"shutdown of a behaviour raised: {raised(error)}")
+        self._traffic.drain(self.goals.not_over)
 
     def close(self, now: float) -> None:
         """Listen to goals no more, and tell what has only now become known of them."""

@@ -39,12 +39,13 @@ _beginning = threading.Lock()
 
 
 class TreeRunner:
-    """Runs one tree, on a node of its own or on one that is given.
+    """Runs one tree, on a node that is made here or on one that is given.
 
     Args:
         root_or_behaviour_tree: what to run; of a BehaviourTree, handlers and visitors are called.
-        node: to send goals from; without one, context, node and spin thread are made here. A node
-            that is in an executor is never spun here: its owner spins it.
+        node: to send goals from; without one, context, node and spin thread are made here, once for
+            all runners that give neither this nor any of what follows but `heartbeat`. A node that
+            is in an executor is never spun here: its owner spins it.
         executor: "multi" (the default), "single", or an executor; one without nodes is spun here.
         heartbeat: seconds after which the tree is ticked though nothing has happened.
         namespace: of the node that is made here.
@@ -73,7 +74,6 @@ class TreeRunner:
         self._log = wiring.log()
         self._wake_up = WakeUp()
         self._on_close: list[Callable[[], None]] = []
-        self._spin_error: BaseException | None = None
         self._started: StartedRun | None = None
         self._running = threading.Lock()
         self._runs_on: int | None = None
@@ -82,7 +82,12 @@ class TreeRunner:
         self._is_down = False
         self._pid = os.getpid()
         self._spinner = wiring.spinner(
-            node, executor, name=name, namespace=namespace, context=context, died=self._spin_died
+            self._wake_up.set,
+            node=node,
+            executor=executor,
+            name=name,
+            namespace=namespace,
+            context=context,
         )
         self._loop = TickLoop(
             self.tree,
@@ -140,7 +145,7 @@ class TreeRunner:
         self._loop.observe(callback)
 
     def on_close(self, callback: Callable[[], None]) -> None:
-        """Call `callback` in `shutdown`, when nothing spins any more and the context still lives.
+        """Call `callback` in `shutdown`, while nothing spins and the context still lives.
 
         The place to destroy further nodes that were added to `executor`.
         """
@@ -171,7 +176,7 @@ class TreeRunner:
             )
         self._begin()
         try:
-            with self._hear_signals():
+            with self._hear_signals(), self._spinner.replaced():
                 return self._run(timeout)
         finally:
             self._release()
@@ -251,7 +256,7 @@ class TreeRunner:
             raise RuntimeError("wait() within the run would wait for itself")
         if timeout is None and not future.done() and self._spinner.is_here():
             raise _waits_for_itself("wait()", "take the status in a done callback of `future`")
-        with self._hear_signals():
+        with self._hear_signals(), self._spinner.replaced():
             futures.wait([future], None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         if not future.done():
             goals = [
@@ -291,6 +296,7 @@ class TreeRunner:
     def shutdown(self) -> None:
         """End the run if there is one, and shut down the tree and all that was made here.
 
+        What runners share goes with the last of them.
         Returns at once where another thread is at it. What an exception cuts short waits no longer.
         Raises RuntimeError on a thread of an executor that is spun here, and within the run.
         """
@@ -308,7 +314,7 @@ class TreeRunner:
             self._loop.raise_what_ended_it()
 
     def _spins_here(self) -> bool:
-        return self._spinner.spins and self._spinner.is_here()
+        return self._spinner.is_stopped_by_one and self._spinner.is_called()
 
     def _at_exit(self) -> None:
         with contextlib.suppress(KeyboardInterrupt), wiring.ended_by_signals(self._signalled):
@@ -342,7 +348,8 @@ class TreeRunner:
             self._loop.shutdown()
         finally:
             try:
-                self._spinner.stop(self._close_guests)
+                guests = self._close_guests if self._on_close else None
+                self._spinner.stop(self._wake_up.set, guests)
             finally:
                 self._loop.close(time.monotonic())
 
@@ -375,12 +382,8 @@ class TreeRunner:
 
     def _check(self) -> None:
         self._spinner.check()
-        if error := self._spin_error:
+        if error := self._spinner.error:
             raise TreeError(f"the spin thread died: {raised(error)}") from error
-
-    def _spin_died(self, error: BaseException) -> None:
-        self._spin_error = error
-        self._wake_up.set()
 
 
 def _waits_for_itself(call: str, instead: str) -> RuntimeError:

@@ -363,7 +363,8 @@ A_PUBLISHER_BETWEEN_TWO_GOALS = """
     class Second(py_trees.behaviour.Behaviour):
         def update(self):  # whoever comes now knows nothing of the time before
             global other
-            other = TreeRunner(MoveRobot("o", 0.1, action_name=name + "_other", timeout=T))
+            leaf = MoveRobot("o", 0.1, action_name=name + "_other", timeout=T)
+            other = TreeRunner(leaf, name="other")
             return py_trees.common.Status.SUCCESS
 
     first = MoveRobot("first", 0.2, action_name=name, timeout=T)

@@ -442,7 +442,7 @@ class TestStopped:
                       resources=arm, timeout=timeouts)
             for letter, which in (("first", 0), ("idle", 0), ("second", 1))
         )  # fmt: skip
-        with TreeRunner(in_turn(second, idle)) as other:
+        with TreeRunner(in_turn(second, idle), name="other") as other:
             for leaf in (idle, second):
                 leaf.setup(node=other.node)
             until_shown(other.node, f"{name}_0", 1)
@@ -689,7 +689,7 @@ class TestStopped:
         journal = host.open(name)
         first = MoveRobot("first", 40.0, action_name=name)
         second = MoveRobot("second", 0.3, action_name=name, timeout=Timeouts(server=30.0))
-        with TreeRunner(first) as one, TreeRunner(second) as other:
+        with TreeRunner(first) as one, TreeRunner(second, name="other") as other:
             one.start()
             until(lambda: first.progress().feedback is not None)
             host.send(signal.SIGSTOP)

@@ -46,28 +46,22 @@ def serve(
         from bt_actions.ros.spinning import Spinner
 
     with Signals() as signals:
-        errors: list[BaseException] = []
-
-        def died(error: BaseException) -> None:
-            errors.append(error)
-            signals.poke()
-
         with starting_ros():
-            spinner = Spinner(None, executor, name=name, namespace=namespace, died=died)
+            spinner = Spinner(None, executor, name=name, namespace=namespace, died=signals.poke)
         server = None
         try:
             server = make(spinner.node)
             spinner.start()
             announce(server)
-            while not errors and not signals.wait(None)[0]:
+            while spinner.error is None and not signals.wait(None)[0]:
                 pass
         finally:
             if server is not None:
                 drain(server, signals)
-            spinner.stop(server.close if server is not None else lambda: None)
-        code = conclude(server, Exit.FAILURE if errors else Exit.SUCCESS)
-        if errors:
-            note(f"bt-actions {command}: the executor died: {raised(errors[0])}")
+            spinner.stop(signals.poke, server.close if server is not None else None)
+        code = conclude(server, Exit.FAILURE if spinner.error else Exit.SUCCESS)
+        if spinner.error:
+            note(f"bt-actions {command}: the executor died: {raised(spinner.error)}")
         signals.settle(code)
     return code
 

@@ -32,6 +32,10 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
         self._executor.shutdown()  # it has no thread yet
         self._executor = self._pool = _Pool(num_threads)
 
+    def add_threads(self, number: int) -> None:
+        """Have so many threads more, at most; those that are there stay."""
+        self._pool.add_threads(number)
+
     def finish(self) -> None:
         """Take no more work, and wait for what is there."""
         self._pool.shutdown()
@@ -65,6 +69,9 @@ class _Pool(ThreadPoolExecutor):
         self._held.discard(task)
         self._begun.set()
         return task(*args, **options)
+
+    def add_threads(self, number: int) -> None:
+        self._max_workers += number
 
     def holds(self, task: Any) -> bool:
         """Whether `task` waits for a thread; waits a moment for one that begins with any."""
