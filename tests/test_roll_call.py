@@ -8,7 +8,7 @@ from bt_actions.recovery.roll_call import (
     ASK_AGAIN,
     SETTLE,
     SETTLE_AFTER_SILENCE,
-    Denial,
+    Answers,
     RollCall,
 )
 
@@ -21,7 +21,7 @@ class Roll(RollCall):
     def __init__(self) -> None:
         self.now = 100.0
         self._numbers: Iterator[int] = iter(range(1000))
-        super().__init__(self.now)
+        super().__init__()
 
     def shows(self, *shown: bytes) -> None:
         self.sees(frozenset(shown), self.now)
@@ -68,7 +68,7 @@ def test_an_answer_alone_is_no_proof() -> None:
 
 def test_who_was_silent_has_to_answer_for_longer() -> None:
     """What it offered when it was woken up may have been lost, and is offered again after 3 s."""
-    for silences in (lambda roll: roll.ask(0), lambda roll: roll.begin(roll.now)):
+    for silences in (lambda roll: roll.ask(0), lambda roll: roll.begin()):
         roll = Roll()
         roll.shows(A)
         silences(roll)
@@ -102,7 +102,7 @@ def test_one_that_comes_newly_begins_anew() -> None:
     assert roll.known
 
 
-class Denied(Denial):
+class Denied(Answers):
     """One whose questions and answers come as a test says."""
 
     def __init__(self) -> None:
@@ -122,7 +122,7 @@ class Denied(Denial):
         for _ in range(times):
             number = self.question(*of)
             for _ in range(denials):
-                self.denied(number)
+                self.answered(number)
 
 
 LONG = 30

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.policy import End
-from bt_actions.recovery.roll_call import Denial
+from bt_actions.recovery.roll_call import Answers
+
+GONE = "its server is gone"
 
 
 @dataclass(slots=True)
@@ -29,9 +31,7 @@ class LeftBehind:
     """It was sent, and no server has shown it yet; one may."""
     nothing_left: str = ""
     """Why none will, or its end is not told: it need not be awaited."""
-    server_is_gone: bool = False
-    """That is why."""
-    denial: Denial = field(default_factory=Denial)
+    denials: Answers = field(default_factory=Answers)
 
     @property
     def end(self) -> End:
@@ -47,12 +47,11 @@ class LeftBehind:
         """No server has it, nor will."""
         self.awaited, self.nothing_left = False, why
 
-    def turns_up(self) -> None:
-        """A server has it: it tells the end in a status."""
-        self.awaited, self.nothing_left, self.server_is_gone = False, "", False
-        self.asked_at = float("-inf")
-
-    def is_awaited_again(self) -> None:
-        """A server that may have it is in sight after all."""
-        self.awaited, self.nothing_left, self.server_is_gone = True, "", False
-        self.denial.begin()
+    def judge(self, *, known: bool, gone: bool) -> None:
+        """See whether to await it: all that its servers run may be `known`, or they are `gone`."""
+        if self.nothing_left == GONE and not gone:  # one is in sight after all
+            self.awaited, self.nothing_left = True, ""
+        if self.awaited and self.denials.lasted >= self.takes:
+            self.is_nowhere(f"denied for {self.takes:g} s")
+        elif self.awaited and known and gone:
+            self.is_nowhere(GONE)

@@ -79,12 +79,8 @@ def test_a_silent_server_counts_more_than_an_output_that_is_lost(
     monkeypatch: pytest.MonkeyPatch, error: int
 ) -> None:
     goal = LeftBehind("/a", bytes(16), 1, shown=End.CANCELED)
-
-    def cleanup(*, missing: Callable[[list[str], bool], None], **_: Any) -> Swept:
-        missing(["/b"], True)
-        return Swept([goal], ["/a"], {"/b": "no server of {} answers"}, 0)
-
-    monkeypatch.setattr(module, "cleanup", cleanup)
+    swept = Swept([goal], ["/a"], {"/b": "no server of {} answers"}, 0, missing=["/b"])
+    monkeypatch.setattr(module, "cleanup", lambda **_: swept)
     monkeypatch.setattr(sys, "stdout", Unwritable(error))
     assert main(["cleanup"]) == 3
 
@@ -117,9 +113,9 @@ def test_an_action_that_is_named_is_wanted(
 ) -> None:
     """Where its server is out of sight, others that are not say nothing of what was left there."""
 
-    def cleanup(wanted: list[str], missing: Callable[..., None], **_: object) -> Swept:
-        missing(wanted, True)
-        return Swept([], ["/a"], dict.fromkeys(wanted, "no server of {} answers"), 7)
+    def cleanup(wanted: list[str], **_: object) -> Swept:
+        silent = dict.fromkeys(wanted, "no server of {} answers")
+        return Swept([], ["/a"], silent, 7, missing=wanted)
 
     monkeypatch.setattr(module, "cleanup", cleanup)
     assert main(["cleanup", "/r1/move"]) == 3

@@ -43,17 +43,24 @@ def left(start_program: Callable[..., Process], serve: Callable[..., Journal], n
     return goal
 
 
-def sweep(wanted: Collection[str], **more: Any) -> tuple[Swept, list[str]]:
-    """Clean up; return what came of it, and what is missing in the end."""
-    told: list[str] = []
-    swept = cleanup(
-        look=1.0,
-        patience=1.0,
-        wanted=wanted,
-        missing=lambda names, in_vain: told.extend(names if in_vain else ()),
-        **more,
-    )
-    return swept, told
+def sweep(wanted: Collection[str], **more: Any) -> Swept:
+    """Clean up; return what came of it."""
+    return cleanup(look=1.0, patience=1.0, wanted=wanted, **more)
+
+
+def when_sighted(
+    name: str, monkeypatch: pytest.MonkeyPatch, call: Callable[[], object], servers: int = 1
+) -> None:
+    """Call this at each look that shows so many servers of the action."""
+    real = sight.servers
+
+    def seen(node: Any, action: str) -> frozenset[bytes]:
+        shown = real(node, action)
+        if action == name and len(shown) == servers:
+            call()
+        return shown
+
+    monkeypatch.setattr(sight, "servers", seen)
 
 
 def test_of_two_servers_each_has_to_answer(
@@ -64,18 +71,10 @@ def test_of_two_servers_each_has_to_answer(
     hosts = [new_host(short_lease=False) for _ in range(2)]
     for host in hosts:
         host.open(name)
-    real = sight.servers
-
-    def stopping(node: Any, action: str) -> frozenset[bytes]:
-        shown = real(node, action)
-        if action == name and len(shown) == 2:
-            hosts[0].send(signal.SIGSTOP)
-        return shown
-
-    monkeypatch.setattr(sight, "servers", stopping)
-    swept, told = sweep([name])
+    when_sighted(name, monkeypatch, lambda: hosts[0].send(signal.SIGSTOP), servers=2)
+    swept = sweep([name])
     hosts[0].send(signal.SIGCONT)
-    assert told == [name]
+    assert swept.missing == [name]
     assert name not in swept.known
 
 
@@ -90,7 +89,7 @@ def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
         return shown | {b"another"} if action == name and shown and not found else shown
 
     monkeypatch.setattr(sight, "servers", one_goes)
-    swept, _told = sweep(
+    swept = sweep(
         [name],
         found=found.append,
         stopped=lambda: any(goal.shown is End.CANCELED for goal in found),
@@ -102,15 +101,14 @@ def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
 
 
 def test_an_action_that_nobody_wants_is_named_where_it_is_not_known(
-    new_host: HostFactory, name: str, domain: int
+    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     host = new_host(short_lease=False)
     host.open(name)
-    swept, told = sweep(
-        [], sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None
-    )
+    when_sighted(name, monkeypatch, lambda: host.send(signal.SIGSTOP))
+    swept = sweep([])
     host.send(signal.SIGCONT)
-    assert told == [], "and in nobody's way"
+    assert swept.missing == [], "and in nobody's way"
     assert name in swept.unknown
     assert name not in swept.known
 
@@ -155,15 +153,15 @@ def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
 ) -> None:
     """What `ros2 launch` gives a node as its namespace is in force for relative names, too."""
     monkeypatch.setattr(module, "LOOK_LONGEST", 0.2)
-    told = list[tuple[list[str], bool]]()
+    told = list[list[str]]()
     monkeypatch.setattr("sys.argv", ["", "--ros-args", "-r", "__ns:=/r1"])
     swept = cleanup(
         look=0.1,
         patience=0.1,
         wanted={"move", "/r2/move"},
-        missing=lambda actions, in_vain: told.append((actions, in_vain)),
+        waits=told.append,
     )
-    assert told == [(["/r1/move", "/r2/move"], False), (["/r1/move", "/r2/move"], True)]
+    assert told == [swept.missing] == [["/r1/move", "/r2/move"]]
     assert swept.domain == domain, "the one in force"
 
 
@@ -173,32 +171,25 @@ def test_cleanup_does_not_take_silence_for_nothing(
     monkeypatch.setattr(module, "LOOK_LONGEST", 6.0)
     host = new_host(short_lease=False)
     host.open(name)
-    told = list[tuple[list[str], bool]]()
+    told = list[list[str]]()
+    when_sighted(name, monkeypatch, lambda: host.send(signal.SIGSTOP))
 
-    def look(wanted: list[str] | None) -> None:
-        cleanup(
-            look=1.0,
-            sighted=lambda action: host.send(signal.SIGSTOP) if action == name else None,
-            missing=lambda actions, in_vain: told.append((actions, in_vain)),
-            wanted=wanted,
-        )
+    def look(wanted: list[str] | None) -> Swept:
+        swept = cleanup(look=1.0, waits=told.append, wanted=wanted)
         host.send(signal.SIGCONT)
+        return swept
 
-    look(wanted=[])
-    assert told == [], "who wants no action is in no server's way"
-    look(wanted=None)
-    assert [(name in actions, in_vain) for actions, in_vain in told] == [
-        (True, False),
-        (True, True),
-    ]
+    assert look(wanted=[]).missing == told == [], "who wants no action is in no server's way"
+    assert name in look(wanted=None).missing
+    assert [name in actions for actions in told] == [True]
 
 
 def test_cleanup_sees_no_server_where_there_is_a_client_only(
     name: str, node: Any, domain: int
 ) -> None:
-    sighted: list[str] = []
     leaf = MoveRobot("client", 1.0, action_name=name)
     leaf.setup(node=node)
-    assert cleanup(look=1.0, sighted=sighted.append).left == []
-    assert name not in sighted
+    swept = cleanup(look=1.0)
+    assert swept.left == []
+    assert name not in [*swept.known, *swept.unknown]
     leaf.shutdown()

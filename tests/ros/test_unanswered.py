@@ -12,12 +12,9 @@ import pytest
 from bt_actions.goals.ids import Author
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
-from bt_actions.recovery import unanswered as module_of_unanswered
 from bt_actions.recovery.ledger import Sent
 from bt_actions.recovery.left_behind import LeftBehind
-from bt_actions.recovery.roll_call import RollCall
 from bt_actions.recovery.sweep import Swept, cleanup
-from bt_actions.recovery.unanswered import Unanswered
 from bt_actions.ros.onlooker import CannotStart
 from tests.support.processes import Journal, Process
 
@@ -82,22 +79,14 @@ def leave(start_program: Callable[..., Process], name: str, domain: int) -> Leav
     return leave_behind
 
 
-def sweep(**more: Any) -> tuple[Swept, list[str], list[str]]:
-    """Clean up; return what came of it, what was found, and what is missing in the end."""
+def sweep(**more: Any) -> tuple[Swept, list[str]]:
+    """Clean up; return what came of it, and what was found."""
     found: list[str] = []
-    missing: list[str] = []
 
     def note(left: LeftBehind) -> None:
         found.append(f"{'awaited' if left.awaited else 'shown'} {left.goal_id.hex()}")
 
-    swept = cleanup(
-        look=1.0,
-        patience=5.0,
-        found=note,
-        missing=lambda names, in_vain: missing.extend(names if in_vain else ()),
-        **more,
-    )
-    return swept, found, missing
+    return cleanup(look=1.0, patience=5.0, found=note, **more), found
 
 
 def test_what_is_on_record_and_in_a_status_is_one_goal(
@@ -105,7 +94,7 @@ def test_what_is_on_record_and_in_a_status_is_one_goal(
 ) -> None:
     journal = serve()
     goal = leave(90.0, journal=journal)
-    swept, found, _ = sweep()
+    swept, found = sweep()
     assert [(left.goal_id.hex(), left.end) for left in swept.left] == [(goal, End.CANCELED)]
     assert found == [f"awaited {goal}", f"shown {goal}"]
     assert list(records.iterdir()) == []
@@ -130,7 +119,7 @@ def test_how_long_one_has_to_be_denied(
     leave(0.0)
     [path] = records.iterdir()
     path.write_text(path.read_text().replace('"accept": 0.0', f'"accept": {on_record}').rstrip())
-    swept, _, _ = sweep(accept=given)
+    swept, _ = sweep(accept=given)
     assert [left.nothing_left for left in swept.left] == [f"denied for {takes:g} s"]
     assert list(records.iterdir()) == []
 
@@ -166,53 +155,34 @@ def test_records_that_cannot_be_read_are_told(
     serve()
     leave(0.0)
     records.chmod(0o777)
-    swept, found, _ = sweep()
+    swept, found = sweep()
     assert found == []
     assert isinstance(swept.trouble, PermissionError)
 
 
-def record(*servers: bytes) -> Sent:
-    """What is on record of a goal that was sent to these."""
-    author = Author(here=True, pid=2**22 + 1, started=b"ab")
-    return Sent(b"goal", "/move", 0, frozenset(servers), 0.0, False, author, Path("x"))
-
-
-@pytest.fixture
-def unanswered(monkeypatch: pytest.MonkeyPatch) -> tuple[Unanswered, list[Sent]]:
-    """One that has read nothing yet, and what is struck off."""
-    struck: list[Sent] = []
-    monkeypatch.setattr(module_of_unanswered, "strike_left", struck.extend)
-    monkeypatch.setattr(module_of_unanswered, "mark_lost", list)
-    return Unanswered(), struck
-
-
-def test_one_whose_server_comes_in_sight_after_all_is_awaited_again(
-    unanswered: tuple[Unanswered, list[Sent]],
-) -> None:
-    told, _ = unanswered
-    told._sent[b"goal"] = record(b"own")
+def test_one_whose_server_comes_in_sight_after_all_is_awaited_again() -> None:
     left = LeftBehind("/move", b"goal", 1, awaited=True)
-    call = RollCall(0.0)
-    call._settled = frozenset({b"other"})
-    call.sees(frozenset({b"other"}), 0.0)
-    calls = {"/move": call}
-    assert list(told.judge({b"goal": left}, calls)) == []
+    left.judge(known=False, gone=True)
+    assert left.awaited, "it may come in sight yet"
+    left.judge(known=True, gone=True)
     assert (left.is_over, left.nothing_left) == (True, "its server is gone")
-    call.sees(frozenset({b"other", b"own"}), 1.0)
-    assert list(told.judge({b"goal": left}, calls)) == [left]
+    left.judge(known=False, gone=False)
     assert (left.awaited, left.is_over) == (True, False)
 
 
 @pytest.mark.parametrize("servers", [[b"a"], [b"a", b"b"]])
 def test_what_one_of_two_servers_shows_stays_on_record(
-    servers: list[bytes], unanswered: tuple[Unanswered, list[Sent]]
+    servers: list[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told, struck = unanswered
-    told._sent[b"goal"] = sent = record(*servers)
+    struck: list[Sent] = []
+    monkeypatch.setattr(module, "strike_left", struck.extend)
+    author = Author(here=True, pid=2**22 + 1, started=b"ab")
+    sent = Sent(b"goal", "/move", 0, frozenset(servers), 0.0, False, author, Path("x"))
     left = LeftBehind("/move", b"goal", 1, shown=End.CANCELED)
-    calls = {"/move": RollCall(0.0)}
-    told.strike({b"goal": left}, calls, was_looked_for=True)
+    over = module._Sweep(1.0, 1.0, 1.0, lambda _: None, lambda _: None, lambda: True)
+    over._sent[b"goal"], over._left[b"goal"] = sent, left
+    over._keep_record()
     assert struck == ([sent] if len(servers) == 1 else [])
     left.is_nowhere("denied for 30 s")
-    told.strike({b"goal": left}, calls, was_looked_for=True)
+    over._keep_record()
     assert struck[-1:] == [sent]

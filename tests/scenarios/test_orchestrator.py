@@ -682,10 +682,17 @@ def test_cleanup_that_was_stopped_looks_again(
 
 @pytest.mark.chaos
 def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
-    launch: Launch, new_host: HostFactory, tree: Tree, name: str, domain: int, record: Record
+    launch: Launch,
+    new_host: HostFactory,
+    tree: Tree,
+    name: str,
+    domain: int,
+    record: Record,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """SIGKILL to the orchestrator; SIGSTOP to the server when cleanup sees it; SIGCONT after 8 s"""
     from bt_actions.recovery.sweep import cleanup
+    from bt_actions.ros import onlooker
 
     host = new_host(short_lease=False)
     journal = host.open(name)
@@ -694,13 +701,17 @@ def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
     run.send(signal.SIGKILL)
     run.wait()
     goes_on = threading.Timer(8.0, lambda: host.send(signal.SIGCONT))
+    real = onlooker.servers
 
-    def sighted(action: str) -> None:
-        if action == name:
+    def seen(node: Any, action: str) -> frozenset[bytes]:
+        shown = real(node, action)
+        if action == name and shown and goes_on.ident is None:
             host.send(signal.SIGSTOP)
             goes_on.start()
+        return shown
 
-    left = cleanup(look=3.0, sighted=sighted).left
+    monkeypatch.setattr(onlooker, "servers", seen)
+    left = cleanup(look=3.0).left
     goes_on.join()
     assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
     assert journal.ends() == ["canceled"]
@@ -709,7 +720,7 @@ def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
 
 @pytest.mark.chaos
 def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
-    launch: Launch, serve: Serve, tree: Tree, name: str, domain: int, record: Record
+    launch: Launch, serve: Serve, tree: Tree, name: str, domain: int, node: Any, record: Record
 ) -> None:
     """SIGKILL to the orchestrator while cleanup looks, and has seen its goal"""
     from bt_actions.recovery.left_behind import LeftBehind
@@ -719,17 +730,10 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     run = launch("run", str(tree(name, distance=9.0)))
     run.line("executing on")
     goal = journal.wait_for("accepted").goal
-    sighted, left = threading.Event(), list[LeftBehind]()
-    sweeps = threading.Thread(
-        target=lambda: left.extend(
-            cleanup(
-                look=8.0,
-                sighted=lambda action: sighted.set() if action == name else None,
-            ).left
-        )
-    )
+    left = list[LeftBehind]()
+    sweeps = threading.Thread(target=lambda: left.extend(cleanup(look=8.0).left))
     sweeps.start()
-    assert sighted.wait(6.0)
+    until(lambda: "bt_actions_cleanup" in node.get_node_names(), within=6.0)
     asked = ("cancel_requested", goal)  # nobody's goals, which show that a server lives, are too
     assert holds_for(
         lambda: asked not in [(str(e.event), e.goal) for e in journal.entries()], 3.0

@@ -36,23 +36,24 @@ def sweep(
     sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread only.
     """
     with _Stop() as stop:
-        swept, foreign, unseen = _sweep(stop, look, patience, accept, wanted, namespace)
+        swept = _sweep(stop, look, patience, accept, wanted, namespace)
         stop.is_told = stop.signal is not None
-        if foreign:
+        if swept.elsewhere:
+            goals = (f"{goal_id.hex()} on {action}" for goal_id, action in swept.elsewhere.items())
             note(
-                f"not touched: {', '.join(foreign)}: of bt_actions on another machine, or in "
+                f"not touched: {', '.join(goals)}: of bt_actions on another machine, or in "
                 "another container, where it cannot be seen whether it is alive (see "
                 "BT_ACTIONS_MACHINE)"
             )
         hint = "; start it" if wanted else ""
         hint += f", or {first}" if wanted and first else ""
-        code = _tell_what_is_open(swept, unseen, stop.signal, hint, any_will_do=wanted is not None)
+        code = _tell_what_is_open(swept, stop.signal, hint, any_will_do=wanted is not None)
         tell = functools.partial(note, end="") if first else write  # whose results are to follow
         try:
             for goal in swept.left:
                 tell(_line(goal))
             if code is Exit.SUCCESS and not swept.left:
-                tell(_nothing(swept, "nothing of this machine" if foreign else "nothing"))
+                tell(_nothing(swept))
         except (OutputLost, BrokenPipeError):
             if code is not Exit.UNKNOWN:
                 raise
@@ -69,15 +70,13 @@ def _sweep(
     accept: float,
     wanted: Collection[str] | None,
     namespace: str,
-) -> tuple[Swept, list[str], list[str]]:
-    """Look, and cancel; return what was seen, goals of others, and actions that are missing."""
+) -> Swept:
+    """Look, and cancel; return what was seen."""
     with importing_ros():
         from bt_actions.recovery.sweep import cleanup
         from bt_actions.ros.onlooker import CannotStart
 
     refuse_domain()
-    foreign: list[str] = []
-    unseen: list[str] = []
 
     def found(left: LeftBehind) -> None:
         stop.leaves_a_goal = True
@@ -93,31 +92,26 @@ def _sweep(
                 f"{left.goal_id.hex()}"
             )
 
-    def missing(names: list[str], in_vain: bool) -> None:
-        if in_vain:
-            unseen.extend(names)
-        else:
-            note(f"waiting for {listing(names)}, where something may have been left")
+    def waits(names: list[str]) -> None:
+        note(f"waiting for {listing(names)}, where something may have been left")
 
     try:
-        swept = cleanup(
+        return cleanup(
             look=look,
             patience=patience,
             accept=accept,
             found=found,
-            elsewhere=lambda action, goal_id: foreign.append(f"{goal_id.hex()} on {action}"),
             wanted=wanted,
             namespace=namespace,
-            missing=missing,
+            waits=waits,
             stopped=lambda: stop.signal is not None,
         )
     except CannotStart as error:
         raise BadInput(f"ROS 2 cannot start: {error}") from error
-    return swept, foreign, unseen
 
 
 def _tell_what_is_open(
-    swept: Swept, unseen: list[str], stopped_by: signal.Signals | None, hint: str, any_will_do: bool
+    swept: Swept, stopped_by: signal.Signals | None, hint: str, any_will_do: bool
 ) -> Exit:
     """Say what is not known, which may be something to wait for; return the exit code."""
     code = Exit.SUCCESS
@@ -131,12 +125,13 @@ def _tell_what_is_open(
         )
         code = Exit.UNKNOWN
     else:
-        for held_against, names in ((True, unseen), (False, set(swept.unknown).difference(unseen))):
+        others = set(swept.unknown).difference(swept.missing)
+        for held_against, names in ((True, swept.missing), (False, others)):
             for trouble in sorted({swept.unknown[name] for name in names}):
                 who = [name for name in sorted(names) if swept.unknown[name] == trouble]
                 nobody = f"{trouble.format(listing(who))}: nobody can see what was left there"
                 note(nobody + (hint if held_against else ""))
-        code = Exit.UNKNOWN if unseen else code
+        code = Exit.UNKNOWN if swept.missing else code
     if swept.trouble is not None:
         note(f"nobody can see what was sent and not answered: {swept.trouble}")
         code = code or Exit.UNKNOWN
@@ -153,7 +148,8 @@ def _line(goal: LeftBehind) -> str:
     return f"{goal.action}  {goal.goal_id.hex()}  {end}\n"
 
 
-def _nothing(swept: Swept, nothing: str) -> str:
+def _nothing(swept: Swept) -> str:
+    nothing = "nothing of this machine" if swept.elsewhere else "nothing"
     seen = len(swept.known)
     where = "1 action" if seen == 1 else f"{seen} actions"
     if swept.unknown:
