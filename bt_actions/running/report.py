@@ -7,8 +7,7 @@ behaviour's state that an event has not told (the tree ticks on another thread m
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from uuid import UUID
 
@@ -25,8 +24,6 @@ from bt_actions.utilities.places import path_of
 DONE = "DONE"
 UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
 """States of a goal before its request goes out."""
-REMEMBERED = 64
-"""Goals of a leaf that are known again when their last news come late."""
 
 
 @dataclass(slots=True)
@@ -34,7 +31,6 @@ class Row:
     """All that one action leaf did in this run, over all its visits."""
 
     behaviour: Behaviour
-    name: str
     path: tuple[str, ...]
     place: str
     """file:line:column, or ""."""
@@ -56,18 +52,21 @@ class Row:
     duration: float = 0.0
     """Seconds from the first wish to the last outcome of each visit, summed up."""
     _goals: dict[str, GoalChanged] = field(default_factory=dict)  # of which more may come: latest
-    _recent: deque[str] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
+    _latest: str = ""
 
     @property
-    def live(self) -> bool:
-        """Whether a goal of this leaf may be running, be it one that the leaf has left."""
-        return bool(self.live_goals)
+    def name(self) -> str:
+        """Of the leaf."""
+        return self.behaviour.name
 
     @property
-    def live_goals(self) -> dict[str, str]:
-        """The goals that may be running, by their ids: their states."""
-        latest = self._goals.values()
-        return {e.goal_id: e.state for e in latest if _is_open(e) and e.state not in UNSENT}
+    def live(self) -> dict[str, str]:
+        """The goals that may be running, also those that the leaf has left: their states by id."""
+        return {
+            event.goal_id: event.state
+            for event in self._goals.values()
+            if event.state not in UNSENT and event.end in (None, End.UNKNOWN)
+        }
 
     @property
     def left_at_server(self) -> bool:
@@ -77,25 +76,28 @@ class Row:
     @property
     def in_doubt(self) -> bool:
         """Whether the latest goal has not begun as far as its server knows, which may change."""
-        return bool(self._recent) and _is_doubtful(self._goals.get(self._recent[-1]))
+        return self.end is End.NEVER_STARTED and self._latest in self._goals
 
     @property
     def waited_for(self) -> int:
         """How many goals of this leaf a run that is over waits for."""
-        return len(self.live_goals) + sum(map(_is_doubtful, self._goals.values()))
+        in_doubt = [each for each in self._goals.values() if each.end is End.NEVER_STARTED]
+        return len(self.live) + len(in_doubt)
 
     def observe(self, event: GoalChanged) -> None:
         """Take in one event of a goal of this leaf."""
-        if _is_open(event) or _is_doubtful(event) or event.end is End.SERVER_GONE:
+        is_latest = event.goal_id == self._latest
+        is_new = not is_latest and event.goal_id not in self._goals
+        if event.state != DONE or event.end is End.SERVER_GONE:
             self._goals[event.goal_id] = event
         else:
             self._goals.pop(event.goal_id, None)
-        if event.goal_id not in self._recent:
+        if is_new:
             self._begin(event)
-        elif event.goal_id != self._recent[-1]:
+        elif not is_latest:
             return  # an older goal, on its way to its end
-        elif event.outcome is not None and self.outcome is None:
-            self._count(event)
+        if event.outcome is not None and self.outcome is None:
+            self.duration = self.lasts(event.time)
         self.state, self.outcome, self.end = event.state, event.outcome, event.end
         self.reason = event.reason
 
@@ -110,34 +112,20 @@ class Row:
     def leave(self, now: float) -> None:
         """Its goals are waited for no longer: how they end is not known."""
         if self.outcome is None:
-            self.outcome = Outcome.CANCELED
-            self.duration = self.counted + max(0.0, now - self.begun)
+            self.outcome, self.duration = Outcome.CANCELED, self.lasts(now)
         self.end = End.UNKNOWN
 
+    def lasts(self, now: float) -> float:
+        """Return the seconds of all visits, where the latest is not over."""
+        return self.counted + max(0.0, now - self.begun)
+
     def _begin(self, event: GoalChanged) -> None:
-        self._recent.append(event.goal_id)
+        self._latest, self.outcome = event.goal_id, None
         self.attempts += 1
         self.attempt = event.attempt
         if event.attempt <= 1:
             self.visits += 1
             self.begun, self.counted = event.time, self.duration
-        if event.outcome is not None:
-            self._count(event)
-
-    def _count(self, event: GoalChanged) -> None:
-        self.duration = self.counted + max(0.0, event.time - self.begun)
-
-
-def _is_open(event: GoalChanged) -> bool:
-    """Whether its goal has no known end, be it that it was not sent yet."""
-    return event.state != DONE and (event.outcome is None or event.end in (None, End.UNKNOWN))
-
-
-def _is_doubtful(event: GoalChanged | None) -> bool:
-    """Whether its goal has not begun as far as its server knows, which may change."""
-    if event is None or event.state == DONE or event.outcome is None:
-        return False
-    return event.end is End.NEVER_STARTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,10 +152,9 @@ class Report:
     """The time of the latest event."""
     unaccounted: list[str] = field(default_factory=list)
     """One line for each goal whose end is not known, now that the run is over."""
-    _clock: Callable[[], float] = time.monotonic
     _begun: float | None = None
     _rows: dict[UUID, Row] = field(default_factory=dict)
-    _statuses: dict[UUID, tuple[Status, str]] = field(default_factory=dict)
+    _changes: dict[UUID, NodeChanged] = field(default_factory=dict)  # of each node the latest
     _warnings: dict[UUID, Culprit] = field(default_factory=dict)
 
     def observe(self, event: Event) -> None:
@@ -176,14 +163,12 @@ class Report:
         self.started = self.started or event.time  # a tree that cannot be set up never starts
         if isinstance(event, TreeStarted):
             self.started = event.time
-            self._begun = self._clock()
+            self._begun = time.monotonic()
         elif isinstance(event, NodeChanged):
-            self._statuses[event.node.id] = (event.status, event.message)
+            self._changes[event.node.id] = event
             warning = str(getattr(event.node, "warning", ""))
             if warning and event.status is Status.SUCCESS:
-                node = event.node
-                warned = Culprit(node, event.path, warning, place_of(node), None)
-                self._warnings[node.id] = warned
+                self._warnings[event.node.id] = self._culprit(event.node, warning)
             row = self._rows.get(event.node.id)
             if row is not None and event.status in (Status.SUCCESS, Status.FAILURE):
                 row.settle()
@@ -197,19 +182,14 @@ class Report:
         """Return the row of an action leaf, a new one at its first event."""
         row = self._rows.get(behaviour.id)
         if row is None:
-            row = Row(
-                behaviour,
-                behaviour.name,
-                path_of(behaviour),
-                place_of(behaviour),
-                str(getattr(behaviour, "server", "")),
-            )
+            server = str(getattr(behaviour, "server", ""))
+            row = Row(behaviour, path_of(behaviour), place_of(behaviour), server)
             self._rows[behaviour.id] = row
         return row
 
     def elapsed(self) -> float:
         """Return the seconds since the tree started, between events too."""
-        return 0.0 if self._begun is None else self._clock() - self._begun
+        return 0.0 if self._begun is None else time.monotonic() - self._begun
 
     @property
     def rows(self) -> list[Row]:
@@ -233,17 +213,17 @@ class Report:
 
     def seconds(self, row: Row) -> float:
         """Return how long `row` took so far, a visit that is not over included."""
-        if row.outcome is not None or not row.visits:
-            return row.duration
-        return row.counted + max(0.0, self.now - row.begun)
+        return row.lasts(self.now) if row.outcome is None else row.duration
 
     def status_of(self, node: Behaviour) -> Status:
         """Return the status that `node` was last seen with."""
-        return self._statuses.get(node.id, (Status.INVALID, ""))[0]
+        change = self._changes.get(node.id)
+        return change.status if change else Status.INVALID
 
     def message_of(self, node: Behaviour) -> str:
         """Return the feedback message that `node` last changed with."""
-        return self._statuses.get(node.id, (Status.INVALID, ""))[1]
+        change = self._changes.get(node.id)
+        return change.message if change else ""
 
     @property
     def warnings(self) -> list[Culprit]:
@@ -254,42 +234,37 @@ class Report:
         """Return the leaves by whose failure the root has failed, in tree order."""
         if self.status is not Status.FAILURE:
             return []
-        return [
-            Culprit(leaf, path_of(leaf), self._why(leaf), place_of(leaf), self._rows.get(leaf.id))
-            for leaf in self._failed_leaves()
-        ]
+        return [self._culprit(leaf, self._why(leaf)) for leaf in self._failed_leaves()]
+
+    def _culprit(self, node: Behaviour, message: str) -> Culprit:
+        return Culprit(node, path_of(node), message, place_of(node), self._rows.get(node.id))
+
+    def _as_it_ended(self, node: Behaviour) -> bool:
+        """Whether it was not stopped since it ended."""
+        return node.status is self.status_of(node)
 
     def _why(self, node: Behaviour) -> str:
         """Return what a node says of its failure, which may not be its first of that status."""
-        as_it_ended = node.status is self.status_of(node)
-        return node.feedback_message if as_it_ended else self.message_of(node)
-
-    def _stands(self, child: Behaviour) -> Status:
-        """Return the status of a child when its parent failed.
-
-        What was reset since an earlier visit was not told of. But a parent that was stopped when it
-        had failed has no status in its children any more, and a Selector resets those that failed.
-        """
-        parent = child.parent
-        if parent is None:
-            return self.status
-        as_it_ended = parent.status is self.status_of(parent)
-        if as_it_ended and not isinstance(parent, Selector):
-            return child.status
-        return self.status_of(child)
+        return node.feedback_message if self._as_it_ended(node) else self.message_of(node)
 
     def _failed_leaves(self) -> Iterator[Behaviour]:
         """Go down from the root along what failed.
 
-        What failed though nothing below it did speaks for itself, as a leaf does.
+        What failed though nothing below it did speaks for itself, as a leaf does. What was reset
+        since an earlier visit was not told of, so a child's own status counts; but a parent that
+        was stopped when it had failed has none in its children any more, and a Selector resets
+        those that failed.
         """
         waiting = [self.root]
         while waiting:
             node = waiting.pop()
-            below = [child for child in node.children if self._stands(child) is Status.FAILURE]
-            if isinstance(node, Gate) and node.refused:
-                below = []  # whose statuses may be those of an earlier time
-            if below:
+            own = self._as_it_ended(node) and not isinstance(node, Selector)
+            below = [
+                child
+                for child in node.children
+                if (child.status if own else self.status_of(child)) is Status.FAILURE
+            ]
+            if below and not (isinstance(node, Gate) and node.refused):  # else of an earlier time
                 waiting.extend(reversed(below))
             else:
                 yield node

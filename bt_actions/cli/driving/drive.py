@@ -293,7 +293,7 @@ class Drive:
             lines += [
                 f"{row.name} on {row.server}, goal {goal_id}, {state.lower()} when left"
                 for row in self._report.live
-                for goal_id, state in row.live_goals.items()
+                for goal_id, state in row.live.items()
                 if goal_id not in goals
             ]
             for row in self._report.live:
