@@ -6,23 +6,15 @@ what it knows and finds wrong.
 
 from __future__ import annotations
 
-import importlib
+import contextlib
 import math
 import re
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 
 from bt_actions.messages.fields import constants
-from bt_actions.messages.interfaces import (
-    PARTS,
-    Kind,
-    UnknownInterface,
-    installed,
-    interface,
-    short_name,
-)
+from bt_actions.messages.interfaces import PARTS, UnknownInterface, called, interface, short_name
 from bt_actions.utilities.suggest import did_you_mean
-from bt_actions.utilities.units import parse_angle, parse_duration
+from bt_actions.utilities.units import parse_duration
 
 _BILLION = 1_000_000_000
 _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
@@ -59,14 +51,17 @@ def _seconds(value: object) -> object:
     return {"sec": nanoseconds // _BILLION, "nanosec": nanoseconds % _BILLION}
 
 
-def quaternion_of(value: object) -> object:
-    """``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields."""
+def quaternion_of(value: object, angle: Callable[[str, object], float]) -> object:
+    """``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields.
+
+    `angle` gives the radians of what is written for one of them.
+    """
     if not isinstance(value, Mapping) or not any(name in value for name in ANGLES):
         return value
     for name in value:
         if name not in ANGLES:
             raise ValueError(f"roll, pitch and yaw stand alone: {name!r} cannot be beside them")
-    roll, pitch, yaw = (parse_angle(value.get(name, 0.0)) / 2 for name in ANGLES)
+    roll, pitch, yaw = (angle(name, value[name]) / 2 if name in value else 0.0 for name in ANGLES)
     sin_r, cos_r, sin_p, cos_p = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     sin_y, cos_y = math.sin(yaw), math.cos(yaw)
     return {
@@ -99,54 +94,25 @@ def constant(text: str, owner: type | None) -> object:
 
 
 def _class(path: str, owner: type | None) -> type:
-    """The class a path such as ``MoveRobot.Feedback`` names, from the module of `owner`."""
-    package, _, rest = path.rpartition("/")
+    """The class a path such as ``MoveRobot.Feedback`` names, in the package of `owner` or any."""
+    place, slash, rest = path.rpartition("/")
     names = rest.split(".")
-    if owner is not None and names[-1] in PARTS and len(names) == 1 and not package:
-        names = [owner.__name__.rpartition("_")[0], *names]
-    found: object = None
-    if package:
-        name, _, kind = package.partition("/")
-        found = _interface(f"{name}/{kind or 'msg'}/{names[0]}")
-    elif owner is not None:
-        found = _beside(names[0], owner)
+    if owner is not None and path in PARTS:
+        names = [owner.__name__.rpartition("_")[0], path]
     kind = PARTS.get(names[-1], "msg" if len(names) == 1 else "action")
-    if found is None and not package:
-        found = _anywhere(names[0], kind)
-    near = ""
-    if found is None:
-        near = did_you_mean(names[0], {full.rpartition("/")[2] for full in installed(kind)})
-    for name in names[1:]:
-        if isinstance(found, type) and not (name in PARTS and hasattr(found, name)):
-            near = did_you_mean(name, [part for part in PARTS if hasattr(found, part)])
-        found = getattr(found, name, None) if name in PARTS else None
-    if not isinstance(found, type):
-        raise UnknownClass(f"no message class {path!r} is known here{near}")
-    return found
-
-
-def _beside(name: str, owner: type) -> object:
-    """An interface of the module of `owner`, or a message of its package."""
-    module = importlib.import_module(".".join(owner.__module__.split(".")[:2]))
-    if not hasattr(module, name) and ".msg" not in owner.__module__:
-        module = importlib.import_module(f"{owner.__module__.split('.')[0]}.msg")
-    return getattr(module, name, None)
-
-
-@lru_cache(maxsize=256)
-def _anywhere(name: str, kind: Kind) -> type | None:
-    """The interface of a name, where one installed package has it."""
-    found = [full for full in installed(kind) if full.rpartition("/")[2] == name]
-    if len(found) > 1:
-        raise ValueError(f"{name!r} may be {' or '.join(found)}: put the package before it")
-    return interface(found[0], kind) if found else None
-
-
-def _interface(name: str) -> type:
-    kind = name.split("/")[1]
-    if kind not in ("action", "srv", "msg"):
-        raise ValueError(f"{name!r} is no type name: it is written package/msg/Name")
+    found: type | None = None
+    if owner is not None and not slash:
+        with contextlib.suppress(UnknownInterface):
+            found = interface(f"{owner.__module__.split('.')[0]}/{names[0]}", kind)
     try:
-        return interface(name, kind)
+        found = found or called(f"{place}{slash}{names[0]}", kind)
     except UnknownInterface as error:
-        raise ValueError(str(error)) from None
+        raise UnknownClass(str(error)) from None
+    for name in names[1:]:
+        parts = [part for part in PARTS if hasattr(found, part)]
+        if name not in parts:
+            near = did_you_mean(name, parts)
+            raise UnknownClass(f"no message class {path!r} is known here{near}")
+        found = getattr(found, name)
+    assert found is not None
+    return found

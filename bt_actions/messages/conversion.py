@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from bt_actions.messages.conveniences import ANGLES, constant, duration_of, quaternion_of, time_of
+from bt_actions.messages.conveniences import constant, duration_of, quaternion_of, time_of
 from bt_actions.messages.fields import (
     FLOATS,
     INTEGERS,
@@ -29,16 +29,12 @@ from bt_actions.messages.interfaces import interface_name, short_name
 from bt_actions.utilities.plain_data import numbers_only, plain, scalar
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.units import parse_angle
 
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")
-_CODES = MappingProxyType(
-    {
-        "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
-        "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
-    }
-)  # fmt: skip
+_CODES = MappingProxyType(dict(zip([*INTEGERS, *FLOATS], "bhiqBHIQBfd", strict=True)))
 """How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code."""
 _NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")
 
@@ -59,13 +55,11 @@ class Problem:
 
 
 class MessageError(ValueError):
-    """The data does not fit the message's type; `path` and `text` are the first problem's."""
+    """The data does not fit the message's type."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         super().__init__("; ".join(str(problem) for problem in problems[:10]))
         self.problems = tuple(problems)
-        self.path = dotted(problems[0].path)
-        self.text = problems[0].text
 
 
 def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.time_ns) -> M:
@@ -78,12 +72,12 @@ def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.t
     return _filled(Message(message_type), data, now)  # type: ignore[no-any-return]
 
 
-def fill_value(kind: FieldType, data: object, *, now: Callable[[], int] = time.time_ns) -> object:
+def fill_value(kind: FieldType, data: object) -> object:
     """A value of type `kind` as a tree has it: a byte is a number, an array stays what it is.
 
     Raises MessageError.
     """
-    value = _filled(kind, data, now)
+    value = _filled(kind, data, time.time_ns)
     return value if isinstance(value, array.array) else plain(value)
 
 
@@ -162,8 +156,6 @@ class _Filler:
         except ValueError as error:
             self._bad(path, str(error))
             return None
-        if isinstance(value, cls):
-            return value
         if not isinstance(value, Mapping):
             self._bad(path, f"the fields of a {short_name(cls)} are needed, not {show(value)}")
             return None
@@ -190,20 +182,14 @@ class _Filler:
         if name == "builtin_interfaces/msg/Duration":
             return duration_of(value)
         if name == "geometry_msgs/msg/Quaternion":
-            return quaternion_of(self._without_holes(value, path))
+            return quaternion_of(value, lambda name, angle: self._angle(angle, (*path, name)))
         return value
 
-    def _without_holes(self, value: object, path: Path) -> object:
-        """Angles of which some are settled elsewhere: numbers, in radians."""
-        if self._hole is None or not isinstance(value, Mapping):
-            return value
-        if not any(name in value for name in ANGLES):
-            return value
-        radians = Scalar("float64")
-        return {
-            name: 0.0 if self._hole(angle, radians, (*path, str(name))) else angle
-            for name, angle in value.items()
-        }
+    def _angle(self, value: object, path: Path) -> float:
+        """In radians; one that is settled elsewhere is a number."""
+        if self._hole is not None and self._hole(value, Scalar("float64"), path):
+            return 0.0
+        return parse_angle(value)
 
     def _listing(self, kind: Listing, value: object, path: Path) -> Any:
         code = _CODES.get(str(kind.item))
@@ -284,23 +270,21 @@ def _number_in(value: object) -> str:
     return ": write the number alone, in the unit that is expected"
 
 
-def _wrong_number(name: str, value: object) -> str | None:
-    what, fits = ("a number", (int, float)) if name in FLOATS else ("a whole number", (int,))
-    if isinstance(value, bool) or not isinstance(value, fits):
+def _wrong_number(name: str, value: Any) -> str | None:
+    whole = name in INTEGERS
+    if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
+        what = "a whole number" if whole else "a number"
         return f"{what} ({name}) is needed, not {show(value)}{_number_in(value)}"
-    if name in INTEGERS:
+    if whole:
         least, greatest = INTEGERS[name]
         if least <= value <= greatest:
             return None
         a = "an" if name.startswith("i") else "a"
         return f"{show(value)} does not fit {a} {name}: {least} to {greatest}"
-    try:
-        number = float(value)
-    except OverflowError:
-        return f"{show(value)} does not fit a {name}"
-    if math.isfinite(number) and abs(number) > FLOATS[name]:
-        return f"{show(value)} does not fit a {name}"
-    return None
+    with contextlib.suppress(OverflowError):
+        if not FLOATS[name] < abs(float(value)) < math.inf:
+            return None
+    return f"{show(value)} does not fit a {name}"
 
 
 def _no_field(cls: type, name: str, known: Mapping[str, FieldType]) -> str:

@@ -15,18 +15,11 @@ from typing import Any
 from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.plain_data import scalar
 
+_BITS = (8, 16, 32, 64)
 INTEGERS = MappingProxyType(
-    {
-        "int8": (-(2**7), 2**7 - 1),
-        "uint8": (0, 2**8 - 1),
-        "int16": (-(2**15), 2**15 - 1),
-        "uint16": (0, 2**16 - 1),
-        "int32": (-(2**31), 2**31 - 1),
-        "uint32": (0, 2**32 - 1),
-        "int64": (-(2**63), 2**63 - 1),
-        "uint64": (0, 2**64 - 1),
-        "byte": (0, 255),
-    }
+    {f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in _BITS}
+    | {f"uint{bits}": (0, 2**bits - 1) for bits in _BITS}
+    | {"byte": (0, 255)}
 )
 """The least and the greatest value of each integer type."""
 FLOATS = MappingProxyType({"float32": 3.402823466e38, "float64": float("inf")})
@@ -116,11 +109,6 @@ def constants(cls: type) -> Mapping[str, object]:
             if name.isupper() and not name.startswith("_") and not name.endswith("__DEFAULT")
         }
     )
-
-
-def is_message_class(value: object) -> bool:
-    """Whether `value` is a class that rosidl generated."""
-    return isinstance(value, type) and hasattr(value, "get_fields_and_field_types")
 
 
 def _type(slot: Any) -> FieldType:

@@ -28,10 +28,6 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 class UnknownInterface(LookupError):
     """No such interface is installed; the text says which package is missing or what it has."""
 
-    def __init__(self, name: str, message: str) -> None:
-        super().__init__(message)
-        self.name = name
-
 
 @lru_cache(maxsize=1024)
 def interface(name: str | type, kind: Kind) -> type:
@@ -48,32 +44,34 @@ def interface(name: str | type, kind: Kind) -> type:
     folders = (Path(entry or ".") / package / kind for entry in sys.path)
     known = next(filter(None, map(_listed, folders)), None)
     if known is None:
-        raise UnknownInterface(name, _missing_package(package, kind))
+        raise UnknownInterface(_missing_package(package, kind))
     found = getattr(importlib.import_module(f"{package}.{kind}"), short, None)
     wanted = {"action": "Goal", "srv": "Request", "msg": "get_fields_and_field_types"}[kind]
     if isinstance(found, type) and hasattr(found, wanted):
         return found
     near = did_you_mean(short, known) or _listing(known)
-    raise UnknownInterface(name, f"package {package!r} has no {_WORDS[kind]} {short!r}{near}")
+    raise UnknownInterface(f"package {package!r} has no {_WORDS[kind]} {short!r}{near}")
 
 
-def find_action(short: str) -> type:
-    """The action meant by ``MoveRobot``, ``pkg/MoveRobot`` or the full name.
+@lru_cache(maxsize=256)
+def called(short: str, kind: Kind) -> type:
+    """What is meant by ``MoveRobot``, ``pkg/MoveRobot`` or the full name.
 
     Raises UnknownInterface when there is none, or more than one; it names the candidates.
     """
     if "/" in short:
-        return interface(short, "action")
-    names = installed("action")
+        return interface(short, kind)
+    names = installed(kind)
     found = [name for name in names if name.rpartition("/")[2] == short]
     if len(found) == 1:
-        return interface(found[0], "action")
+        return interface(found[0], kind)
+    word = _WORDS[kind]
     if found:
-        raise UnknownInterface(short, f"{short!r} is more than one action: {', '.join(found)}")
-    words = {name.rpartition("/")[2] for name in names}
-    raise UnknownInterface(
-        short, f"no installed package has an action {short!r}" + did_you_mean(short, words)
-    )
+        raise UnknownInterface(
+            f"{short!r} is more than one {word}, put the package before it: {', '.join(found)}"
+        )
+    near = did_you_mean(short, {name.rpartition("/")[2] for name in names})
+    raise UnknownInterface(f"no installed package has the {word} {short!r}{near}")
 
 
 def packages(kind: Kind) -> dict[str, Path]:
@@ -120,11 +118,11 @@ def short_name(cls: type) -> str:
 def _split(name: str, kind: Kind) -> tuple[str, str]:
     parts = name.split("/")
     if len(parts) == 3 and parts[1] in _WORDS and parts[1] != kind:
-        raise UnknownInterface(name, f"{name!r} names no {_WORDS[kind]}, but one of {parts[1]}/")
+        raise UnknownInterface(f"{name!r} names no {_WORDS[kind]}, but one of {parts[1]}/")
     if len(parts) == 3 and parts[1] == kind:
         parts = [parts[0], parts[2]]
     if len(parts) != 2 or not _PACKAGE.fullmatch(parts[0]) or not _NAME.fullmatch(parts[1]):
-        raise UnknownInterface(name, f"{name!r} is no type name: it is written package/{kind}/Name")
+        raise UnknownInterface(f"{name!r} is no type name: it is written package/{kind}/Name")
     return parts[0], parts[1]
 
 

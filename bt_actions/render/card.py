@@ -87,15 +87,13 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
 
 def describe(interface: type | str, kind: Kind) -> Iterator[Table]:
     """The messages of an interface with their fields and constants, or why they cannot be told."""
-    from bt_actions.messages import fields as ros_fields
     from bt_actions.messages import interfaces
 
     try:
         found = interfaces.interface(interface, kind) if isinstance(interface, str) else interface
         parts = [getattr(found, part, None) for part in _PARTS[kind]] if kind in _PARTS else [found]
         for part in parts:
-            if ros_fields.is_message_class(part):
-                assert isinstance(part, type)
+            if isinstance(part, type) and hasattr(part, "get_fields_and_field_types"):
                 lines = tuple(islice(_fields(part, 0), _MOST_LINES + 1))
                 if len(lines) > _MOST_LINES:
                     lines = (*lines[:_MOST_LINES], Line("…", ""))

@@ -60,7 +60,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "t", "--sim", "--fault", "nonsense"], "--fault"),
         (["render", "t", "-o", "t.pdf"], "t.pdf: cannot tell the format"),
         (["send", "a" * 121, "MoveRobot"], "it has more than 120 characters"),
-        (["send", "a", "NoSuchAction"], "no installed package has an action 'NoSuchAction'"),
+        (["send", "a", "NoSuchAction"], "no installed package has the action 'NoSuchAction'"),
         (["send", "a", "MoveRobot", "distnce=1"], "no field 'distnce'; did you mean 'distance'?"),
         (["send", "a", "MoveRobot", "distance=far"], "distance"),
         (["send", "a", "MoveRobot", "distance=1e400"], "1e400 does not fit a float64"),

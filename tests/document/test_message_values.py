@@ -56,7 +56,7 @@ def test_a_constant_may_be_named_where_any_number_is_needed(name: str) -> None:
     ("name", "text"),
     [
         ("MoveRobot.Feedback.STATUS_MOVIN", "; did you mean 'STATUS_MOVING'?"),
-        ("MoveRobt.Feedback.STATUS_MOVING", "no message class 'MoveRobt.Feedback' is known here"),
+        ("MoveRobt.Feedback.STATUS_MOVING", "no installed package has the action 'MoveRobt'"),
         ("STATUS_MOVING", "has no constant 'STATUS_MOVING'"),
     ],
 )

@@ -85,13 +85,13 @@ def _leaf(server: str, type_name: str, data: dict[str, object]) -> ActionBehavio
     """Check everything that can be checked without a server."""
     from bt_actions.document.language.ros_names import why_not
     from bt_actions.messages.conversion import MessageError, fill
-    from bt_actions.messages.interfaces import UnknownInterface, find_action
+    from bt_actions.messages.interfaces import UnknownInterface, called
 
     why = why_not(server)
     if why:
         raise BadInput(f"{server!r} cannot be the name of an action server: {why}")
     try:
-        action_type = find_action(type_name)
+        action_type = called(type_name, "action")
         goal = fill(action_type.Goal, data)  # type: ignore[attr-defined]  # made by rosidl
     except UnknownInterface as error:
         raise BadInput(str(error)) from error
