@@ -14,10 +14,8 @@ from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from rclpy.context import Context
 from rclpy.exceptions import NameValidationException
-from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.validate_full_topic_name import validate_full_topic_name
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.ros.graph import servers
@@ -64,10 +62,7 @@ class ActionView:
         """Take the statuses that have come in."""
         handle = self._status.handle
         with handle:
-            for _ in range(DEPTH):
-                taken = handle.take_message(GoalStatusArray, False)
-                if taken is None:
-                    return
+            while (taken := handle.take_message(GoalStatusArray, False)) is not None:
                 yield taken[0]
 
     def answers(self) -> Iterator[tuple[int, int]]:
@@ -77,10 +72,8 @@ class ActionView:
         """
         handle = self._client.handle
         with handle:
-            for _ in range(DEPTH):
-                header, response = handle.take_response(CancelGoal.Response)
-                if header is None:
-                    return
+            while (taken := handle.take_response(CancelGoal.Response))[0] is not None:
+                header, response = taken
                 yield header.request_id.sequence_number, response.return_code
 
     def cancel(self, goal_id: bytes) -> int | None:
@@ -106,14 +99,11 @@ class Onlooker:
         self.domain = int(node.context.get_domain_id())
 
     def full_name(self, name: str) -> str:
-        """Return the name as a run means it, remapped. Raises ValueError where it is none."""
-        node = self._node
-        full = str(expand_topic_name(name, node.get_name(), node.get_namespace()))
+        """Return the name as a run means it. Raises ValueError where it is none."""
         try:
-            validate_full_topic_name(full)
-        except NameValidationException as error:
+            return str(self._node.resolve_topic_name(name, only_expand=True))
+        except RuntimeError as error:  # rclpy's RCLError
             raise ValueError(str(error)) from error
-        return full
 
     def actions(self) -> list[str]:
         """Return the names of the actions that anybody serves, or is a client of."""
