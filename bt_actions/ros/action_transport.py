@@ -14,8 +14,8 @@ every answer to a question is told, with those before it.
 What is taken waits in one inbox and is delivered in its order by whoever comes first: the executor,
 or a call of `deliver_arrived`, after which nothing that had arrived before is still under way.
 
-It carries messages and decides nothing. Of rclpy's ActionClient it keeps construction, the wait
-set and destruction; it uses the low-level handle, whose methods are checked for at construction.
+It carries messages and decides nothing. It uses the low-level handle of rclpy's ActionClient, whose
+methods are checked for at construction; an executor waits for it through workarounds/one_waitable.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from action_msgs.srv import CancelGoal
-from rclpy.action import ActionClient as RclpyActionClient
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_action_status_default
+from rclpy.type_support import check_for_type_support
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.goals.terms import NEVER
@@ -63,6 +63,8 @@ _USED_OF_HANDLE = (
     "take_feedback",
     "take_status",
     "is_action_server_available",
+    "add_to_waitset",
+    "is_ready",
 )
 
 
@@ -76,11 +78,8 @@ class _Question:
     answers: list[Any] = field(default_factory=list)
 
 
-class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typed
+class RosTransport:
     """One action as one node sees it (transport.ActionTransport)."""
-
-    never_waits = True
-    """No code of a user's runs in it (workarounds/once_executor.py)."""
 
     def __init__(
         self,
@@ -91,12 +90,12 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         seen_since: float = NEVER,
         on_close: Callable[[RosTransport], None] = lambda _: None,
     ) -> None:
-        """Create the client in a callback group of its own.
+        """Create the client, which no executor knows of.
 
         Raises RuntimeError when this rclpy's low-level client lacks a method that is needed.
         """
         self._lock = threading.RLock()
-        self._listener = listener
+        self._node, self._name, self._listener = node, action_name, listener
         self.seen_since = seen_since
         self._on_close = on_close
         self._goal_requests: dict[int, _Question] = {}
@@ -109,19 +108,19 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         self.on_trial = False
         """The listener has another client; here it wants to hear of statuses alone."""
         self._closed = False
-        self._impl = action_type.Impl  # before rclpy's part: the executor may take at once
+        check_for_type_support(action_type)
+        self._impl = action_type.Impl
         services = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
-        super().__init__(
-            node,
-            action_type,
-            action_name,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-            goal_service_qos_profile=services,
-            result_service_qos_profile=services,
-            cancel_service_qos_profile=services,
-            feedback_sub_qos_profile=QoSProfile(depth=DEPTH),
-        )
-        missing = [name for name in _USED_OF_HANDLE if not hasattr(self._client_handle, name)]
+        feedback = QoSProfile(depth=DEPTH)
+        profiles = services, services, services, feedback, qos_profile_action_status_default
+        with node.handle:
+            self.handle = rclpy_implementation.ActionClient(
+                node.handle,
+                action_type,
+                action_name,
+                *(profile.get_c_qos_profile() for profile in profiles),
+            )
+        missing = [name for name in _USED_OF_HANDLE if not hasattr(self.handle, name)]
         if missing:
             raise RuntimeError(f"this rclpy's action client has no {', '.join(missing)}")
 
@@ -133,7 +132,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request.goal_id = UUID(uuid=list(goal_id))
         request.goal = goal
         with self._lock:
-            number = self._client_handle.send_goal_request(request)
+            number = self.handle.send_goal_request(request)
             self._goal_requests[number] = question = _Question(goal_id)
             self.reachability.asked(question.asked)
 
@@ -146,7 +145,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request = CancelGoal.Request()
         request.goal_info.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
-            number = self._client_handle.send_cancel_request(request)
+            number = self.handle.send_cancel_request(request)
             self._keep(self._cancel_requests, number, question := _Question(goal_id))
             self.reachability.asked(question.asked)
 
@@ -158,7 +157,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         request = self._impl.GetResultService.Request()
         request.goal_id = UUID(uuid=list(goal_id))
         with self._lock:
-            number = self._client_handle.send_result_request(request)
+            number = self.handle.send_result_request(request)
             self._keep(self._result_requests, number, question := _Question(about))
         return question.asked
 
@@ -180,20 +179,6 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
             while len(self._past_requests) > GOALS_KEPT:
                 del self._past_requests[next(iter(self._past_requests))]
 
-    # The executor's view. It may have this client in hand while it is destroyed on another thread;
-    # rclpy's own methods then raise in the executor, which ends its spin.
-
-    def add_to_wait_set(self, wait_set: Any) -> None:
-        """Take part in the wait, unless destroyed."""
-        with self._lock:
-            if not self._closed:
-                super().add_to_wait_set(wait_set)
-
-    def is_ready(self, wait_set: Any) -> bool:
-        """Whether there is something to take."""
-        with self._lock:
-            return not self._closed and bool(super().is_ready(wait_set))
-
     # Answers
 
     def deliver_arrived(self) -> bool:
@@ -202,18 +187,18 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         Returns whether there was anything.
         """
         self.take_data()
-        return self._deliver()
+        return self.deliver()
 
     def take_data(self) -> None:
-        """Take all that has arrived into the inbox. By the executor, or `deliver_arrived`."""
+        """Take all that has arrived into the inbox."""
         taken = self._inbox
         status_type, read_statuses = status_reader()
         with self._lock:
             if self._closed:
                 return
-            with self._client_handle:
+            with self.handle:
                 for _ in range(TAKE_AT_MOST):
-                    number, response = self._client_handle.take_goal_response(
+                    number, response = self.handle.take_goal_response(
                         self._impl.SendGoalService.Response
                     )
                     if response is None:
@@ -221,19 +206,19 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                     question = self._goal_requests.get(number) or self._past_requests.get(number)
                     self._file("goal", question, response.accepted)
                 for _ in range(TAKE_AT_MOST):
-                    feedback = self._client_handle.take_feedback(self._impl.FeedbackMessage)
+                    feedback = self.handle.take_feedback(self._impl.FeedbackMessage)
                     if feedback is None:
                         break
                     taken.append(("feedback", bytes(feedback.goal_id.uuid), feedback.feedback))
                 for _ in range(TAKE_AT_MOST):
-                    number, response = self._client_handle.take_cancel_response(CancelGoal.Response)
+                    number, response = self.handle.take_cancel_response(CancelGoal.Response)
                     if response is None:
                         break
                     question = self._cancel_requests.get(number)
                     if question is not None:
                         self._file("cancel", question, _cancel_code(response, question.about))
                 for _ in range(TAKE_AT_MOST):
-                    number, response = self._client_handle.take_result_response(
+                    number, response = self.handle.take_result_response(
                         self._impl.GetResultService.Response
                     )
                     if response is None:
@@ -242,7 +227,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                     result = response.result if status else None
                     self._file("result", self._result_requests.get(number), (status, result))
                 for _ in range(TAKE_AT_MOST):
-                    message = self._client_handle.take_status(status_type)
+                    message = self.handle.take_status(status_type)
                     if message is None:
                         break
                     taken.append(("status", read_statuses(message), None))
@@ -257,11 +242,8 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
         question.answers.append(answer)
         self._inbox.append((kind, question.about, (question.asked, tuple(question.answers))))
 
-    async def execute(self, taken: None) -> None:
-        """Deliver what the executor has had taken."""
-        self._deliver()
-
-    def _deliver(self) -> bool:
+    def deliver(self) -> bool:
+        """Deliver what has been taken; return whether there was anything."""
         with host.lock:
             any_came = bool(self._inbox)
             while self._inbox:
@@ -269,7 +251,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
                 try:
                     self._tell(kind, about, detail)
                 except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
-                    log.error(f"{self._action_name}: {kind} was not taken in: {raised(error)}")
+                    log.error(f"{self._name}: {kind} was not taken in: {raised(error)}")
             if any_came:
                 with contextlib.suppress(Exception):  # nothing was lost by that
                     self._listener.all_delivered()
@@ -299,11 +281,12 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
 
     def servers(self) -> frozenset[bytes]:
         """Return the GIDs of the servers in sight; raises InvalidHandle where the node is gone."""
-        return servers(self._node, self._action_name)
+        return servers(self._node, self._name)
 
     def ready(self) -> bool:
         """Whether all parts of a server are in sight; raises InvalidHandle as well."""
-        return bool(self.server_is_ready())
+        with self._node.handle:
+            return bool(self.handle.is_action_server_available())
 
     @property
     def closed(self) -> bool:
@@ -316,7 +299,7 @@ class RosTransport(RclpyActionClient):  # type: ignore[misc]  # rclpy is not typ
             if self._closed:
                 return
             self._closed = True
-            super().destroy()
+            self.handle.destroy_when_not_in_use()
         self._on_close(self)
 
 

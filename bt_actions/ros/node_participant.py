@@ -30,6 +30,7 @@ from bt_actions.ros.log import log
 from bt_actions.ros.rediscovery import look_for
 from bt_actions.ros.service_client import ServiceClient
 from bt_actions.ros.topics import Publisher, Subscription
+from bt_actions.ros.workarounds.one_waitable import OneWaitable
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import Listener, Seeker
 from bt_actions.utilities.suggest import did_you_mean, listing
@@ -76,6 +77,7 @@ class NodeParticipant:
         sight.nodes.add(node)
         self.seen_since, self.long_stalls = sight.since, sight.long_stalls
         self.traffic = Traffic(host, self)
+        self._waitable = OneWaitable(node)
         self._warned_of: set[str] = set()
 
     @classmethod
@@ -133,7 +135,10 @@ class NodeParticipant:
         self._warn_of_remapping(name)
         is_private = sees_nobody_else()  # no server can come to be seen later than another
         seen_since = NEVER if is_private else self.seen_since
-        return RosTransport(self.node, action_type, name, listener, seen_since)
+        leave = self._waitable.leave
+        transport = RosTransport(self.node, action_type, name, listener, seen_since, leave)
+        self._waitable.join(transport)
+        return transport
 
     def _warn_of_remapping(self, name: str) -> None:
         """Say it, once for a name, where a rule would have it another: ROS remaps no action."""

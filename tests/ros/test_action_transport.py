@@ -17,6 +17,8 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 from bt_actions import Gripper, MoveRobot
 from bt_actions.ros import action_transport
 from bt_actions.ros.action_transport import RosTransport
+from bt_actions.ros.node_participant import NodeParticipant
+from bt_actions.ros.workarounds.one_waitable import OneWaitable
 from bt_actions.traffic.transport import Request
 from tests.support.processes import Host
 from tests.support.waiting import until
@@ -110,12 +112,16 @@ def heard() -> Heard:
     return Heard()
 
 
+def transport_to(node: Node, name: str, heard: Heard) -> RosTransport:
+    return NodeParticipant.of(node).open_transport(MoveRobotAction, name, heard)
+
+
 @pytest.fixture
 def client(node: Node, host: Host, name: str, heard: Heard) -> Iterator[RosTransport]:
     """A client of a server that is there."""
-    client = RosTransport(node, MoveRobotAction, name, heard)
+    client = transport_to(node, name, heard)
     host.open(name)
-    until(client.server_is_ready)
+    until(client.ready)
     yield client
     client.close()
     host.close_server(name)
@@ -157,7 +163,7 @@ def request(client: RosTransport, kind: str) -> bytes:
 def test_an_answer_that_arrives_before_its_request_is_filed_is_not_lost(
     client: RosTransport, node: Node, heard: Heard, kind: str
 ) -> None:
-    client._client_handle = LateFiling(client._client_handle, kind, patience=0.02)
+    client.handle = LateFiling(client.handle, kind, patience=0.02)
     with single(node):
         asked = [request(client, kind) for _ in range(TIMES)]
         until(lambda: len(heard.answers(kind)) == TIMES)
@@ -194,7 +200,7 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
     node = Node("dying", context=context)
     client = RosTransport(node, MoveRobotAction, name, heard)
     journal = host.open(name)
-    until(client.server_is_ready)
+    until(client.ready)
     goal_id = uuid.uuid4().bytes
     client.send(goal_id, MoveRobotAction.Goal(distance=5.0))
     until(lambda: heard.goals, meanwhile=client.deliver_arrived)
@@ -252,13 +258,13 @@ def test_a_client_that_is_destroyed_in_the_executors_hands_does_not_end_the_spin
     client: RosTransport, node: Node, monkeypatch: pytest.MonkeyPatch, moment: str
 ) -> None:
     """`shutdown` of a leaf, while another thread spins the user's node."""
-    real = getattr(RosTransport, moment)
+    real = getattr(OneWaitable, moment)
 
-    def destroyed_first(self: RosTransport, *arguments: Any) -> Any:
+    def destroyed_first(self: OneWaitable, *arguments: Any) -> Any:
         client.close()
         return real(self, *arguments)
 
-    monkeypatch.setattr(RosTransport, moment, destroyed_first)
+    monkeypatch.setattr(OneWaitable, moment, destroyed_first)
     alive = threading.Event()
     executor = SingleThreadedExecutor(context=node.context)
     with spinning(node, executor):
@@ -275,7 +281,7 @@ def test_clients_come_and_go_under_a_spinning_executor(
     executor = MultiThreadedExecutor(2, context=node.context)
     with spinning(node, executor):
         for number in range(times):
-            RosTransport(node, MoveRobotAction, f"{name}_{number % 5}", heard).close()
+            transport_to(node, f"{name}_{number % 5}", heard).close()
         executor.create_task(alive.set)
         assert alive.wait(5.0)
 
@@ -283,8 +289,8 @@ def test_clients_come_and_go_under_a_spinning_executor(
 # Shared per node, name and type
 
 
-def clients_of(node: Node) -> list[RosTransport]:
-    return [waitable for waitable in node.waitables if isinstance(waitable, RosTransport)]
+def clients_of(node: Node) -> tuple[Any, ...]:
+    return NodeParticipant.of(node)._waitable._members
 
 
 def test_leaves_with_the_same_action_share_one_client(node: Node, name: str) -> None:

@@ -36,7 +36,8 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
         client = leaf._endpoint.transport
         monkeypatch.setattr(client, "servers", frozenset)
         monkeypatch.setattr(client, "ready", lambda: False)
-        monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
+        client._on_close(client)  # nobody waits for it
+        monkeypatch.setattr(client, "_on_close", lambda _: None)
         monkeypatch.setattr(client, "take_data", lambda: None)
         monkeypatch.setattr(client, "cancel", lambda _: None)
 
@@ -107,7 +108,8 @@ def test_who_is_not_heard_after_a_stall_hears_of_its_goal_all_the_same(
             for request in ("cancel", "ask_result", "probe"):
                 monkeypatch.setattr(client, request, lambda *_: client.reachability.asked(now()))
             monkeypatch.setattr(client, "take_data", lambda: None)
-            monkeypatch.setattr(client, "add_to_wait_set", lambda _: None)
+            client._on_close(client)  # nobody waits for it
+            monkeypatch.setattr(client, "_on_close", lambda _: None)
             monkeypatch.setattr(process.stalls, "_due", process.stalls._idle(now()) - 5.0)
         if canceled:
             runner.interrupt()

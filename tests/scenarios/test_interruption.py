@@ -254,7 +254,7 @@ class TestABehaviourThatRaises:
         journal = serve("1:delay_accept=0.3")
         warm = MoveRobot("warm", 0.0, action_name=name)
         warm.setup(node=node)  # so that the server is known, and the first tick sends
-        until(warm._endpoint.transport.server_is_ready)
+        until(warm._endpoint.transport.ready)
         way = warm._endpoint.route  # nor is it in doubt since a stall in the tests before
         way._long_stalls = process.stalls.long_times
         leaf = MoveRobot("m", 5.0, action_name=name)

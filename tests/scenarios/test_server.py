@@ -466,7 +466,7 @@ class TestStopped:
         really, began = RosTransport.servers, time.monotonic()
 
         def late(at: RosTransport) -> frozenset[bytes]:
-            early = at._action_name == f"{name}_0" and time.monotonic() - began < 1.5
+            early = at._name == f"{name}_0" and time.monotonic() - began < 1.5
             return frozenset() if early else really(at)
 
         monkeypatch.setattr(RosTransport, "servers", late)
@@ -552,7 +552,7 @@ class TestStopped:
 
         def late(at: RosTransport) -> frozenset[bytes]:
             shown = really(at)
-            if at._action_name == f"{name}_1":
+            if at._name == f"{name}_1":
                 if shown:
                     seen.setdefault("other", time.monotonic())
             elif time.monotonic() - seen.get("other", time.monotonic()) < 0.5:
