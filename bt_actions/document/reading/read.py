@@ -68,8 +68,7 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
 
 def _without(node: Mapping, name: str) -> Mapping:
     copy = Mapping()
-    copy.line, copy.column = node.line, node.column
-    copy.end_line, copy.end_column = node.line, node.column + 1
+    copy.begin = copy.end = node.begin
     copy.flow = node.flow
     copy.pairs = [pair for pair in node.pairs if pair[0].text != name]
     return copy

@@ -67,9 +67,9 @@ def _composed(composer: _Composer, source: Source) -> Node | None:
 class _Open:
     """A collection whose end has not come yet."""
 
-    __slots__ = ("anchor", "height", "items", "key", "keys", "node", "pairs", "refused", "size")
+    __slots__ = ("anchor", "before", "height", "items", "key", "keys", "node", "pairs", "refused")
 
-    def __init__(self, node: Mapping | Listing, anchor: str | None) -> None:
+    def __init__(self, node: Mapping | Listing, anchor: str | None, before: int) -> None:
         self.node = node
         self.anchor = anchor
         self.items = node.items if isinstance(node, Listing) else None
@@ -78,7 +78,8 @@ class _Open:
         self.keys: dict[str, Scalar] = {}
         self.refused = False
         """Whether a list or a mapping stands as a key."""
-        self.size = 1
+        self.before = before
+        """How many nodes there were before it."""
         self.height = 1
         """Collections inside each other, this one among them."""
 
@@ -101,7 +102,6 @@ class _Composer:
     def read(self, next_event: Callable[[], Any]) -> None:
         """Take all events, or those before the first with which it gives up."""
         takes = {
-            yaml.ScalarEvent: self._scalar,
             yaml.MappingStartEvent: self._mapping,
             yaml.MappingEndEvent: self._end,
             yaml.SequenceStartEvent: self._listing,
@@ -112,7 +112,16 @@ class _Composer:
             yaml.DocumentEndEvent: _nothing,
         }
         while (kind := type(event := next_event())) is not yaml.StreamEndEvent:
-            takes[kind](event)
+            if kind is yaml.ScalarEvent:
+                node = Scalar()
+                node.text = event.value
+                node.plain = not event.style
+                node.begin, node.end = event.start_mark, event.end_mark
+                if event.tag is not None or event.anchor is not None:
+                    self._marked(node, event)
+                self._add(node, 0)
+            else:
+                takes[kind](event)
             if self._size > MAX_NODES and not self.gave_up:
                 text = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
                 self._report("BT105", event, text)
@@ -129,25 +138,17 @@ class _Composer:
     def _report(self, code: str, event: Any, message: str, hint: str | None = None) -> None:
         self._source.report(code, _event_span(event), message, hint=hint)
 
-    def _scalar(self, event: Any) -> None:
-        node = Scalar()
-        node.text = event.value
-        node.plain = not event.style
+    def _marked(self, node: Scalar, event: Any) -> None:
         if event.tag is not None:
-            self._tag(node, event)
-        _place(node, event)
+            node.plain = False
+        if event.tag not in (None, "!", "tag:yaml.org,2002:str"):
+            self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
+            self._source.settled.add(_event_span(event))
+            self._source.unread.nodes.append(node)
         if event.anchor is not None:
             self._source.anchored = True
             self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = (node, 1, 0)
-        self._add(node, 1, 0)
-
-    def _tag(self, node: Scalar, event: Any) -> None:
-        node.plain = False
-        if event.tag not in ("!", "tag:yaml.org,2002:str"):
-            self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
-            self._source.settled.add(_event_span(event))
-            self._source.unread.nodes.append(node)
 
     def _mapping(self, event: Any) -> None:
         node = Mapping()
@@ -165,13 +166,13 @@ class _Composer:
             return
         if event.tag is not None and event.tag != "!":
             self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
-        _place(node, event)
+        node.begin, node.end = event.start_mark, event.end_mark
         node.flow = bool(event.flow_style)
         if event.anchor is not None:
             self._source.anchored = True
             self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = None
-        self._stack.append(_Open(node, event.anchor))
+        self._stack.append(_Open(node, event.anchor, self._size))
 
     def _too_deep(self, event: Any) -> None:
         self._report("BT105", event, f"nested deeper than {MAX_DEPTH} levels")
@@ -181,23 +182,19 @@ class _Composer:
         done = self._stack.pop()
         node = done.node
         if node.flow:
-            mark = event.end_mark
-            node.end_line, node.end_column = mark.line + 1, mark.column + 1
-        else:
-            last = None
-            if done.items is not None:
-                last = done.items[-1] if done.items else None
-            elif done.pairs:
-                last = done.pairs[-1][1]
-            if last is not None and (last.end_line, last.end_column) > (node.line, node.column):
-                node.end_line, node.end_column = last.end_line, last.end_column
+            node.end = event.end_mark
+        elif done.items or done.pairs:
+            last = done.items[-1] if done.items else done.pairs[-1][1]
+            if last.end.index > node.begin.index:
+                node.end = last.end
+        size = self._size - done.before + 1
         if isinstance(node, Mapping) and "<<" in done.keys and self._unfold:
             self._merge(node)
         if done.refused and not done.pairs:
             self._source.settled.add(span_of(node))
         if done.anchor is not None:
-            self._anchors[done.anchor] = (node, done.size, done.height)
-        self._add(node, done.size, done.height)
+            self._anchors[done.anchor] = (node, size, done.height)
+        self._add(node, done.height)
 
     def _alias(self, event: Any) -> None:
         if event.anchor not in self._anchors:
@@ -212,24 +209,23 @@ class _Composer:
         if not self._unfold:
             alias = Alias()
             alias.name = event.anchor
-            _place(alias, event)
-            self._add(alias, 1, 0)
+            alias.begin, alias.end = event.start_mark, event.end_mark
+            self._add(alias, 0)
             return
         node, size, height = found
         if len(self._stack) + height > MAX_DEPTH:
             self._too_deep(event)
             return
         self._size += size - 1
-        self._add(node, size, height)
+        self._add(node, height)
 
-    def _add(self, node: Node, size: int, height: int) -> None:
+    def _add(self, node: Node, height: int) -> None:
         self._size += 1
         if not self._stack:
             if self.root is None:
                 self.root = node
             return
         frame = self._stack[-1]
-        frame.size += size
         if height >= frame.height:
             frame.height = height + 1
         if frame.items is not None:
@@ -298,14 +294,6 @@ def _braced(node: Node) -> str | None:
 
 def _nothing(event: Any) -> None:
     """Of this event nothing is to be kept."""
-
-
-def _place(node: Node, event: Any) -> None:
-    start, end = event.start_mark, event.end_mark
-    node.line = line = start.line + 1
-    node.column = start.column + 1
-    node.end_line = line if end.line == start.line else end.line + 1  # one number for both
-    node.end_column = end.column + 1
 
 
 def _event_span(event: Any) -> Span:

@@ -37,6 +37,6 @@ def cut_hint(node: Scalar, source: Source) -> str | None:
 
 def _behind(node: Scalar, source: Source) -> str:
     """What stands behind a plain text on its line, if a '#' is on that."""
-    if not node.plain or node.end_line not in source.commented:
+    if not source.commented or not node.plain or node.end_line not in source.commented:
         return ""
     return (source.line(node.end_line) or "")[node.end_column - 1 :]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Protocol
 
 from bt_actions.document.findings import Span
 
@@ -33,14 +34,39 @@ _SPECIAL = re.compile(r"([-+]?)\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 _MAX_DIGITS = 400
 
 
+class Mark(Protocol):
+    """A place in a text, as libyaml has it: counted from 0."""
+
+    @property
+    def index(self) -> int: ...
+    @property
+    def line(self) -> int: ...
+    @property
+    def column(self) -> int: ...
+
+
 class Node:
     """A range of the text; lines and columns count from 1, the end is one past the last."""
 
-    __slots__ = ("column", "end_column", "end_line", "line")
-    line: int
-    column: int
-    end_line: int
-    end_column: int
+    __slots__ = ("begin", "end")
+    begin: Mark
+    end: Mark
+
+    @property
+    def line(self) -> int:
+        return self.begin.line + 1
+
+    @property
+    def column(self) -> int:
+        return self.begin.column + 1
+
+    @property
+    def end_line(self) -> int:
+        return self.end.line + 1
+
+    @property
+    def end_column(self) -> int:
+        return self.end.column + 1
 
 
 class Scalar(Node):
