@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from py_trees.behaviour import Behaviour
-from py_trees.common import Access, Status
+from py_trees.common import Status
 
 from bt_actions.behaviours.connected import backend_in
 from bt_actions.behaviours.progress import DEADLINES, Progress
 from bt_actions.behaviours.reading import Reading
-from bt_actions.behaviours.variables import key, resolve, variables_in
+from bt_actions.behaviours.variables import register, resolve, variables_in
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
@@ -99,11 +99,6 @@ class ActionBehaviour(Behaviour):
         self._tree_closed = False
         self._started = 0.0
         self._outcome: Outcome | None = None
-        self.blackboard = self.attach_blackboard_client()
-        for variable in variables_in(goal):
-            self.blackboard.register_key(variable, Access.READ)
-        for target in self.save:
-            self.blackboard.register_key(key(target), Access.WRITE)
 
     # What a caller may read after a tick
 
@@ -185,6 +180,7 @@ class ActionBehaviour(Behaviour):
         backend = backend_in(kwargs, self)
         self.action_type = interface(self.action_type, "action")
         self._check_fields()
+        register(self, self._variables(), self.save)
         if backend is not self._backend:
             self._leave_endpoint()
             self._endpoint = backend.traffic.endpoint(self.action_type, self.action_name)
@@ -342,6 +338,10 @@ class ActionBehaviour(Behaviour):
         action: Any = self.action_type
         data = self.goal() if callable(self.goal) else self.goal
         return fill(action.Goal, resolve(data), now=self._require_setup().clock.stamp)
+
+    def _variables(self) -> set[str]:
+        """The blackboard keys that a goal is made from."""
+        return variables_in(self.goal)
 
     def _check_fields(self) -> None:
         action: Any = self.action_type

@@ -54,7 +54,7 @@ def condition_of(
 class Reading:
     """The `expect`, `save` and `retry.when` of an action; a result is read first, saved later."""
 
-    __slots__ = ("_expect", "_expect_text", "_given", "_names", "_save", "to_save", "when")
+    __slots__ = ("_expect", "_given", "_names", "_save", "to_save", "when")
 
     def __init__(
         self,
@@ -65,10 +65,8 @@ class Reading:
     ) -> None:
         """Raises ValueError for what is neither a function nor an expression."""
         self._names = names
-        self._given = [("expect", expect), ("retry.when", when)]
-        self._given += (("save", place) for place in save.values())
+        self._given = expect, when, save
         self._expect = condition_of(expect, "expect", names)
-        self._expect_text = expect if isinstance(expect, str) else getattr(expect, "text", "")
         self._save = {key: function_of(place, "save", names) for key, place in save.items()}
         self.when = condition_of(when, "retry.when", names)
         self.to_save: dict[str, Any] = {}
@@ -77,7 +75,9 @@ class Reading:
     def unknown_field(self, result_type: Any) -> str:
         """Say which field one of them reads that a result of this type has not; or ""."""
         fields = result_type.get_fields_and_field_types()
-        for what, text in self._given:
+        expect, when, save = self._given
+        saved = (("save", place) for place in save.values())
+        for what, text in (("expect", expect), ("retry.when", when), *saved):
             tree = Expression(text, roots=self._names(None)).tree if isinstance(text, str) else None
             for node in ast.walk(tree) if tree is not None else ():
                 if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
@@ -91,8 +91,10 @@ class Reading:
         """Check the result and read from it what is to be saved; return what is wrong with it."""
         try:
             if self._expect is not None and not self._expect(result):
-                wanted = f"{self._expect_text} was" if self._expect_text else "something else was"
-                return f"{wanted} expected, but the result is: {shorten(result)}"
+                given = self._given[0]
+                wanted = given if isinstance(given, str) else getattr(given, "text", "")
+                wanted = wanted or "something else"
+                return f"{wanted} was expected, but the result is: {shorten(result)}"
         except ExpressionError as error:
             return str(error)
         try:

@@ -11,8 +11,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from py_trees.common import Access
-
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.variables import Var, resolve, variables_in
 from bt_actions.expressions.expression import ExpressionError
@@ -73,9 +71,10 @@ class RunTree(ActionBehaviour):
             timeout=timeout,
             **kwargs,
         )
-        for given in (tree, inputs):
-            for variable in variables_in(given):
-                self.blackboard.register_key(variable, Access.READ)
+        self._given = [tree, inputs]
+
+    def _variables(self) -> set[str]:
+        return variables_in(self._given)
 
     def names(self, result: Any) -> Mapping[str, object]:
         """The result, and the outputs of the tree."""

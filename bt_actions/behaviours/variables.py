@@ -6,11 +6,13 @@ the blackboard is process-global and has no lock.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
+from py_trees.common import Access
 
 from bt_actions.utilities.plain_data import numbers_only
 
@@ -71,6 +73,16 @@ def _step(value: Any, step: str, name: str) -> Any:
 def write(name: str, value: Any) -> None:
     """Set a variable, as the blackboard's own clients see it."""
     Blackboard.set(key(name), value)
+
+
+def register(leaf: Behaviour, read: Iterable[str], written: Iterable[str]) -> None:
+    """Tell the blackboard, once for a leaf, which keys it reads and which variables it sets."""
+    access = [*((name, Access.READ) for name in read)]
+    access += ((key(name), Access.WRITE) for name in written)
+    if access and not leaf.blackboards:
+        client = leaf.attach_blackboard_client()
+        for name, how in access:
+            client.register_key(name, how)
 
 
 def resolve(data: Any) -> Any:

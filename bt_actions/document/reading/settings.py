@@ -35,13 +35,13 @@ def join_names(*parts: str) -> str:
     return joined
 
 
-def merged(base: object, over: object) -> dict[str, object]:
+def merged(base: dict[str, object], over: dict[str, object]) -> dict[str, object]:
     """Two mappings of settings as one, key by key to any depth; `over` wins."""
-    result = dict(base) if isinstance(base, dict) else {}
-    for name, value in (over if isinstance(over, dict) else {}).items():
-        earlier = result.get(name)
-        both = isinstance(earlier, dict) and isinstance(value, dict)
-        result[name] = merged(earlier, value) if both else value
+    result = {**base, **over}
+    for name in base.keys() & over:
+        earlier, value = base[name], over[name]
+        if isinstance(earlier, dict) and isinstance(value, dict):
+            result[name] = merged(earlier, value)
     return result
 
 

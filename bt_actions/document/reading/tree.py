@@ -52,10 +52,10 @@ class TreeNode:
     @property
     def place(self) -> Place:
         """Where the node's kind is written, or the node begins whose kind is merged into it."""
-        node, key = self.node, self.key
-        begin, end = (node.line, node.column), (node.end_line, node.end_column)
-        at = key if begin <= (key.line, key.column) < end else node
-        return Place(self.source.name, at.line, at.column)
+        node, at = self.node, self.key.begin
+        if not node.begin.index <= at.index < node.end.index:
+            at = node.begin
+        return Place(self.source.name, at.line + 1, at.column + 1)
 
     @property
     def is_action(self) -> bool:
