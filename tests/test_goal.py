@@ -599,7 +599,7 @@ def test_without_deadlines_the_server_is_still_asked_now_and_then() -> None:
 def test_what_is_held_falls_due_later_and_nothing_else_does() -> None:
     life = executing()
     life.now = Now(life.now.steady + 2.5, life.now.ros + 2.5)  # nobody polls: timeout.feedback is 2
-    life.goal.suspend_deadlines(1.0, life.now)
+    life.goal.deadlines.suspend(1.0, life.now)
     assert life.pass_time(0.9) == []
     assert life.goal.deadline(life.now) == (Event.FEEDBACK_DUE, pytest.approx(0.1))
     life.on(Event.FEEDBACK, "at last")

@@ -158,7 +158,7 @@ def test_one_that_is_not_ready_is_asked_and_is_not_gone_while_it_speaks(watch: S
     watch.probe_answered(1.5, 1)
     assert not watch.gone(1.4 + NOT_READY_FOR, gids(OLD))
     assert watch.gone(1.5 + NOT_READY_FOR, gids(OLD))
-    watch.heard(3.0)
+    watch.heard_at = 3.0
     assert not watch.gone(1.5 + NOT_READY_FOR, gids(OLD))
 
 

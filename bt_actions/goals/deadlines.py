@@ -55,7 +55,7 @@ class Deadlines:
             self._due[event] += seconds
 
     def suspend(self, seconds: float, now: Now) -> None:
-        """Let none take effect within so many seconds of the steady clock."""
+        """Let none take effect within so many seconds: what is awaited may be on its way."""
         self._not_before = now.steady + seconds
 
     def _suspended_for(self, now: Now) -> float:

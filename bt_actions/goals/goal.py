@@ -90,10 +90,6 @@ class Goal(Facts):
         if not self.sent:
             self.deadlines.postpone(seconds)
 
-    def suspend_deadlines(self, seconds: float, now: Now) -> None:
-        """Let no deadline take effect for so many seconds: what is awaited may be on its way."""
-        self.deadlines.suspend(seconds, now)
-
     # What the caller may ask
 
     def due_in(self, now: Now) -> float | None:

@@ -15,8 +15,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.traffic.begun import begun_in
-from bt_actions.traffic.handle import Change, GoalHandle
+from bt_actions.traffic.handle import Change, GoalHandle, begun_in
 from bt_actions.utilities.places import root_of
 
 

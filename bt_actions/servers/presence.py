@@ -66,9 +66,9 @@ class ServerWatch:
         self._probed_at = NEVER
         self._sent: dict[int, float] = {}  # probe: when it was sent
         self._answers: dict[int, _Answers] = {}  # by probe
-        self._heard_at = NEVER
-        self._both_answered = False
-        self._most_answers = 0
+        self.heard_at = NEVER
+        """When any word of a server came: whoever speaks is there."""
+        self._most_answers = 0  # to one question
 
     def observe(
         self, now: float, ready: bool, gids: frozenset[GID], *, concludes: bool = True
@@ -83,13 +83,12 @@ class ServerWatch:
             self._unready_since = now
         self._ready = ready
         if gids != self.gids:
-            self._both_answered = self.alone = False
-            self._most_answers = 0
+            self.alone, self._most_answers = False, 0
             self._answers.clear()
             self._crowded_since = now if len(gids) > 1 else None
             self.gids = gids
         since = self._crowded_since
-        if not concludes or since is None or self._both_answered or now < self._not_alone_before:
+        if not concludes or since is None or self.both_live or now < self._not_alone_before:
             return
         if now - since >= SLOWEST_START:
             self.alone = self._answered_once(now, since)
@@ -130,37 +129,31 @@ class ServerWatch:
 
     def probe_answered(self, now: float, probe: int) -> None:
         """Take one answer to the probe numbered `probe`."""
-        self.heard(now)
-        sent = self._sent.get(probe, NEVER)
-        count, first, sent = self._answers.get(probe, (0, now, sent))
+        self.heard_at = now
+        count, first, sent = self._answers.get(probe, (0, now, self._sent.get(probe, NEVER)))
         self._answers[probe] = _Answers(count + 1, first, sent)
         if len(self._answers) > PROBES_KEPT:
             del self._answers[next(iter(self._answers))]
-        if count + 1 > 1:
+        if count:
             self.two_answered(count + 1)
-
-    def heard(self, now: float) -> None:
-        """Take any word of a server: whoever speaks is there."""
-        self._heard_at = now
 
     def two_answered(self, answers: int = 2) -> None:
         """Take note that two, or more, have answered one question, a probe or another."""
         if self._crowded_since is not None:
-            self._both_answered = True
             self._most_answers = max(self._most_answers, answers)
             self.alone = False
 
     @property
     def both_live(self) -> bool:
         """Whether two of those that are shown have answered one question."""
-        return self._both_answered
+        return self._most_answers > 1
 
     def all_live(self, now: float) -> bool:
         """Whether all that are shown live, and more than one are: so many answered one question.
 
         Or two did, and a dead one would not be shown any more.
         """
-        if not self._both_answered or self._crowded_since is None:
+        if not self.both_live or self._crowded_since is None:
             return False
         return self._most_answers >= len(self.gids) or now - self._crowded_since > LEASE
 
@@ -171,7 +164,7 @@ class ServerWatch:
         if self._crowded_since is None:
             return Server.READY
         none_dead = now - self._crowded_since > LEASE and now >= self._not_alone_before
-        if self._both_answered or none_dead:
+        if self.both_live or none_dead:
             return Server.AMBIGUOUS
         return Server.READY if self.alone else Server.UNCLEAR
 
@@ -180,7 +173,7 @@ class ServerWatch:
 
         `runs`: goals may run here, so that it matters whether one that is not ready is gone.
         """
-        is_open = self._crowded_since is not None and not self._both_answered
+        is_open = self._crowded_since is not None and not self.both_live
         is_open |= runs and self._unready_since is not None and bool(self.gids)
         if not is_open or now - self._probed_at < PROBE_EVERY:
             return False
@@ -197,7 +190,7 @@ class ServerWatch:
             return True
         if self._unready_since is None or len(self.gids) > 1:
             return False
-        return now - max(self._unready_since, self._heard_at) >= NOT_READY_FOR
+        return now - max(self._unready_since, self.heard_at) >= NOT_READY_FOR
 
     def changed(self, sent_to: frozenset[GID]) -> bool:
         """Whether a server is shown that was not there when the goal was sent."""

@@ -18,8 +18,8 @@ from bt_actions.traffic.host import Host
 from bt_actions.traffic.watcher import BESIDE
 
 IN_FLIGHT = 8
-"""Goal requests of this process under way at a server; its queue holds 10, and drops what is over
-silently."""
+"""Goal requests of this process, of all its nodes, under way at a server; its queue holds 10, and
+drops what is over silently."""
 
 
 class Admission:
@@ -47,7 +47,9 @@ class Admission:
         if self._may_overtake(handle):
             return False
         self._cancel_what_is_back(handle)
-        return not self._conflicts(handle) and self._in_flight(endpoint) < IN_FLIGHT
+        endpoints = self._domain.open_to((endpoint.name, endpoint.action_type))
+        in_flight = sum(each.goal.in_flight for one in endpoints for each in one.goals.values())
+        return not self._conflicts(handle) and in_flight < IN_FLIGHT
 
     def why_not(self, handle: GoalHandle) -> str:
         """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
@@ -69,11 +71,6 @@ class Admission:
                 told = other.goal.cancel_said
                 return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
         return ""
-
-    def _in_flight(self, endpoint: Endpoint) -> int:
-        """Count the goal requests at the server that wait for their answer, of all nodes."""
-        endpoints = self._domain.open_to((endpoint.name, endpoint.action_type))
-        return sum(handle.goal.in_flight for each in endpoints for handle in each.goals.values())
 
     def _may_overtake(self, handle: GoalHandle) -> bool:
         """Whether the request of a goal that it replaces, or that replaces it, is under way.
@@ -97,10 +94,11 @@ class Admission:
         to_see = dict.fromkeys(each for each in self._domain.open if _has_lost(each, handle))
         left = {(each.name, each.action_type): None for each in to_see}
         if handle.goal.busy in (Busy.WAIT, Busy.FAIL):
-            for name, action_type in self._domain.lost_with(handle.goal.resources):
-                left[name, action_type] = None
-                if name not in self._endpoints:  # another's server, which nobody speaks to any more
-                    self._open_to(action_type, name)
+            for (name, action_type), lost in list(self._domain.lost.items()):
+                if any(each.goal.resources & handle.goal.resources for each in lost):
+                    left[name, action_type] = None
+                    if name not in self._endpoints:  # a server that nobody speaks to any more
+                        self._open_to(action_type, name)
         for name, action_type in left:
             ours = self._endpoints.get(name)
             if ours is not None and ours.action_type is action_type:

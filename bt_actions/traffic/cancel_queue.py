@@ -8,7 +8,7 @@ is to be canceled, and when again, is for goals/goal.py to decide. All under the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 AT_MOST = 8
 """Requests of this process without an answer at one server: two places are left to others."""
@@ -41,10 +41,9 @@ class Cancels:
         self._waiting.pop(goal_id, None)
         self._asked.pop(goal_id, None)
 
-    def forget_answers(self, goal_ids: Iterable[bytes]) -> None:
-        """There will be none to what was asked for these so far."""
-        for goal_id in goal_ids:
-            self._asked.pop(goal_id, None)
+    def forget_answer(self, goal_id: bytes) -> None:
+        """There will be none to what was asked for this goal so far."""
+        self._asked.pop(goal_id, None)
 
     def has_request(self, goal_id: bytes) -> bool:
         """Whether a request for this goal waits for room."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -29,12 +30,10 @@ class Domain:
         """A server went out of sight once: what else its process serves may have, too."""
         self.known: set[Action] = set()
         """The actions that had a server once."""
-        self._lost: dict[Action, list[GoalHandle]] = {}
-        self._cancels: dict[Action, Cancels] = {}
-
-    def cancels_at(self, action: Action) -> Cancels:
-        """Return the cancel requests of this process to an action."""
-        return self._cancels.setdefault(action, Cancels())
+        self.lost: dict[Action, list[GoalHandle]] = {}
+        """Lost goals whose endpoint is gone: their server may be back for the next one."""
+        self.cancels: dict[Action, Cancels] = defaultdict(Cancels)
+        """The cancel requests of this process."""
 
     def open_to(self, action: Action) -> list[Endpoint]:
         """Return the endpoints with goals to this action."""
@@ -43,21 +42,9 @@ class Domain:
     def keep_lost(
         self, action: Action, handle: GoalHandle, forget: Callable[[bytes], None]
     ) -> None:
-        """Remember a lost goal whose endpoint goes: its server may be back for the next one."""
-        kept = self._lost.setdefault(action, [])
+        """Remember a lost goal whose endpoint goes."""
+        kept = self.lost.setdefault(action, [])
         kept.append(handle)
         for forgotten in kept[:-LOST_KEPT]:
             forget(forgotten.goal.id)
         del kept[:-LOST_KEPT]
-
-    def lost_with(self, resources: frozenset[str]) -> list[Action]:
-        """Return the actions of which goals are remembered that had some of these resources."""
-        return [
-            action
-            for action, kept in self._lost.items()
-            if any(handle.goal.resources & resources for handle in kept)
-        ]
-
-    def take_lost(self, action: Action) -> list[GoalHandle]:
-        """Give them to a new endpoint."""
-        return self._lost.pop(action, [])

@@ -85,7 +85,7 @@ class Drain:
                 if not hurry and not self._is_over(now):
                     self._deliver_arrived()
                     for handle in self._waits:
-                        handle.endpoint.apply_deadlines_guarded(handle)
+                        handle.endpoint.apply_deadlines(handle)
                     self._waits = [handle for handle in self._waits if _may_end(handle)]
                     if self._waits:
                         return Sleep(LOOK)

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 from bt_actions.goals.goal import Goal
@@ -58,31 +56,25 @@ class ActionEndpoint:
         reporter: Reporter,
         action_type: Any,
         name: str,
-        *,
-        unused: Callable[[ActionEndpoint], None],
-        why_not: Callable[[GoalHandle], str],
     ) -> None:
-        """`unused` is called where no goal is open; `why_not` tells what has kept a goal back."""
         self._host = host
         self.participant, self.domain, self.reporter = participant, domain, reporter
         self.action_type = action_type
         self.name = name
-        self._unused, self._why_not = unused, why_not
         self.users = 0
         self._forks = host.forks
         self.goals: dict[bytes, GoalHandle] = {}
         self.watch = ServerWatch()
-        self.cancels = domain.cancels_at((name, action_type))
+        self.cancels = domain.cancels[name, action_type]
         self.orphaned = False
         self.in_sight_since = self.heard_at = host.steady()
         self._probes = itertools.count(1)
-        self._last_probes: deque[int] = deque()
         self._warned_of: set[str] = set()
         self._ended = EndedGoals(self, host)
         self._effect_runner = EffectRunner(self, host, domain, self._warn_once)
         self._predecessors = Predecessors(name, host.log)
         self.transport = participant.open_transport(action_type, name, self)
-        self.route = Route(self, self, host, domain)
+        self.route = Route(self, host, domain)
         self.watcher = Watcher(self, host, domain, self.route)
         self.in_doubt, self.holds_back = self.route.in_doubt, self.route.holds_back
         self.observe, self.observe_and_tell = self.watcher.observe, self.watcher.observe_and_tell
@@ -116,7 +108,7 @@ class ActionEndpoint:
             self._ended.runs(goal_id)
             return
         now = self.heard_at = self._host.steady()
-        self.watch.heard(now)
+        self.watch.heard_at = now
         handle.replies.spoke(self.watch, now)
         self.tell(handle, Event.FEEDBACK, feedback)
         if handle.keeps_feedback and handle.goal.outcome is None:
@@ -142,7 +134,7 @@ class ActionEndpoint:
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
-        self._unused(self)
+        self.reporter.drop_if_unused(self)
 
     def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight.
@@ -151,7 +143,7 @@ class ActionEndpoint:
         """
         handle = self.goals.get(goal_id)
         if handle is not None:
-            self.watch.heard(self._host.steady())
+            self.watch.heard_at = self._host.steady()
             if not (denies and self.watch.changed(handle.replies.sent_to)):
                 self.heard_at = self._host.steady()
             if len(handle.replies.sent_to) > 1:
@@ -200,23 +192,27 @@ class ActionEndpoint:
 
         What has arrived by now is taken in first: an answer that came in time is in time, though
         the executor was too busy to look. Where this whole process stood still, it may be about to
-        arrive. One moment decides whether to do so, and what is due.
+        arrive. One moment decides whether to do so, and what is due. What fails in it stops
+        nothing.
         """
         with self._host.lock:
-            goal, now = handle.goal, self.participant.now()
-            if self.is_parents:
-                return
-            if handle.paused_at is not None and not goal.sent:
-                handle.held_back_since = None
-                return
-            self._give_back_time(handle, now.steady)
-            if goal.due_in(now) == 0.0:
-                self.deliver_arrived()
-                now = self.participant.now()
-                self._suspend_after_stall(goal, now)
-            self._host.trace.shows_time(handle)
-            for event in goal.due(now):
-                self._apply(handle, event, now)
+            try:
+                goal, now = handle.goal, self.participant.now()
+                if self.is_parents:
+                    return
+                if handle.paused_at is not None and not goal.sent:
+                    handle.held_back_since = None
+                    return
+                self._give_back_time(handle, now.steady)
+                if goal.due_in(now) == 0.0:
+                    self.deliver_arrived()
+                    now = self.participant.now()
+                    self._suspend_after_stall(goal, now)
+                self._host.trace.shows_time(handle)
+                for event in goal.due(now):
+                    self._apply(handle, event, now)
+            except Exception as error:  # noqa: BLE001 - a mistake of ours: any
+                self._warn_once("a deadline could not be applied", error)
 
     def _give_back_time(self, handle: GoalHandle, now: float) -> None:
         """See to it that no deadline counts the time in which a goal is not sent on our account."""
@@ -232,14 +228,7 @@ class ActionEndpoint:
         open_question = self.holds_back if waits else self.in_doubt
         in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
         servers = stalls.servers_take(now.steady) if waits else 0.0
-        goal.suspend_deadlines(max(stalls.answers_take(now.steady), servers, in_doubt), now)
-
-    def apply_deadlines_guarded(self, handle: GoalHandle) -> None:
-        """The same; what fails in it keeps no other goal from its turn."""
-        try:
-            self.apply_deadlines(handle)
-        except Exception as error:  # noqa: BLE001 - a mistake of ours: any
-            self._warn_once("a deadline could not be applied", error)
+        goal.deadlines.suspend(max(stalls.answers_take(now.steady), servers, in_doubt), now)
 
     def _apply(
         self, handle: GoalHandle, event: Event, now: Now, detail: Any = None, message: Any = None
@@ -251,7 +240,7 @@ class ActionEndpoint:
         commands = goal.on(event, now, detail)
         trace.told(handle, event, detail, commands)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
-            goal.reason += self._why_not(handle)
+            goal.reason += self.reporter.why_not(handle)
         newly_gone = goal.lost and not was_lost and goal.end is End.SERVER_GONE
         if newly_gone and handle.look_out_left is None:
             handle.look_out_left = LOOKED_OUT_FOR
@@ -265,9 +254,7 @@ class ActionEndpoint:
         """Ask the server just in order to be answered."""
         probe = next(self._probes)
         self.watch.probe_sent(self._host.steady(), probe)
-        self._last_probes.append(probe)
-        if len(self._last_probes) > PROBES_KEPT:
-            self.transport.forget(self._last_probes.popleft())
+        self.transport.forget(probe - PROBES_KEPT)
         with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
             self.transport.probe(probe, self._host.random_id())
 
@@ -309,7 +296,7 @@ class ActionEndpoint:
             self.domain.open.pop(self, None)
             self._host.scheduler.remove(self)
             self.watcher.rest()
-            self._unused(self)
+            self.reporter.drop_if_unused(self)
         self._host.trace.retired(handle)
 
     def goals_of(self, owner: Any) -> list[GoalHandle]:
@@ -320,7 +307,8 @@ class ActionEndpoint:
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""
         self.transport.close()
-        self.cancels.forget_answers(self.goals)
+        for goal_id in self.goals:
+            self.cancels.forget_answer(goal_id)
         self.transport, self.watch = transport, ServerWatch()
         self.watcher.begin_anew()
         self._host.scheduler.wake_by(self._host.steady())

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -16,10 +17,13 @@ from bt_actions.goals.terms import NEVER, Event, State
 from bt_actions.servers.presence import Server, ServerWatch
 from bt_actions.servers.replies import Replies, Told
 from bt_actions.traffic.cancel_queue import Cancels
-from bt_actions.traffic.transport import ActionTransport, Participant
+from bt_actions.traffic.transport import ActionTransport, Listener, Participant
 
 FEEDBACK_KEPT = 100
 """Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
+
+begun_in: ContextVar[object] = ContextVar("begun_in", default=None)
+"""Which run begins goals on this thread, set by whoever ticks its tree; None: nobody said it."""
 
 
 class Reporter(Protocol):
@@ -31,8 +35,14 @@ class Reporter(Protocol):
     def notify(self, change: Change | None) -> None:
         """Tell the observers, and whoever waits; None: something may be sent, or can be read."""
 
+    def why_not(self, handle: GoalHandle) -> str:
+        """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
 
-class Endpoint(Protocol):
+    def drop_if_unused(self, endpoint: Endpoint) -> None:
+        """Close an endpoint that has no user and no open goal."""
+
+
+class Endpoint(Listener, Protocol):
     """One action as one node sees it (ActionEndpoint), as its parts and its neighbors know it."""
 
     participant: Participant
@@ -68,10 +78,7 @@ class Endpoint(Protocol):
         """Tell a goal what is believed of what was said of it, or seen."""
 
     def apply_deadlines(self, handle: GoalHandle) -> None:
-        """Let the goal's deadlines take effect."""
-
-    def apply_deadlines_guarded(self, handle: GoalHandle) -> None:
-        """The same; what fails in it keeps no other goal from its turn."""
+        """Let the goal's deadlines take effect; what fails in it stops nothing."""
 
     def take_in(self, handle: GoalHandle) -> None:
         """See to this goal from now on."""
@@ -118,7 +125,7 @@ class GoalHandle:
     name: str
     """The leaf's."""
     begun_in: object = None
-    """Which run it belongs to (traffic/begun.py); None where nobody said it."""
+    """Which run it belongs to; None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))

@@ -45,7 +45,7 @@ def _sees_more(endpoint: Endpoint, other: Endpoint, servers: frozenset[bytes], n
 
 def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
     """Take over what was lost, or left, at this action before, to cancel it first."""
-    for handle in domain.take_lost((endpoint.name, endpoint.action_type)):
+    for handle in domain.lost.pop((endpoint.name, endpoint.action_type), []):
         saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at
         if handle.reporter is not endpoint.reporter and not saw_it:
             first = handle.not_gone_before == NEVER  # a later node need only have discovered

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from bt_actions.goals.ids import Author, author_of
+from bt_actions.goals.ids import author_of
 from bt_actions.traffic.host import Log
 
 TOLD_AT_MOST = 10
@@ -26,16 +26,10 @@ class Predecessors:
         """Take the ids of all goals that a status shows running, but our own."""
         if len(self._told) >= TOLD_AT_MOST:
             return
-        dead: dict[Author, bool] = {}
-        for goal_id in running:
-            if goal_id in self._told:
-                continue
-            author = author_of(goal_id)
-            if author is None or not author.here:
-                continue
-            if author not in dead:  # to ask reads a file
-                dead[author] = not author.alive
-            if dead[author] and len(self._told) < TOLD_AT_MOST:
+        authors = {each: author_of(each) for each in running if each not in self._told}
+        dead = {each for each in {*authors.values()} if each and not each.alive}  # reads a file
+        for goal_id, author in authors.items():
+            if author in dead and len(self._told) < TOLD_AT_MOST:
                 self._told.add(goal_id)
                 self._log.warning(
                     f"{self._action}: a goal of process {author.pid}, which is dead, still runs "

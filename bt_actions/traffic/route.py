@@ -17,7 +17,7 @@ from bt_actions.servers.stalls import ANSWERS_TAKE
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
-from bt_actions.traffic.transport import ActionTransport, Listener, Opener
+from bt_actions.traffic.transport import ActionTransport, Opener
 
 LAST_WORD = 0.5
 """Seconds within which a server that is not busy answers."""
@@ -35,23 +35,21 @@ ON_TRIAL = 0
 class Route:
     """How one endpoint reaches its server (a transport.Seeker)."""
 
-    def __init__(self, endpoint: Endpoint, listener: Listener, host: Host, domain: Domain) -> None:
-        self._endpoint, self._listener = endpoint, listener
-        self._host, self._domain = host, domain
+    def __init__(self, endpoint: Endpoint, host: Host, domain: Domain) -> None:
+        self._endpoint, self._host, self._domain = endpoint, host, domain
         self.elsewhere = False
         """The transport is not in our node's participant: nobody spins it."""
         self._long_stalls = endpoint.participant.long_stalls
         self._last_question_at = NEVER  # to a server that has answered another transport
 
     def holds_back(self, now: float) -> bool:
-        """Whether nothing is sent though a server is in sight: it may not be heard, or be two."""
-        return self.in_doubt(now) > 0.0 or self._discovers(now)
+        """Whether nothing is sent though a server is in sight: it may not be heard, or be two.
 
-    def _discovers(self, now: float) -> bool:
-        """Whether a second server may be there that a new participant has not discovered yet.
-
-        The first one may be the wrong one, or both may move.
+        Of two, a new participant may not have discovered the second yet. The first one may be the
+        wrong one, or both may move.
         """
+        if self.in_doubt(now) > 0.0:
+            return True
         seen_since = self._endpoint.transport.seen_since
         came_at = max(seen_since, self._endpoint.in_sight_since)
         is_new = came_at - seen_since < TOO_NEW and now - came_at < DISCOVERS
@@ -127,7 +125,7 @@ class Route:
     def try_in(self, participant: Opener) -> ActionTransport:
         """Return a transport like our own in another participant, on trial."""
         endpoint, now = self._endpoint, self._host.steady()
-        transport = participant.open_transport(endpoint.action_type, endpoint.name, self._listener)
+        transport = participant.open_transport(endpoint.action_type, endpoint.name, endpoint)
         transport.on_trial = True
         if not self._is_absent(now):
             endpoint.transport.reachability.tried(now)
@@ -182,7 +180,7 @@ class Route:
         for handle in list(endpoint.goals.values()):
             if handle.replies.sent_to & seen:  # it may be shown later than another of its name
                 handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
-            handle.goal.suspend_deadlines(ANSWERS_TAKE, endpoint.participant.now())
+            handle.goal.deadlines.suspend(ANSWERS_TAKE, endpoint.participant.now())
             endpoint.tell(handle, Event.SERVER_CHANGED)
 
     def fall_back(self) -> bool:
@@ -192,7 +190,7 @@ class Route:
             return endpoint.participant.alive()  # the next look may see more
         action_type, name = endpoint.action_type, endpoint.name
         try:
-            transport = endpoint.participant.open_transport(action_type, name, self._listener)
+            transport = endpoint.participant.open_transport(action_type, name, endpoint)
         except Exception:  # noqa: BLE001 - or it is gone by now, too
             return False
         self.elsewhere = False

@@ -22,10 +22,9 @@ from bt_actions.goals.terms import Event, Now, State
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
 from bt_actions.traffic.admission import Admission
-from bt_actions.traffic.begun import begun_in
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Change, GoalHandle, Observer
+from bt_actions.traffic.handle import Change, Endpoint, GoalHandle, Observer, begun_in
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.transport import Participant
 from bt_actions.utilities.plain_text import in_words, raised
@@ -41,6 +40,7 @@ class Traffic:
         self._domain = host.domain(participant.domain)
         self._endpoints: dict[str, ActionEndpoint] = {}
         self._admission = Admission(host, self._domain, self._endpoints, self._open_to)
+        self.why_not = self._admission.why_not
         self._observers: list[Observer] = []
 
     def now(self) -> Now:
@@ -70,14 +70,7 @@ class Traffic:
     def _open_to(self, action_type: Any, name: str) -> ActionEndpoint:
         """Return a new endpoint to an action, with no user yet."""
         endpoint = self._endpoints[name] = ActionEndpoint(
-            self.host,
-            self.participant,
-            self._domain,
-            self,
-            action_type,
-            name,
-            unused=self._drop_if_unused,
-            why_not=self._admission.why_not,
+            self.host, self.participant, self._domain, self, action_type, name
         )
         handover.adopt(endpoint, self.host, self._domain)
         return endpoint
@@ -88,9 +81,9 @@ class Traffic:
             endpoint.users -= 1
             if endpoint.users <= 0:
                 handover.park(endpoint, self.host, self._domain)
-            self._drop_if_unused(endpoint)
+            self.drop_if_unused(endpoint)
 
-    def _drop_if_unused(self, endpoint: ActionEndpoint) -> None:
+    def drop_if_unused(self, endpoint: Endpoint) -> None:
         """Close the transport of an endpoint that has no user and no open goal.
 
         Not before it has delivered all: a second server may have taken the last goal, too.

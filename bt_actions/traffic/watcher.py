@@ -64,7 +64,7 @@ class Watcher:
             if not all(handle.accounted_for for handle in endpoint.goals.values()):
                 wait = min(wait, DELIVER_EVERY)
         for handle in list(endpoint.goals.values()):
-            endpoint.apply_deadlines_guarded(handle)
+            endpoint.apply_deadlines(handle)
             due = handle.goal.due_in(endpoint.participant.now())
             if due is not None and handle.paused_at is None:
                 wait = min(wait, due)

@@ -34,7 +34,7 @@ def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> 
     """One whose server has gone."""
     goal = Goal(b"1" * 16, "/move", LIMITS, Now(0.0, 0.0))
     goal.outcome, goal.end, goal.state = Outcome.SERVER_LOST, end, state
-    nothing = dict.fromkeys(("deliver_arrived", "apply_deadlines_guarded"), lambda *_: None)
+    nothing = dict.fromkeys(("deliver_arrived", "apply_deadlines"), lambda *_: None)
     endpoint: Any = Endpoint(
         in_doubt=lambda _: 0.0, is_parents=False, cancels=Cancels(), tell=tell, **nothing
     )
