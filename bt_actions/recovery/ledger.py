@@ -66,8 +66,9 @@ class Ledger(Record):
 
     def __init__(self, complain: Callable[[str], None]) -> None:
         self._complain = complain
-        self._complained = self._tidied = False
-        self._paths: dict[bytes, Path] = {}
+        self._complained = False
+        self._home: Path | None = None
+        self._paths: dict[bytes, str] = {}
 
     def __contains__(self, goal_id: bytes) -> bool:
         """Whether a goal is on record."""
@@ -88,13 +89,17 @@ class Ledger(Record):
         `accept`: the seconds that its server is given to decide.
         """
         known = frozenset(servers if len(servers) <= SERVERS_AT_MOST else ())
+        entry = action, domain, known, min(accept or 0.0, KEPT_FOR), lost
         try:
-            home = directory()
-            if not self._tidied:
-                self._tidied = True
-                _tidy(home)
-            path = self._paths[goal_id] = home / (goal_id.hex() + _SUFFIX)
-            _write(path, action, domain, known, min(accept or 0.0, KEPT_FOR), lost, os.O_CREAT)
+            if self._home is None:
+                self._home = directory()
+                _tidy(self._home)
+            path = self._paths[goal_id] = f"{self._home}/{goal_id.hex()}{_SUFFIX}"
+            try:
+                _write(path, *entry, os.O_CREAT)
+            except FileNotFoundError:  # who logs out may have all of /dev/shm removed
+                directory()
+                _write(path, *entry, os.O_CREAT)
         except OSError as error:
             if not self._complained:
                 self._complained = True
@@ -108,7 +113,7 @@ class Ledger(Record):
         path = self._paths.pop(goal_id, None)
         if path is not None:
             with contextlib.suppress(OSError):
-                path.unlink()
+                os.unlink(path)  # noqa: PTH108 - a Path takes four times as long
 
     def disown(self) -> None:
         """Let go of all, as the child of a fork: it is the parent's."""
@@ -188,7 +193,7 @@ def _author(path: Path) -> Author | None:
 
 
 def _write(
-    path: Path,
+    path: str | Path,
     action: str,
     domain: int,
     servers: Iterable[bytes],
