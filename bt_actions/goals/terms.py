@@ -25,6 +25,8 @@ class Now(NamedTuple):
 class State(Enum):
     """Where a goal is in its life."""
 
+    __hash__ = object.__hash__  # Enum has one in Python, which is asked often
+
     QUEUED = "It waits for its resources."
     WAITING_FOR_SERVER = "It holds its resources, and waits for a server to send to."
     SENDING = "The request is out, and not answered."
@@ -71,6 +73,8 @@ MAY_TURN_UP = frozenset(
 class Command(Enum):
     """What the caller must do next."""
 
+    __hash__ = object.__hash__  # Enum has one in Python, which is asked often
+
     RELEASE = "give the resources back, or leave the queue for them"
     SEND = "send the goal request"
     ASK_RESULT = "ask for the result; asking twice does no harm"
@@ -79,6 +83,8 @@ class Command(Enum):
 
 class Event(Enum):
     """What can happen to a goal. The comment names the detail that comes with it."""
+
+    __hash__ = object.__hash__  # Enum has one in Python, which is asked often
 
     GRANTED = "the resources are ours"
     TAKEN = "the resources are taken, and waiting is not wanted"

@@ -21,6 +21,8 @@ from bt_actions.traffic.handle import GoalHandle
 class Do(Enum):
     """What is done beside the goal's commands."""
 
+    __hash__ = object.__hash__
+
     NOTE = "report that it has changed"
     WAKE_WAITING = "wake those whose goals may have waited for this"
     RECORD = "put what more is known of it on record, if it is there"

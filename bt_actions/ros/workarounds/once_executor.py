@@ -5,9 +5,10 @@ holds the interpreter's lock, until a thread has begun with it; the pool's threa
 Measured, with /clock at 100 Hz: 7,000 hand-overs a second, 2,000 of them queued at a time, and all
 Python threads of the process still for 0.2 s again and again. Here whoever spins waits for the pool
 instead. What is called, in which order and on how many threads is as it was: rclpy's looks at
-nothing new either while work waits for a thread. What says that it never waits, as our transports
-do, is run on the thread that spins: that saves a hand-over and a wait set for each message. The
-bug is rclpy #1452, mended by rclpy #1547: not needed any more with a release that has that.
+nothing new either while work waits for a thread. What delivers by itself, as our transports do, and
+never waits, does so on the thread that spins: that saves a hand-over and two wait sets for each
+message. The bug is rclpy #1452, mended by rclpy #1547: not needed any more with a release that has
+that.
 """
 
 from __future__ import annotations
@@ -40,15 +41,17 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
         """Take no more work, and wait for what is there."""
         self._pool.shutdown()
 
+    def _make_handler(self, entity: Any, *args: Any) -> Any:
+        """Make the task that serves what is ready; None: it has been served."""
+        if not hasattr(entity, "deliver_arrived"):
+            return super()._make_handler(entity, *args)
+        entity.deliver_arrived()
+        return None
+
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
         """Return what is to be run next, as rclpy's does; TimeoutException: nothing, as yet."""
         ready = super().wait_for_ready_callbacks(*args, **options)
-        task, entity, _ = ready
-        if self._pool.holds(task):
-            raise TimeoutException
-        if getattr(entity, "never_waits", False):
-            task()
-            task.result()
+        if ready[0] is None or self._pool.holds(ready[0]):
             raise TimeoutException
         return ready
 
