@@ -5,10 +5,9 @@ holds the interpreter's lock, until a thread has begun with it; the pool's threa
 Measured, with /clock at 100 Hz: 7,000 hand-overs a second, 2,000 of them queued at a time, and all
 Python threads of the process still for 0.2 s again and again. Here whoever spins waits for the pool
 instead. What is called, in which order and on how many threads is as it was: rclpy's looks at
-nothing new either while work waits for a thread. What delivers by itself, as our transports do, and
-never waits, does so on the thread that spins: that saves a hand-over and two wait sets for each
-message. The bug is rclpy #1452, mended by rclpy #1547: not needed any more with a release that has
-that.
+nothing new either while work waits for a thread. What says that it never waits, as our transports
+do, is served on the thread that spins: that saves a hand-over and two wait sets for each message.
+The bug is rclpy #1452, mended by rclpy #1547: not needed any more with a release that has that.
 """
 
 from __future__ import annotations
@@ -43,9 +42,9 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
 
     def _make_handler(self, entity: Any, *args: Any) -> Any:
         """Make the task that serves what is ready; None: it has been served."""
-        if not hasattr(entity, "deliver_arrived"):
+        if not getattr(entity, "never_waits", False):
             return super()._make_handler(entity, *args)
-        entity.deliver_arrived()
+        entity.take_data()
         return None
 
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:

@@ -103,16 +103,15 @@ class OneWaitable(Waitable):  # type: ignore[misc]  # rclpy is not typed
         self._ready.update(dict.fromkeys(ready))
         return bool(ready)
 
-    def take_data(self) -> list[Taking]:
-        """Take all that has arrived; return from whom."""
+    def take_data(self) -> None:
+        """Take all that has arrived, and deliver it."""
         ready = []
         while self._ready:
             ready.append(self._ready.popitem()[0])
             ready[-1].take_data()
-        return ready
-
-    async def execute(self, ready: list[Taking]) -> None:
-        """Deliver it."""
         with host.lock:
             for each in ready:
                 each.deliver()
+
+    async def execute(self, taken: None) -> None:
+        """Nothing is left to do."""
