@@ -89,7 +89,6 @@ From `bt_actions.testing`; how they are used stands in [testing.md](testing.md).
 BY_PY_TREES = {"setup", "initialise", "update", "terminate", "shutdown"}
 BY_OURSELVES = {
     "ActionBehaviour.due_in",
-    "ActionBehaviour.file_interrupted",
     "ActionBehaviour.open_handles",
     "Retry.pause",
     "TreeRunner.catch_up",

@@ -59,7 +59,7 @@ class ActionBehaviour(Behaviour):
     """
 
     __slots__ = ("_attempts", "_backend", "_endpoint", "_handle", "_left_behind", "_outcome",
-                 "_reading", "_shown_feedback", "_started", "_tree_closed")  # fmt: skip
+                 "_reading", "_shown_feedback", "_started")  # fmt: skip
 
     def __init__(
         self,
@@ -96,7 +96,6 @@ class ActionBehaviour(Behaviour):
         self._handle: GoalHandle | None = None
         self._left_behind: list[GoalHandle] = []
         self._attempts = Attempts(self.retry, self._reading.when)
-        self._tree_closed = False
         self._started = 0.0
         self._outcome: Outcome | None = None
 
@@ -232,16 +231,17 @@ class ActionBehaviour(Behaviour):
 
     def terminate(self, new_status: Status) -> None:
         """Let go at once of a goal that is still open; it is canceled and drained."""
-        handle = self._handle
-        if self._backend is None or handle is None:
+        handle, backend = self._handle, self._backend
+        if backend is None or handle is None:
             return
-        if self._filed(handle):
-            if self._outcome is None and self.history:
-                self._outcome = self.history[-1].outcome  # stopped in the pause before a retry
-            return
-        if new_status is Status.INVALID or handle.goal.outcome is None:
-            self._backend.traffic.interrupt(handle)
-            self.file_interrupted()
+        if not self._filed(handle):
+            backend.traffic.interrupt(handle)
+            outcome, reason = handle.goal.outcome, handle.goal.reason
+            if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
+                outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
+            self.history.append(self._record(handle.goal, outcome, reason, backend))
+            self.feedback_message = f"{outcome}: {reason}"
+        self._outcome = self.history[-1].outcome  # also where it stops in the pause before a retry
 
     def shutdown(self) -> None:
         """Cancel all live goals of the whole tree, wait for their ends, and let go of the client.
@@ -251,15 +251,14 @@ class ActionBehaviour(Behaviour):
         """
         if self._backend is None:
             return
-        if not self._tree_closed:
-            tree = root_of(self).iterate()
-            leaves = [leaf for leaf in tree if isinstance(leaf, ActionBehaviour)]
-            live = [handle for leaf in leaves for handle in leaf.open_handles()]
-            self._backend.traffic.drain(live)
-            for leaf in leaves:
-                leaf.file_interrupted()
-                leaf._tree_closed = True  # noqa: SLF001 - of our own kind
-        self._leave_endpoint()
+        traffic = self._backend.traffic
+        tree = root_of(self).iterate()
+        leaves = [leaf for leaf in tree if isinstance(leaf, ActionBehaviour)]
+        for leaf in leaves:
+            ActionBehaviour.terminate(leaf, Status.INVALID)
+        traffic.drain([handle for leaf in leaves for handle in leaf.open_handles()])
+        for leaf in leaves:
+            leaf._leave_endpoint()  # noqa: SLF001 - of our own kind
 
     def open_handles(self) -> list[GoalHandle]:
         """Return the goals of this leaf that are not over, left behind ones too.
@@ -270,18 +269,6 @@ class ActionBehaviour(Behaviour):
         if self._endpoint is not None:
             handles += [handle for handle in self._endpoint.goals_of(self) if handle not in handles]
         return [handle for handle in handles if not handle.is_over]
-
-    def file_interrupted(self) -> None:
-        """Record that the visit ended before its outcome: its goal was canceled, or is drained."""
-        handle = self._handle
-        if self._backend is None or handle is None or self._filed(handle):
-            return
-        outcome, reason = handle.goal.outcome, handle.goal.reason
-        if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
-            outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
-        self.history.append(self._record(handle.goal, outcome, reason, self._backend))
-        self._outcome = outcome
-        self.feedback_message = f"{outcome}: {reason}"
 
     # What a leaf for actions of one type may know better
 
@@ -310,7 +297,6 @@ class ActionBehaviour(Behaviour):
         return self._backend
 
     def _begin(self, backend: Backend) -> GoalHandle:
-        self._tree_closed = False
         self._left_behind = self.open_handles()
         self._started = backend.clock.now().ros
         self._handle = backend.traffic.begin(
