@@ -43,15 +43,11 @@ class LeftBehind:
         """Whether nobody runs it, nor will."""
         return self.end is not End.UNKNOWN or bool(self.nothing_left)
 
-    def is_nowhere(self, why: str) -> None:
-        """No server has it, nor will."""
-        self.awaited, self.nothing_left = False, why
-
     def judge(self, *, known: bool, gone: bool) -> None:
         """See whether to await it: all that its servers run may be `known`, or they are `gone`."""
         if self.nothing_left == GONE and not gone:  # one is in sight after all
             self.awaited, self.nothing_left = True, ""
         if self.awaited and self.denials.lasted >= self.takes:
-            self.is_nowhere(f"denied for {self.takes:g} s")
+            self.awaited, self.nothing_left = False, f"denied for {self.takes:g} s"
         elif self.awaited and known and gone:
-            self.is_nowhere(GONE)
+            self.awaited, self.nothing_left = False, GONE

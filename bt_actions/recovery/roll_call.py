@@ -56,7 +56,7 @@ class Answers:
             return False
         self._count[number] += 1
         at, of = self._asked[number]
-        if self._count[number] != max(1, len(of)) or (self._last and at <= self._last[0]):
+        if self._count[number] != len(of) or (self._last and at <= self._last[0]):
             return False
         if self._last is None or self._last[1] != of:
             self.lasted = 0.0
@@ -72,9 +72,7 @@ class RollCall:
     def __init__(self) -> None:
         self.servers: frozenset[bytes] = frozenset()
         """All that were ever in sight."""
-        self.sighted = False
-        """Whether anything of a server was."""
-        self._settled: frozenset[bytes] | None = None  # those that had the time; None: nobody had
+        self._settled: frozenset[bytes] = frozenset()  # those that had the time
         self._settle = SETTLE
         self._answers = Answers()
         self._asked_at = 0.0  # last; 0: not since one came in sight
@@ -83,20 +81,19 @@ class RollCall:
 
     def begin(self) -> None:
         """Go on in a new participant, which has nothing in sight yet."""
-        if self.sighted and not self.known:
+        if self.servers and not self.known:
             self._settle = SETTLE_AFTER_SILENCE
         self._shown: frozenset[bytes] = frozenset()
-        self._in_sight = False
 
     @property
     def known(self) -> bool:
         """Whether every server that was ever in sight has had the time to tell what it runs."""
-        return self._settled is not None and self.servers <= self._settled
+        return bool(self.servers) and self.servers <= self._settled
 
     @property
     def trouble(self) -> str:
         """Why it is not `known`; the action's name, or several, belong in the braces."""
-        if not self._in_sight or self._asked_at - self._heard_at > LATE:
+        if not self._shown or self._asked_at - self._heard_at > LATE:
             return "no server of {} answers"
         if self._gone:
             return "a server of {} went away meanwhile"
@@ -104,26 +101,23 @@ class RollCall:
 
     @property
     def _gone(self) -> frozenset[bytes]:
-        return self.servers - (self._settled or frozenset()) - self._shown
+        return self.servers - self._settled - self._shown
 
     def overdue(self, now: float) -> bool:
         """Whether it is neither known nor on the way to it."""
-        return not self.known and (not self._in_sight or now - self._complete_at >= SETTLE)
+        return not self.known and (not self._shown or now - self._complete_at >= SETTLE)
 
-    def sees(self, shown: frozenset[bytes], now: float, *, published: bool = False) -> None:
-        """Take what is in sight now; a status may be `published` where no server is shown yet."""
-        in_sight = bool(shown) or published
-        if shown - self.servers or (in_sight and not self._in_sight):
+    def sees(self, shown: frozenset[bytes], now: float) -> None:
+        """Take what is in sight now."""
+        if shown - self.servers or (shown and not self._shown):
             self._answers.begin()
             self._asked_at, self._complete_at = 0.0, now
         self.servers |= shown
-        self.sighted |= in_sight
         self._shown = shown
-        self._in_sight = in_sight
 
     def due(self, now: float) -> bool:
         """Whether to ask the next question now."""
-        return self._in_sight and now - self._asked_at >= ASK_AGAIN
+        return bool(self._shown) and now - self._asked_at >= ASK_AGAIN
 
     def asked(self, number: int, now: float) -> None:
         """The question of this number was asked."""
@@ -140,4 +134,4 @@ class RollCall:
         if now - self._asked_at <= LATE and self._answers.answered(number) and not self._gone:
             self._complete_at = now
             if self._answers.lasted >= self._settle:
-                self._settled = (self._settled or frozenset()) | self._shown
+                self._settled |= self._shown

@@ -93,12 +93,8 @@ def cleanup(
     be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
     with a new one, twice at most.
 
-    Raises CannotStart, if nothing has been looked at yet; ValueError for a `look`, a `patience` or
-    an `accept` that is negative or no number, and for a name in `wanted` that is none.
+    Raises CannotStart, if nothing has been looked at yet.
     """
-    if not (look >= 0.0 and patience >= 0.0 and accept >= 0.0):
-        given = f"look {look}, patience {patience}, accept {accept}"
-        raise ValueError(f"{given}: seconds are 0 or more")
     sweep = _Sweep(look, patience, accept, found, waits, stopped)
     for tries_before in range(3):
         still = Stalls()
@@ -138,7 +134,7 @@ class _Sweep:
         self._trouble: OSError | None = None
 
     def begin(self, sight: Onlooker, wanted: Collection[str] | None) -> None:
-        """Go on with what is seen here. Raises ValueError for a name that is none."""
+        """Go on with what is seen here."""
         self._sight = sight
         self._wanted = None if wanted is None else {sight.full_name(name) for name in wanted}
         self._views: dict[str, ActionView] = {}
@@ -177,7 +173,7 @@ class _Sweep:
             if overdue and now >= until and not self._has_waited:
                 self._has_waited = True
                 self._waits(overdue)
-            silent = any(self._calls[name].sighted for name in overdue)
+            silent = any(self._calls[name].servers for name in overdue)
             if silent and breaks_off and now >= min(until, began + LOOK_AGAIN):
                 return False  # it may not hear this participant
             time.sleep(TURN)
@@ -194,7 +190,7 @@ class _Sweep:
             unknown={
                 name: call.trouble
                 for name, call in calls
-                if not call.known and (call.sighted or name in lacks)
+                if not call.known and (call.servers or name in lacks)
             },
             domain=self._sight.domain,
             trouble=self._trouble,
@@ -214,7 +210,7 @@ class _Sweep:
             if left is None:
                 continue
             if left.awaited:
-                if was_looked_for and not self._calls[sent.action].sighted:
+                if was_looked_for and not self._calls[sent.action].servers:
                     mark_lost([sent])
             elif left.nothing_left == GONE:
                 mark_lost([sent])
@@ -227,7 +223,7 @@ class _Sweep:
         return [
             action
             for action, call in sorted(self._calls.items())
-            if not call.known and (action in required or (self._wanted is None and call.sighted))
+            if not call.known and (action in required or (self._wanted is None and call.servers))
         ]
 
     @property
@@ -239,7 +235,7 @@ class _Sweep:
         """Whether a goal may turn up yet at a server in sight."""
         return any(
             left.awaited
-            and self._calls[left.action].sighted
+            and self._calls[left.action].servers
             and now < self._deadline + left.takes + AWAIT_LONGER
             for left in self._left.values()
         )
@@ -247,13 +243,10 @@ class _Sweep:
     def _turn(self, still: Stalls) -> None:
         """Take all that has come in, then look around, and ask."""
         for action, view in self._views.items():
-            self._hear(action, view)
-            for message in view.statuses():  # there may be many, each of thousands of goals
+            self._hear(action, view)  # first: what was told before an answer is read
+            for message in view.statuses():
                 self._read(action, message)
-                self._hear(action, view)
-                still.lives(time.monotonic())
-                if self._stopped():
-                    return
+                still.lives(time.monotonic())  # there may be many, each of thousands of goals
         now = time.monotonic()
         if now - self._glanced_at >= GLANCE:
             self._glanced_at = now
@@ -270,14 +263,10 @@ class _Sweep:
         for number, code in view.answers():
             self._calls[action].answered(number, time.monotonic())
             left = self._questions.get((action, number))
-            if left is None:
-                continue
-            if code not in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
-                self._turns_up(left)
-            elif code == CANCEL_TERMINATED and len(self._calls[action].servers) <= 1:
-                left.is_nowhere("has ended")
-            else:
+            if left is not None and code in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
                 left.denials.answered(number)
+            elif left is not None:
+                self._turns_up(left)
 
     def _glance(self, now: float) -> None:
         """See which actions are in sight, and how many servers each has."""
@@ -285,7 +274,7 @@ class _Sweep:
             if action not in self._views:
                 self._views[action] = self._sight.view(action)
         for action, view in self._views.items():
-            self._calls[action].sees(view.servers(), now, published=view.is_published())
+            self._calls[action].sees(view.servers(), now)
 
     def _read(self, action: str, message: Any) -> None:
         one_server = len(self._calls[action].servers) <= 1  # or else another may run what has ended

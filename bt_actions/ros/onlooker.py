@@ -54,10 +54,6 @@ class ActionView:
         """Return the GIDs of the servers that are shown."""
         return servers(self._node, self._action)
 
-    def is_published(self) -> bool:
-        """Whether a status is; where it is not, there are mere clients."""
-        return bool(self._node.count_publishers(self._action + STATUS))
-
     def statuses(self) -> Iterator[Any]:
         """Take the statuses that have come in."""
         handle = self._status.handle
@@ -99,11 +95,8 @@ class Onlooker:
         self.domain = int(node.context.get_domain_id())
 
     def full_name(self, name: str) -> str:
-        """Return the name as a run means it. Raises ValueError where it is none."""
-        try:
-            return str(self._node.resolve_topic_name(name, only_expand=True))
-        except RuntimeError as error:  # rclpy's RCLError
-            raise ValueError(str(error)) from error
+        """Return the name as a run means it."""
+        return str(self._node.resolve_topic_name(name, only_expand=True))
 
     def actions(self) -> list[str]:
         """Return the names of the actions that anybody serves, or is a client of."""

@@ -97,7 +97,7 @@ class Row:
         elif not is_latest:
             return  # an older goal, on its way to its end
         if event.outcome is not None and self.outcome is None:
-            self.duration = self.lasts(event.time)
+            self.duration = self.seconds(event.time)
         self.state, self.outcome, self.end = event.state, event.outcome, event.end
         self.reason = event.reason
 
@@ -112,11 +112,14 @@ class Row:
     def leave(self, now: float) -> None:
         """Its goals are waited for no longer: how they end is not known."""
         if self.outcome is None:
-            self.outcome, self.duration = Outcome.CANCELED, self.lasts(now)
+            self.duration = self.seconds(now)
+            self.outcome = Outcome.CANCELED
         self.end = End.UNKNOWN
 
-    def lasts(self, now: float) -> float:
-        """Return the seconds of all visits, where the latest is not over."""
+    def seconds(self, now: float) -> float:
+        """Return how long it took so far, a visit that is not over included."""
+        if self.outcome is not None:
+            return self.duration
         return self.counted + max(0.0, now - self.begun)
 
     def _begin(self, event: GoalChanged) -> None:
@@ -152,7 +155,6 @@ class Report:
     """The time of the latest event."""
     unaccounted: list[str] = field(default_factory=list)
     """One line for each goal whose end is not known, now that the run is over."""
-    _begun: float | None = None
     _rows: dict[UUID, Row] = field(default_factory=dict)
     _changes: dict[UUID, NodeChanged] = field(default_factory=dict)  # of each node the latest
     _warnings: dict[UUID, Culprit] = field(default_factory=dict)
@@ -163,7 +165,6 @@ class Report:
         self.started = self.started or event.time  # a tree that cannot be set up never starts
         if isinstance(event, TreeStarted):
             self.started = event.time
-            self._begun = time.monotonic()
         elif isinstance(event, NodeChanged):
             self._changes[event.node.id] = event
             warning = str(getattr(event.node, "warning", ""))
@@ -189,7 +190,7 @@ class Report:
 
     def elapsed(self) -> float:
         """Return the seconds since the tree started, between events too."""
-        return 0.0 if self._begun is None else time.monotonic() - self._begun
+        return time.monotonic() - self.started if self.started else 0.0
 
     @property
     def rows(self) -> list[Row]:
@@ -210,10 +211,6 @@ class Report:
     def decided(self) -> bool:
         """Whether the tree has come to its end, be it that goals of it have not."""
         return self.status_of(self.root) in (Status.SUCCESS, Status.FAILURE)
-
-    def seconds(self, row: Row) -> float:
-        """Return how long `row` took so far, a visit that is not over included."""
-        return row.lasts(self.now) if row.outcome is None else row.duration
 
     def status_of(self, node: Behaviour) -> Status:
         """Return the status that `node` was last seen with."""

@@ -153,6 +153,6 @@ def _action(report: Report, row: Row) -> ActionOutcome:
         0 if row.outcome is None else OUTCOMES[row.outcome],
         ENDS[End.UNKNOWN if row.end is None else row.end],
         row.reason,
-        report.seconds(row),
+        row.seconds(report.now),
         row.place,
     )

@@ -198,7 +198,7 @@ def test_a_goal_whose_server_is_gone_is_accounted_for(leaf: FakeAction, story: S
 
 def test_an_action_that_runs_has_a_duration_too(leaf: FakeAction, story: Story) -> None:
     report = told(leaf, story.start(), story.goal(leaf, "EXECUTING"), story.goal(leaf, "CANCELING"))
-    assert report.seconds(report.rows[0]) == pytest.approx(1.0)
+    assert report.rows[0].seconds(report.now) == pytest.approx(1.0)
 
 
 def test_the_leaf_s_own_judgement_wins_over_the_server_s(leaf: FakeAction, story: Story) -> None:

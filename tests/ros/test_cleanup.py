@@ -121,25 +121,6 @@ def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
     assert [goal.goal_id.hex() for goal in swept.left] == [left]
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"look": float("nan")},
-        {"look": -1.0},
-        {"patience": float("nan")},
-        {"patience": -1.0},
-        {"wanted": ["no name"]},
-        {"wanted": ["/a//b"]},
-    ],
-    ids=str,
-)
-def test_what_is_no_time_and_what_is_no_name_is_refused(
-    wrong: dict[str, Any], domain: int, no_leaks: None
-) -> None:
-    with pytest.raises(ValueError, match=r"seconds are|topic name"):
-        cleanup(**{"look": 0.0, "patience": 0.0, **wrong})
-
-
 def test_a_domain_that_is_none_is_refused(
     domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

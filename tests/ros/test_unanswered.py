@@ -183,6 +183,6 @@ def test_what_one_of_two_servers_shows_stays_on_record(
     over._sent[b"goal"], over._left[b"goal"] = sent, left
     over._keep_record()
     assert struck == ([sent] if len(servers) == 1 else [])
-    left.is_nowhere("denied for 30 s")
+    left.nothing_left = "denied for 30 s"
     over._keep_record()
     assert struck[-1:] == [sent]

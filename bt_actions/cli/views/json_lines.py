@@ -145,7 +145,7 @@ class JsonView:
             "outcome": row.outcome,
             "end": row.end,
             "reason": row.reason,
-            "duration": round(self._report.seconds(row), 3),
+            "duration": round(row.seconds(self._report.now), 3),
             "place": row.place or None,
         }
 

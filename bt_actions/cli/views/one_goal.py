@@ -62,7 +62,7 @@ class GoalView:
         for row in self._report.rows:
             if closing.cause and row.outcome is Outcome.CANCELED:
                 row.reason = closing.cause  # here is no tree that could have interrupted it
-            self._line(f"{goal_text(row)}, after {self._report.seconds(row):.2f} s")
+            self._line(f"{goal_text(row)}, after {row.seconds(self._report.now):.2f} s")
         if closing.error:
             self._line(closing.error)
         if self._report.servers_gone:
