@@ -106,6 +106,8 @@ class RunGoals:
 
     def tell(self, now: float) -> None:
         """Tell what was noted, and forget what is over."""
+        if not self._changes:
+            return
         while self._changes:
             change = self._changes.popleft()
             handle = change.handle
@@ -122,5 +124,5 @@ class RunGoals:
                         handle.goal.id.hex(),
                     )
                 )
-            for done in [each for each in list(self._handles) if each.is_over]:
-                del self._handles[done]
+        for done in [each for each in list(self._handles) if each.is_over]:
+            del self._handles[done]

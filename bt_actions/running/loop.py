@@ -15,7 +15,6 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Duration, Status
-from py_trees.composites import Composite
 from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
@@ -79,10 +78,9 @@ class TickLoop:
         self._observers: list[Observer] = []
         self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.watch())
         self.watchdog = Watchdog(self._traffic, self.goals)
-        self._set_up = weakref.WeakSet[Behaviour]()
-        self._children: list[
-            tuple[Behaviour, list[Behaviour]]
-        ] = []  # as they were found, root last
+        self._nodes = set[Behaviour]()  # of the tree, and set up
+        self._left = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
+        self._with_children: list[tuple[Behaviour, list[Behaviour]]] = []  # as found, root last
         self._doing = "setup"
         self._stop_wanted = self.abandoned = self._pause_wanted = self._paused = False
         self._timeout: float | None = None
@@ -186,34 +184,39 @@ class TickLoop:
 
     def _set_up_missing(self) -> None:
         """Set up what was not yet: the tree, in the first run, or what is new in it."""
-        tree, done, found = self.tree, self._set_up, self._children
-        same_root = found and found[-1][0] is tree.root
-        if same_root and all(node.children == children for node, children in found):
-            return  # asked at each tick: about 10 ns a behaviour
-        by_itself = type(tree).setup is not BehaviourTree.setup and not done
-        while new := [each for each in tree.root.iterate() if each not in done]:
+        tree = self.tree
+        by_itself = type(tree).setup is not BehaviourTree.setup and not self._nodes
+        while not self._is_as_found():
+            nodes = list(tree.root.iterate())
             self._doing = "setup"
+            children = [
+                (node, list(node.children))
+                for node in nodes
+                if node.children or hasattr(node, "add_child") or node is tree.root
+            ]
             if by_itself:
                 tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
-            for behaviour in new:
+            done = self._nodes | set(self._left)
+            for node in [each for each in nodes if each not in done]:
                 if not by_itself:
-                    behaviour.setup(node=self._node)
-                done.add(behaviour)
-            by_itself = False
-        self._doing = "tick"
-        nodes = list(tree.root.iterate())
-        self._visitor.forget_others(set(nodes))
-        self._children = [
-            (node, list(node.children))
-            for node in nodes
-            if node.children or isinstance(node, Composite) or node is tree.root
-        ]
+                    node.setup(node=self._node)
+                self._nodes.add(node)
+            by_itself, now = False, set(nodes)
+            self._left.update(self._nodes - now)
+            self._visitor.forget_others(now)
+            self._nodes, self._with_children, self._doing = now, children, "tick"
+
+    def _is_as_found(self) -> bool:
+        """Whether the tree is as it was set up; takes about 10 ns a behaviour."""
+        found = self._with_children
+        same_root = bool(found) and found[-1][0] is self.tree.root
+        return same_root and all(node.children == children for node, children in found)
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
         try:
             with self.goals.begun_here():
-                self._guarded(lambda: tick_once(self.tree))
+                self._guarded(lambda: tick_once(self.tree, self._visitor))
         except _Abandoned:
             pass
         finally:
@@ -223,15 +226,14 @@ class TickLoop:
         return bool(changed)
 
     def _after_each(self) -> str:
-        if self.watchdog.gives_up():
+        if self.watchdog.ends_at < math.inf and self.watchdog.gives_up():
             raise _Abandoned
         return self._misbehaved()
 
     def _dues(self) -> Iterator[float]:
         """The deadlines that running behaviours have of their own, as seconds from now."""
-        for node in self._visitor.running:
-            due_in = getattr(node, "due_in", None)
-            due = due_in() if callable(due_in) else None
+        for due_in in self._visitor.timed:
+            due = due_in()
             if isinstance(due, int | float):
                 yield max(due, 0.001)
 
@@ -245,11 +247,10 @@ class TickLoop:
     def _guarded(self, step: Callable[[], None]) -> None:
         try:
             step()
+        except Misbehaviour as error:
+            raise TreeError(f"{'/'.join(path_of(error.behaviour))}: {error}") from None
         except Exception as error:
-            culprit = culprit_of(error)
-            where = "/".join(path_of(culprit or self.tree.root))
-            if isinstance(error, Misbehaviour):
-                raise TreeError(f"{where}: {error}") from None
+            where = "/".join(path_of(culprit_of(error) or self.tree.root))
             raise TreeError(f"{where}: {self._doing} raised {raised(error)}") from error
 
     # Its end
@@ -312,7 +313,7 @@ class TickLoop:
 
     def shutdown(self) -> None:
         """Shut the tree down, if it was set up here: else another one may run it."""
-        if not self._set_up:
+        if not self._nodes:
             return
         ours = [each for each in self.tree.root.iterate() if isinstance(each, ActionBehaviour)]
         for shutdown in self.tree.shutdown, *(each.shutdown for each in ours):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -10,7 +10,7 @@ from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
 
-def tick_once(tree: BehaviourTree) -> None:
+def tick_once(tree: BehaviourTree, changes: ChangeVisitor) -> None:
     """Tick as `BehaviourTree.tick` does, which walks the whole tree even for no visitor.
 
     That is most of the time in a large tree of which little runs (docs/performance.md, row 6).
@@ -22,9 +22,7 @@ def tick_once(tree: BehaviourTree) -> None:
         handler(tree)
     for visitor in tree.visitors:
         visitor.initialise()
-    for node in tree.root.tick():
-        for visitor in tree.visitors:
-            node.visit(visitor)
+    changes.follow(tree.root.tick(), [each for each in tree.visitors if each is not changes])
     for visitor in tree.visitors:
         visitor.finalise()
     for handler in tree.post_tick_handlers:
@@ -33,7 +31,11 @@ def tick_once(tree: BehaviourTree) -> None:
 
 
 class Misbehaviour(Exception):
-    """What a behaviour did wrong without raising anything; raised in its `visit`."""
+    """What a behaviour did wrong without raising anything."""
+
+    def __init__(self, behaviour: Behaviour, what: str) -> None:
+        super().__init__(what)
+        self.behaviour = behaviour
 
 
 class ChangeVisitor(VisitorBase):
@@ -49,30 +51,42 @@ class ChangeVisitor(VisitorBase):
         `after_each` is called when a behaviour has ticked, and what it returns is its misbehaviour.
         """
         super().__init__(full=False)
-        self.running: list[Behaviour] = []
+        self._running: list[Behaviour] = []
+        self.timed: list[Callable[[], object]] = []
+        """`due_in` of those that run and have one (ActionBehaviour.due_in)."""
         self._before, self._after_each = before, after_each
         self._visited: list[Behaviour] = []
+        self._visited_before: list[Behaviour] = []
         self._known: dict[Behaviour, Status] = {}
 
     def initialise(self) -> None:
         """Begin a tick (py_trees calls this)."""
-        self._visited = []
+        self._visited_before, self._visited = self._visited, []
         self._before()
 
     def run(self, behaviour: Behaviour) -> None:
-        """Take note of a behaviour that was ticked (py_trees calls this).
+        """Take note of a behaviour that was ticked (py_trees calls this)."""
+        self.follow([behaviour])
+
+    def follow(self, ticked: Iterable[Behaviour], others: Collection[VisitorBase] = ()) -> None:
+        """Take note of each behaviour as it has been ticked, behind the `others`.
 
         Raises Misbehaviour, also where it has no status: py_trees makes INVALID of what is none,
         and goes on with its parent. Nothing else leaves that after a tick.
         """
-        status = behaviour.status
-        if status is Status.INVALID or status.__class__ is not Status:
-            raise Misbehaviour(
-                "no status after its tick; update() has to return RUNNING, SUCCESS or FAILURE"
-            )
-        self._visited.append(behaviour)
-        if wrong := self._after_each():
-            raise Misbehaviour(wrong)
+        after_each, visited = self._after_each, self._visited
+        for behaviour in ticked:
+            for visitor in others:
+                behaviour.visit(visitor)
+            status = behaviour.status
+            if status is Status.INVALID or status.__class__ is not Status:
+                what = (
+                    "no status after its tick; update() has to return RUNNING, SUCCESS or FAILURE"
+                )
+                raise Misbehaviour(behaviour, what)
+            visited.append(behaviour)
+            if wrong := after_each():
+                raise Misbehaviour(behaviour, wrong)
 
     def forget_others(self, tree: set[Behaviour]) -> None:
         """Forget what is in the tree no more, unless its end has still to be told."""
@@ -84,11 +98,17 @@ class ChangeVisitor(VisitorBase):
 
     def finish(self) -> list[tuple[Behaviour, Status]]:
         """Return the changes of a tick, also of one that raised: what it visited and stopped."""
-        visited = self._visited
-        seen = set(visited)
-        stopped = [node for node in self.running if node not in seen]
-        self.running = [node for node in visited if node.status is Status.RUNNING]
-        return self._changes([*stopped, *visited])
+        visited, stopped = self._visited, list[Behaviour]()
+        is_as_before = visited == self._visited_before
+        if not is_as_before:
+            seen = set(visited)
+            stopped = [node for node in self._running if node not in seen]
+        changes = self._changes([*stopped, *visited])
+        if changes or not is_as_before:
+            self._running = [node for node in visited if node.status is Status.RUNNING]
+            dues = [getattr(node, "due_in", None) for node in self._running]
+            self.timed = [due for due in dues if callable(due)]
+        return changes
 
     def stopped(self) -> list[tuple[Behaviour, Status]]:
         """Return the changes of what was last known to run."""

@@ -27,7 +27,8 @@ class Watchdog:
 
     def __init__(self, traffic: Traffic, goals: RunGoals) -> None:
         self._traffic, self._host, self._goals = traffic, traffic.host, goals
-        self._ends_at = math.inf
+        self.ends_at = math.inf
+        """When the run is to end (seconds, steady clock)."""
         self._watches = False
         self._ticks_on: int | None = None
         self.gave_up = False
@@ -35,11 +36,11 @@ class Watchdog:
 
     def begin(self, ends_at: float) -> None:
         """A run begins on this thread, which is to end at `ends_at` (seconds, steady clock)."""
-        self._ticks_on, self._ends_at, self.gave_up = threading.get_ident(), ends_at, False
+        self._ticks_on, self.ends_at, self.gave_up = threading.get_ident(), ends_at, False
 
     def end_by(self, moment: float) -> None:
         """The run is to end by then; safe in a signal handler."""
-        self._ends_at = min(self._ends_at, moment)
+        self.ends_at = min(self.ends_at, moment)
 
     def end(self) -> None:
         """The last tick is over, and so is all that a behaviour does when it is stopped."""
@@ -47,12 +48,11 @@ class Watchdog:
 
     def is_overdue(self, now: float) -> bool:
         """Whether the last tick should have been over for long; safe in a signal handler."""
-        return self._ticks_on is not None and now - self._ends_at >= GRACE
+        return self._ticks_on is not None and now - self.ends_at >= GRACE
 
     def gives_up(self) -> bool:
         """Whether nobody waits for the rest of this thread's tick any more."""
-        ends = self._ends_at < math.inf  # asked after each behaviour
-        if ends and self.is_overdue(self._host.steady()) and not self._goals.wanted:
+        if self.is_overdue(self._host.steady()) and not self._goals.wanted:
             self._give_up()  # else it is for `run_due`, which bears with stalls
         return self.gave_up
 
