@@ -99,6 +99,7 @@ def installed(kind: Kind) -> list[str]:
     )
 
 
+@lru_cache(maxsize=4096)
 def interface_name(cls: type) -> str:
     """``"pkg/action/Name"`` of an interface's class."""
     package, kind = cls.__module__.split(".")[:2]

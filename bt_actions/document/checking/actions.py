@@ -18,6 +18,7 @@ from bt_actions.document.reading.settings import merged, settings_of, when_of
 from bt_actions.document.reading.tree import Declared, TreeNode
 from bt_actions.document.yaml.nodes import Mapping, span_of
 from bt_actions.document.yaml.source import Source
+from bt_actions.messages.conversion import Problem, examine
 from bt_actions.messages.fields import FieldType, Message
 
 __all__ = ["check_actions", "check_defaults", "check_use"]
@@ -97,8 +98,6 @@ def _check_together(checker: Checker, node: TreeNode, declared: Declared) -> Non
     cls = checker.action_class(declared)
     if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):
         return
-
-    from bt_actions.messages.conversion import Problem, examine
 
     def problems(goal: object) -> list[Problem]:
         return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]

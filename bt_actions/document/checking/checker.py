@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.document.checking.infer import BOOL, TEXT, Report, infer, named
@@ -27,12 +28,13 @@ from bt_actions.document.language.values import (
 )
 from bt_actions.document.reading.inputs import refuse_infinite
 from bt_actions.document.reading.settings import when_of
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import Declared, Document
 from bt_actions.document.reading.unread import Doubts
-from bt_actions.document.reading.writes import Write, writes_of
+from bt_actions.document.reading.writes import Write, writes_in
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.messages.conversion import examine
 from bt_actions.messages.fields import Either, FieldType, Message
 from bt_actions.utilities.suggest import closest, listing
 
@@ -43,8 +45,16 @@ __all__ = ["Checker"]
 
 
 Types = MappingType[str, FieldType | None]
-_PARTS = {"action": ("Goal", "Result", "goal"), "srv": ("Request", "Response", "request")}
-"""What is sent and what comes back, and the key of what is sent."""
+_PARTS = {"action": ("goal", "Goal", "Result"), "srv": ("request", "Request", "Response")}
+
+
+@lru_cache(maxsize=1024)
+def _parts(cls: type | None, kind: str) -> tuple[str, FieldType | None, Types]:
+    """The key and the type of what is sent, and the root of expressions over what comes back."""
+    key, asked, answered = _PARTS[kind]
+    if cls is None:
+        return key, None, {"result": None}
+    return key, Message(getattr(cls, asked)), {"result": Message(getattr(cls, answered))}
 
 
 class Checker:
@@ -63,7 +73,8 @@ class Checker:
         self.reads: dict[int, list[Computed]] = {}
         """What reads variables in each node, by the node's id; an alias's own under the alias's."""
         self.reader: object = document
-        self._writes: dict[int, tuple[Write, ...]] = {}
+        self.writes: dict[int, list[Write]] = {}
+        """What each node writes, by the node's id, in the order of the text."""
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
         self._inferred: dict[tuple[object, ...], FieldType | None] = {}
@@ -94,10 +105,6 @@ class Checker:
             known = self._doubts_of[id(included)] = Doubts(included)
         return known
 
-    def writes_of(self, node: TreeNode) -> tuple[Write, ...]:
-        """The variables that a node writes."""
-        return self._writes.get(id(node), ())
-
     def types_at(self, reader: object) -> Callable[[str], FieldType | None]:
         """Gives the type of a variable as a node reads it."""
         items = self._items.get(id(reader))
@@ -109,12 +116,10 @@ class Checker:
 
     def collect_writes(self) -> None:
         """Find the variables that nodes write, with their types as far as they are known."""
-        for node in self.document.nodes():
-            writes = tuple(writes_of(node, self.document))
-            if writes:
-                self._writes[id(node)] = writes
-        self._items = items_inside(self._writes.values(), self.declared_at)
-        written = (write for writes in self._writes.values() for write in writes)
+        written = writes_in(self.document)
+        for write in written:
+            self.writes.setdefault(id(write.node), []).append(write)
+        self._items = items_inside(written, self.declared_at)
         infer_variables(written, self)
 
     def action_class(self, declared: Declared) -> type | None:
@@ -126,11 +131,10 @@ class Checker:
 
     def call(self, values: dict[str, object], node: Mapping, cls: type | None, kind: str) -> None:
         """Check what an action and a service have in common."""
-        asked, answered, key = _PARTS[kind]
-        written = node.get(key)
-        if key in values and written is not None:
-            self.value(None if cls is None else Message(getattr(cls, asked)), values[key], written)
-        roots = {"result": None if cls is None else Message(getattr(cls, answered))}
+        key, asked, roots = _parts(cls, kind)
+        written = node.get(key) if key in values else None
+        if written is not None:
+            self.value(asked, values[key], written)
         for condition in (values.get("expect"), when_of(values)):
             self.condition(condition, roots)
         self.save(values.get("save"), roots)
@@ -185,8 +189,6 @@ class Checker:
             for computed in computed_in(value):
                 self.expression(computed, {})
             return
-
-        from bt_actions.messages.conversion import examine
 
         def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):

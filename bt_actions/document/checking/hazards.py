@@ -13,15 +13,17 @@ from bt_actions.document.checking.order import find_early_reads
 from bt_actions.document.checking.verdicts import BEGUN, Verdicts
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.language.values import names_value
-from bt_actions.document.reading.settings import resources_below, settings_of
+from bt_actions.document.reading.settings import resources_below, shared_settings
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
-from bt_actions.document.yaml.nodes import Node, span_of
+from bt_actions.document.yaml.nodes import span_of
 
 __all__ = ["find_hazards"]
 
 _BUSY = BEGUN | {"wait_until", "running", "python", "retry", "repeat", "for_each"}
+_LOOPED = ("as", "index")
+"""What a loop writes for those who want to read it."""
 
 
 def find_hazards(checker: Checker, doubts: Doubts) -> None:
@@ -81,7 +83,9 @@ class _Hazards:
                 inside = True
             elif kind == "for_each":
                 self._taken(node, around)
-                around = around | {write.name: node for write in self._checker.writes_of(node)}
+                around = around | {
+                    write.name: node for write in self._checker.writes.get(id(node), ())
+                }
             stack.extend((child, inside, around) for child in reversed(node.children))
 
     # BT304
@@ -94,8 +98,11 @@ class _Hazards:
     # BT301
 
     def _look_at_action(self, node: TreeNode) -> None:
-        timeout = settings_of(node, self._document).get("timeout", {})
+        timeout = node.values.get("timeout", {})
         if not isinstance(timeout, dict) or "result" in timeout:
+            return
+        shared = shared_settings(node.alias, self._document).get("timeout", {})
+        if not isinstance(shared, dict) or "result" in shared:
             return
         if self._doubts.below(node):
             return
@@ -242,7 +249,7 @@ class _Hazards:
     def _taken(self, node: TreeNode, around: Mapping[str, TreeNode]) -> None:
         document = self._document
         given: dict[str, TreeNode | Declared] = {**document.inputs, **document.topics, **around}
-        for write in self._checker.writes_of(node):
+        for write in self._checker.writes.get(id(node), ()):
             other = given.get(write.name)
             if other is not None:
                 self._report(
@@ -258,7 +265,7 @@ class _Hazards:
         checker, document, doubts = self._checker, self._document, self._doubts
         reads = itertools.chain.from_iterable(checker.reads.values())
         read = {name for one in reads for name in one.expression.variables}
-        written = {w.name for node in document.nodes() for w in self._checker.writes_of(node)}
+        written = {write.name for writes in checker.writes.values() for write in writes}
         if not doubts.unknown_variable:
             self._unread(read)
         for name in self._own(document.actions):
@@ -281,31 +288,17 @@ class _Hazards:
                 key = document.topics[name].key
                 self._report("BT309", span_of(key), f"nothing reads the topic {name!r}")
         known = read | set(document.outputs) | set(document.inputs) | set(document.topics)
-        for node in document.nodes():
-            if node.kind is not None and node.kind.name == "for_each":
+        for writes in self._checker.writes.values():
+            unread = [one for one in writes if one.name not in known and one.under not in _LOOPED]
+            if not unread:
                 continue
-            writes = self._checker.writes_of(node)
-            if known.issuperset(write.name for write in writes):
-                continue
-            keys = _keys_of(node)
-            for write in writes:
-                if write.name not in known and not doubts.mentions(write.name):
-                    known.add(write.name)
-                    own = write.written if write.written is not node.node else node.key
-                    at = keys.get((write.name, id(write.written)), own)
-                    text = f"nothing reads ${write.name}"
-                    self._report("BT310", span_of(at), text)
+            node = unread[0].node
+            tables = (node.written.get("set"), node.written.get("save"))
+            pairs = (pair for one in tables if isinstance(one, YamlMapping) for pair in one.pairs)
+            keys = {key.text: key for key, _ in pairs}
+            for name in (one.name for one in unread if not doubts.mentions(one.name)):
+                known.add(name)
+                self._report("BT310", span_of(keys.get(name, node.key)), f"nothing reads ${name}")
 
     def _own(self, table: dict[str, Declared]) -> Iterator[str]:
         return (name for name, declared in table.items() if declared.source is self._source)
-
-
-def _keys_of(node: TreeNode) -> dict[tuple[str, int], Node]:
-    """The keys under which a node writes variables, by their names and the ids of their values."""
-    tables = [node.written.get(table) for table in ("set", "save")]
-    return {
-        (key.text, id(value)): key
-        for table in tables
-        if isinstance(table, YamlMapping)
-        for key, value in table.pairs
-    }

@@ -8,12 +8,13 @@ written a name, nothing is claimed.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from functools import cached_property
 from typing import NamedTuple
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Span
+from bt_actions.document.language.values import Computed
 from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import span_of
@@ -53,6 +54,11 @@ class _Order:
         self._passed: set[str] = set()
         """What the nodes write that were visited already."""
         self._root = root
+        actions = checker.document.actions.items()
+        self._shared: dict[str | None, Sequence[Computed]] = {
+            name: checker.reads.get(id(declared), ()) for name, declared in actions
+        }
+        """What is read by the declaration of an action."""
 
     @cached_property
     def _writers(self) -> Counter[str]:
@@ -91,8 +97,9 @@ class _Order:
         added: set[str] = set()
         onward: set[str] = set()  # written when the next child is reached, or there is none left
         ended: set[str] = set()  # written when a child ends the node
+        succeeded: Set[str] = _NOTHING
         for child in node.children:
-            ended |= onward
+            ended |= succeeded
             succeeded, failed = self.visit(child, around, later)
             if kind in _TURNED:
                 succeeded, failed = failed, succeeded
@@ -107,7 +114,7 @@ class _Order:
         return _Written(ended, onward) if kind == "fallback" else _Written(onward, ended)
 
     def _own(self, node: TreeNode) -> frozenset[str]:
-        writes = self._checker.writes_of(node)
+        writes = self._checker.writes.get(id(node))
         return frozenset(write.name for write in writes) if writes else _NOTHING
 
     def _below(self, node: TreeNode) -> frozenset[str]:
@@ -120,8 +127,7 @@ class _Order:
                 if not self._may_be_written(name, own, around):
                     span = read.span(checker.source, *read.expression.variable_spans[at][1])
                     self._report(name, span, f"nothing has written ${name} when this is read")
-        declared = checker.document.actions.get(node.alias) if node.alias is not None else None
-        for read in checker.reads.get(id(declared), ()) if declared is not None else ():
+        for read in self._shared.get(node.alias, ()):
             for name in read.expression.variables:
                 if not self._may_be_written(name, own, around):
                     text = f"nothing has written ${name} when {node.alias!r} reads it here"

@@ -84,18 +84,15 @@ def _output_type(write: Write, known: Known) -> FieldType | None:
         return None
 
 
-def items_inside(
-    written: Iterable[tuple[Write, ...]], declared: Container[str]
-) -> dict[int, dict[str, Write]]:
+def items_inside(written: Iterable[Write], declared: Container[str]) -> dict[int, dict[str, Write]]:
     """What gives the nodes inside of loops their items, by the node's id.
 
     Only where several loops use one name, and nothing else writes it: inside of each it has the
     type of that loop's items.
     """
     writers: dict[str, list[Write]] = {}
-    for writes in written:
-        for write in writes:
-            writers.setdefault(write.name, []).append(write)
+    for write in written:
+        writers.setdefault(write.name, []).append(write)
     inside: dict[int, dict[str, Write]] = {}
     for name, loops in writers.items():
         if len(loops) < 2 or name in declared or any(one.root != "item of" for one in loops):

@@ -117,7 +117,9 @@ class Name:
 
 def _odd(text: str) -> str | None:
     """What to call the first character of a text that nobody sees."""
-    return next((spoken(char) for char in text if not char.isprintable()), None)
+    if text.isprintable():
+        return None
+    return next(spoken(char) for char in text if not char.isprintable())
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,9 @@ __all__ = [
 ]  # fmt: skip
 
 
+_NAME = Name()
+
+
 @dataclass(frozen=True, slots=True)
 class AnyValue:
     """Anything, with `$name` in it."""
@@ -110,7 +113,7 @@ class Table:
             return wrong_form(self, node, source, hint=self._meant(node))
         found: dict[str, object] = {}
         for key, inner in node.pairs:
-            name = Name().read(key, source)
+            name = _NAME.read(key, source)
             value = self.item.read(inner, source)
             if name is BAD:
                 source.unread.nodes += (key, inner)
@@ -131,7 +134,7 @@ class Table:
     def schema(self) -> Schema:
         return {
             "type": ["object", "null"],
-            "propertyNames": Name().schema(),
+            "propertyNames": _NAME.schema(),
             "additionalProperties": self.item.schema(),
         }
 

@@ -65,7 +65,7 @@ class _Bad:
 BAD: Final = _Bad()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Computed:
     """A value that an expression gives when it is needed; `start` is its place in the scalar."""
 
@@ -82,7 +82,7 @@ class Computed:
         return inner_span(self.node, source, self.start + start, self.start + end)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Interpolated:
     """A text with values in it."""
 

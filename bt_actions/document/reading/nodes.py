@@ -69,6 +69,7 @@ class _Reader:
             parent, item = self._waiting.pop()
             child = self.node(item)
             if child is not None:
+                child.level = parent.level + 1
                 parent.children.append(child)
         return root
 

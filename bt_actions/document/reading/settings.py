@@ -12,6 +12,7 @@ __all__ = [
     "resources_below",
     "server_of",
     "settings_of",
+    "shared_settings",
     "text_of",
     "when_of",
 ]
@@ -47,13 +48,17 @@ def merged(base: dict[str, object], over: dict[str, object]) -> dict[str, object
 
 def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
     """A node's settings over its alias's over the document's defaults, key by key."""
-    alias = node.alias
+    return merged(shared_settings(node.alias, document), node.values)
+
+
+def shared_settings(alias: str | None, document: Document) -> dict[str, object]:
+    """What the nodes of an alias (None: of no alias) have where they say nothing."""
     shared = document.settings.get(alias)
     if shared is None:
         declared = document.actions.get(alias) if alias is not None else None
         own = declared.values if declared is not None else {}
         shared = document.settings[alias] = merged(document.defaults, own)
-    return merged(shared, node.values)
+    return shared
 
 
 def server_of(settings: Mapping[str, object]) -> str:

@@ -20,8 +20,8 @@ class TreeNode:
     """A node of the tree.
 
     `values` holds what was read under each key (the kind's own key included), `written` the YAML
-    node of each. `alias` is the action's name in this document, where the node is one; `included`
-    the tree that a subtree stands for.
+    node of each; `level` is how deep it is, from 1. `alias` is the action's name in this document,
+    where the node is one; `included` the tree that a subtree stands for.
     """
 
     __slots__ = (
@@ -30,6 +30,7 @@ class TreeNode:
         "included",
         "key",
         "kind",
+        "level",
         "name",
         "node",
         "source",
@@ -39,6 +40,7 @@ class TreeNode:
 
     def __init__(self, kind: Kind | None, key: Scalar, node: Mapping, source: Source) -> None:
         self.kind = kind
+        self.level = 1
         self.key = key
         self.node = node
         self.source = source

@@ -104,24 +104,20 @@ class Workspace:
         self._import(document, chain)
         read_root(document)
         size = height = 0
-        levels = {id(document.root): 1}
         for node in document.nodes():
             size += 1
-            level = levels.pop(id(node))
-            for child in node.children:
-                levels[id(child)] = level + 1
-            if level > height:
-                height = level
+            if node.level > height:
+                height = node.level
             if node.kind is not None and node.kind.name == "subtree":
                 node.included = self._include(node, chain)
                 if node.included is not None:
                     size += self._sizes.get(id(node.included), 0)
-                    below = level + self._heights.get(id(node.included), 0)
+                    below = node.level + self._heights.get(id(node.included), 0)
                     if below > MAX_LEVELS:
                         message = f"the tree unfolds to more than {MAX_LEVELS} levels of nodes"
                         source.report("BT105", span_of(node.key), message)
                         node.included = None
-                        below = level
+                        below = node.level
                     height = max(height, below)
                 if size > MAX_TREE_NODES:
                     message = f"the tree unfolds to more than {MAX_TREE_NODES:,} nodes"

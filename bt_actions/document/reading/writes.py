@@ -9,62 +9,60 @@ from bt_actions.document.language.values import Computed
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping, Node
 
-__all__ = ["Write", "writes_of"]
+__all__ = ["Write", "writes_in", "writes_of"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Write:
     """A variable that a node writes: from `value`, an expression over `root` or plain data."""
 
     name: str
     node: TreeNode
-    written: Node
+    under: str
+    """The key of the node that says so; none where the action's declaration does."""
     value: object
     root: str | None = None
 
     @property
+    def written(self) -> Node:
+        """What says so; the node itself, where its action's declaration does."""
+        node, table = self.node, self.node.written.get(self.under)
+        if isinstance(table, Mapping):
+            return table.get(self.name) or node.node
+        return node.node if not self.under else table or node.key
+
+    @property
     def depends(self) -> bool:
         """Does the type of what is written depend on those of variables?"""
-        return isinstance(self.value, Computed) and bool(self.value.expression.names)
+        return isinstance(self.value, Computed) and bool(self.value.expression.variables)
+
+
+def writes_in(document: Document) -> list[Write]:
+    """The variables that the nodes of a document write, in the order of the text."""
+    return [write for node in document.nodes() for write in writes_of(node, document)]
 
 
 def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
     """The variables that a node itself writes."""
     values = node.values
-    declared = document.actions.get(node.alias) if node.alias is not None else None
-    if declared is not None:
-        own = values.get("save")
-        shared = declared.values.get("save")
-        for name, value in (shared if isinstance(shared, dict) else {}).items():
-            if not isinstance(own, dict) or name not in own:
-                yield Write(name, node, node.node, value, "result")
+    kind = node.kind.name if node.kind is not None else ""
     saved = values.get("save")
-    if isinstance(saved, dict):
-        table = _values_in(node.written.get("save"))
-        for name, value in saved.items():
-            inner = table.get(name)
-            root = None if node.kind is not None and node.kind.name == "subtree" else "result"
-            if node.kind is not None and node.kind.name == "wait_for_message":
-                root = "message"
-            yield Write(name, node, inner or node.node, value, root)
-    if node.kind is None:
-        return
-    if node.kind.name == "set" and isinstance(values.get("set"), dict):
-        table = _values_in(node.written.get("set"))
-        for name, value in values["set"].items():  # type: ignore[attr-defined]
-            inner = table.get(name)
-            yield Write(name, node, inner or node.node, value)
-    if node.kind.name == "for_each":
-        item = values.get("as", "item")
+    own = saved if isinstance(saved, dict) else {}
+    declared = document.actions.get(node.alias) if node.alias is not None else None
+    shared = declared.values.get("save") if declared is not None else None
+    if isinstance(shared, dict):
+        for name, value in shared.items():
+            if name not in own:
+                yield Write(name, node, "", value, "result")
+    root = {"subtree": None, "wait_for_message": "message"}.get(kind, "result")
+    for name, value in own.items():
+        yield Write(name, node, "save", value, root)
+    if kind == "set" and isinstance(table := values.get("set"), dict):
+        for name, value in table.items():
+            yield Write(name, node, "set", value)
+    elif kind == "for_each":
+        item, index = values.get("as", "item"), values.get("index")
         if isinstance(item, str):
-            yield Write(item, node, node.written.get("as", node.key), values.get("in"), "item of")
-        index = values.get("index")
+            yield Write(item, node, "as", values.get("in"), "item of")
         if isinstance(index, str):
-            yield Write(index, node, node.written["index"], 0)
-
-
-def _values_in(table: Node | None) -> dict[str, Node]:
-    """The YAML nodes of a mapping's values, by their keys."""
-    if not isinstance(table, Mapping):
-        return {}
-    return {key.text: value for key, value in table.pairs}
+            yield Write(index, node, "index", 0)
