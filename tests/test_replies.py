@@ -19,7 +19,7 @@ UNKNOWN = (0, None)
 
 
 def events(told: replies.Told) -> list[Event]:
-    return [event for event, _ in told]
+    return [] if told is None else [told[0]]
 
 
 @pytest.fixture
@@ -58,12 +58,12 @@ def alone(watch: ServerWatch) -> float:
 
 def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
     said = sent(watch)
-    assert said.accepted(watch, 0.0, [True]) == [(Event.ACCEPTED, None)]
-    assert said.accepted(watch, 0.0, [False]) == [(Event.REJECTED, None)]
-    assert said.canceled(watch, 0.0, 0.0, [DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
-    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
-    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == [(Event.RESULT_UNKNOWN, None)]
-    assert said.finished(watch, 0.0, 0.0, [(2, None)]) == [(Event.STATUS, 2)]
+    assert said.accepted(watch, 0.0, [True]) == (Event.ACCEPTED, None)
+    assert said.accepted(watch, 0.0, [False]) == (Event.REJECTED, None)
+    assert said.canceled(watch, 0.0, 0.0, [DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
+    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
+    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == (Event.RESULT_UNKNOWN, None)
+    assert said.finished(watch, 0.0, 0.0, [(2, None)]) == (Event.STATUS, 2)
 
 
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
@@ -77,65 +77,65 @@ def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
 def test_one_server_that_accepts_twice_is_one_server(watch: ServerWatch) -> None:
     said = replies.Replies(Goal(b"1", "move", Timeouts(), Now(0.0, 0.0)))
     said.sent_to = frozenset({ONE})
-    assert said.accepted(watch, 0.0, [True, True]) == []
+    assert said.accepted(watch, 0.0, [True, True]) is None
     assert not watch.both_live
 
 
 def test_what_one_refuses_the_other_may_accept(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.accepted(watch, 0.0, [False]) == []
+    assert said.accepted(watch, 0.0, [False]) is None
     assert events(said.accepted(watch, 0.0, [False, True])) == [Event.ACCEPTED]
-    assert said.accepted(watch, 0.0, [True, False]) == []
+    assert said.accepted(watch, 0.0, [True, False]) is None
     assert events(said.accepted(watch, 0.0, [False, False])) == [Event.REJECTED]
 
 
 def test_a_refusal_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.accepted(watch, 0.0, [False]) == []
-    assert said.looked(watch, 0.0) == []
+    assert said.accepted(watch, 0.0, [False]) is None
+    assert said.looked(watch, 0.0) is None
     assert events(said.looked(watch, alone(watch))) == [Event.REJECTED]
 
 
 def test_what_one_has_ended_the_other_may_run(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
-    assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == [(Event.RESULT, ABORTED)]
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
+    assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == (Event.RESULT, ABORTED)
 
 
 def test_what_both_have_ended_was_at_two_servers(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
     told = said.finished(watch, 0.0, 0.0, [ABORTED, SUCCEEDED])
-    assert told == [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, SUCCEEDED)]
+    assert told == (Event.SERVER_AMBIGUOUS, SUCCEEDED)
     assert watch.both_live
 
 
 def test_an_end_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
-    assert said.looked(watch, 0.0) == []
-    assert said.looked(watch, alone(watch)) == [(Event.RESULT, ABORTED)]
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
+    assert said.looked(watch, 0.0) is None
+    assert said.looked(watch, alone(watch)) == (Event.RESULT, ABORTED)
 
 
 def test_an_end_may_be_that_of_the_one_that_has_gone_since(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    assert said.looked(watch, 0.0) == []
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) == []
+    assert said.looked(watch, 0.0) is None
+    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
     watch.observe(1.0, True, frozenset({ONE}))
     assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED], "ask whoever is left"
-    assert said.finished(watch, 1.1, 0.9, [ABORTED]) == [], "asked while both were there"
-    assert said.finished(watch, 1.2, 1.1, [SUCCEEDED]) == [(Event.RESULT, SUCCEEDED)]
+    assert said.finished(watch, 1.1, 0.9, [ABORTED]) is None, "asked while both were there"
+    assert said.finished(watch, 1.2, 1.1, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
 
 
 def test_what_one_denies_the_other_may_have(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.canceled(watch, 0.0, 0.0, [DENIED]) == []
-    assert said.canceled(watch, 0.0, 0.0, [DENIED, CANCELED]) == [(Event.CANCEL_ANSWERED, CANCELED)]
-    assert said.canceled(watch, 0.0, 0.0, [CANCELED, DENIED]) == []
-    assert said.canceled(watch, 0.0, 0.0, [DENIED, DENIED]) == [(Event.CANCEL_ANSWERED, DENIED)]
-    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == []
+    assert said.canceled(watch, 0.0, 0.0, [DENIED]) is None
+    assert said.canceled(watch, 0.0, 0.0, [DENIED, CANCELED]) == (Event.CANCEL_ANSWERED, CANCELED)
+    assert said.canceled(watch, 0.0, 0.0, [CANCELED, DENIED]) is None
+    assert said.canceled(watch, 0.0, 0.0, [DENIED, DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
+    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) is None
     assert events(said.finished(watch, 0.0, 0.0, [UNKNOWN, UNKNOWN])) == [Event.RESULT_UNKNOWN]
 
 
 def test_two_that_live_are_told_of_where_both_may_have_it(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    assert said.looked(watch, 0.0) == []
+    assert said.looked(watch, 0.0) is None
     watch.two_answered()
     assert events(said.looked(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
     said.sent_to = frozenset({ONE})
@@ -149,11 +149,11 @@ def test_a_lost_server_is_back_only_when_it_can_be_talked_to(
     assert events(said.looked(watch, 1.0)) == [Event.SERVER_LOST]
     said._goal.on(Event.SERVER_LOST, Now(1.0, 1.0))
     watch.observe(2.0, False, BOTH)
-    assert said.looked(watch, 2.0) == []
+    assert said.looked(watch, 2.0) is None
     watch.observe(2.1, True, BOTH)
     assert events(said.looked(watch, 2.1)) == [Event.SERVER_RETURNED]
     said._goal.on(Event.SERVER_RETURNED, Now(2.1, 2.1))
-    assert said.looked(watch, 2.2) == []
+    assert said.looked(watch, 2.2) is None
 
 
 def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_restarted(
@@ -162,7 +162,7 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
     assert events(said.looked(watch, 0.0)) == [Event.SERVER_CHANGED]
-    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == []
+    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) is None
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
 
 
@@ -175,19 +175,18 @@ def test_a_server_that_was_taken_for_dead_is_back_when_that_was_wrong(
     said.looked(watch, 0.0)
     said.finished(watch, 0.0, 0.0, [UNKNOWN])
     now = alone(watch)
-    for event, detail in said.looked(watch, now):
-        said._goal.on(event, Now(now, now), detail)
+    told(said, said.looked(watch, now), now)
     assert said._goal.lost
-    assert said.looked(watch, now) == [], "it is still taken for one"
+    assert said.looked(watch, now) is None, "it is still taken for one"
     if how == "both answer":
         watch.probe_answered(now, 1)
         watch.observe(now, False, BOTH)
-        assert said.looked(watch, now) == [], "it cannot be talked to"
+        assert said.looked(watch, now) is None, "it cannot be talked to"
         watch.observe(now, True, BOTH)
     elif how == "two of three, none dead":
         watch.observe(now, True, BOTH | {b"third"})
         watch.two_answered()
-        assert said.looked(watch, now) == [], "these may be the other two"
+        assert said.looked(watch, now) is None, "these may be the other two"
         now += LEASE + 1.0
     else:
         watch.observe(now, True, frozenset({ONE}))
@@ -197,21 +196,19 @@ def test_a_server_that_was_taken_for_dead_is_back_when_that_was_wrong(
 
 
 def test_the_status_of_one_of_two_shows_no_end(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 2)]
+    assert said.shown(watch, 1.2, 5) == (Event.STATUS, 2)
     said.looked(watch, 0.0)
     watch.observe(1.0, True, frozenset({ONE}))
     said.looked(watch, 1.0)
-    assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 2)], (
-        "it may be that of the one that has gone"
-    )
+    assert said.shown(watch, 1.2, 5) == (Event.STATUS, 2), "it may be that of the one that has gone"
     said.sent_to = frozenset({ONE})
-    assert said.shown(watch, 1.2, 5) == [(Event.STATUS, 5)]
+    assert said.shown(watch, 1.2, 5) == (Event.STATUS, 5)
 
 
 def told(said: replies.Replies, what: replies.Told, now: float) -> list[Event]:
     """Tell the goal, too; return the events."""
-    for event, detail in what:
-        said._goal.on(event, Now(now, now), detail)
+    if what is not None:
+        said._goal.on(what[0], Now(now, now), what[1])
     return events(what)
 
 
@@ -233,9 +230,9 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
     later = now + NO_SECOND_AFTER
-    assert said.finished(watch, later, now, [UNKNOWN]) == []
+    assert said.finished(watch, later, now, [UNKNOWN]) is None
     watch.observe(later, True, BOTH)
-    assert said.looked(watch, later) == []
+    assert said.looked(watch, later) is None
     assert watch.alone_since(later, now), "which would do, had it come later"
     watch.observe(later, True, frozenset({OTHER}))
     assert told(said, said.looked(watch, later), later) == [Event.SERVER_LOST]
@@ -243,13 +240,13 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
 
 def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -> None:
     said = beside_a_newcomer(watch)
-    told(said, [(Event.INTERRUPTED, None)], 0.0)
-    assert said.canceled(watch, 0.2, 0.1, [DENIED]) == []
-    assert said.looked(watch, 0.3) == []
+    told(said, (Event.INTERRUPTED, None), 0.0)
+    assert said.canceled(watch, 0.2, 0.1, [DENIED]) is None
+    assert said.looked(watch, 0.3) is None
     now = alone(watch)
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
-    assert said.canceled(watch, now, now, [DENIED]) == []
+    assert said.canceled(watch, now, now, [DENIED]) is None
     now += NO_SECOND_AFTER
     assert told(said, said.looked(watch, now), now) == [Event.SERVER_LOST]
     assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"

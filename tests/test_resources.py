@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from bt_actions.goals.policy import Busy
-from bt_actions.goals.resources import Answer, Resources
+from bt_actions.goals.resources import Resources
+from bt_actions.goals.terms import Event
 
 BASE, ARM, BOTH = frozenset({"base"}), frozenset({"arm"}), frozenset({"base", "arm"})
 
@@ -24,21 +25,21 @@ def held_by(*holders: str) -> Resources[str]:
 
 def test_what_is_free_is_granted() -> None:
     table: Resources[str] = Resources()
-    assert table.request("a", BASE, Busy.WAIT) is Answer.GRANTED
-    assert table.request("b", ARM, Busy.WAIT) is Answer.GRANTED
+    assert table.request("a", BASE, Busy.WAIT) is Event.GRANTED
+    assert table.request("b", ARM, Busy.WAIT) is Event.GRANTED
     assert table.holders(BOTH) == ["a", "b"]
 
 
 @pytest.mark.parametrize(
     ("busy", "answer"),
     [
-        (Busy.WAIT, Answer.QUEUED),
-        (Busy.FAIL, Answer.TAKEN),
-        (Busy.REPLACE, Answer.GRANTED),
-        (Busy.SHARE, Answer.GRANTED),
+        (Busy.WAIT, None),
+        (Busy.FAIL, Event.TAKEN),
+        (Busy.REPLACE, Event.GRANTED),
+        (Busy.SHARE, Event.GRANTED),
     ],
 )
-def test_there_are_four_ways_to_meet_a_taken_resource(busy: Busy, answer: Answer) -> None:
+def test_there_are_four_ways_to_meet_a_taken_resource(busy: Busy, answer: Event | None) -> None:
     assert held_by("a").request("b", BASE, busy) is answer
 
 
@@ -59,15 +60,15 @@ def test_who_shares_keeps_the_others_waiting_until_the_last_has_left() -> None:
 
 def test_all_of_them_or_none() -> None:
     table = held_by("a")
-    assert table.request("b", BOTH, Busy.WAIT) is Answer.QUEUED
+    assert table.request("b", BOTH, Busy.WAIT) is None
     assert table.holders(ARM) == []
 
 
 def test_nobody_overtakes_on_a_name_that_an_earlier_one_waits_for() -> None:
     table = held_by("a")
     table.request("b", BOTH, Busy.WAIT)
-    assert table.request("c", ARM, Busy.WAIT) is Answer.QUEUED, "arm is free, but b was first"
-    assert table.request("d", ARM, Busy.FAIL) is Answer.TAKEN
+    assert table.request("c", ARM, Busy.WAIT) is None, "arm is free, but b was first"
+    assert table.request("d", ARM, Busy.FAIL) is Event.TAKEN
     assert table.release("a") == ["b"]
     assert table.release("b") == ["c"]
 
@@ -93,9 +94,9 @@ class AnyOrder(RuleBasedStateMachine):
     def request(self, names: frozenset[str], busy: Busy) -> None:
         self.count += 1
         answer = self.table.request(self.count, names, busy)
-        if answer is not Answer.TAKEN:
+        if answer is not Event.TAKEN:
             self.open[self.count] = (names, busy)
-        if answer is Answer.QUEUED:
+        if answer is None:
             self.waiting.append(self.count)
 
     @precondition(lambda self: self.open)

@@ -28,6 +28,7 @@ from bt_actions.goals.terms import (
     CANCEL_UNKNOWN_GOAL,
     FROM_SERVER,
     MAY_TURN_UP,
+    SHOWS_ACCEPTANCE,
     Command,
     Event,
     Now,
@@ -48,8 +49,13 @@ class Goal(Facts):
     # What the caller may tell
 
     def on(self, event: Event, now: Now, detail: Any = None) -> tuple[Command, ...]:
-        """Take what happened and return what to do, in order."""
-        if self._shows_acceptance(event, detail):
+        """Take what happened and return what to do, in order.
+
+        What only an accepted goal has shows that its acceptance was lost, or overtaken; and of one
+        that went out of sight with its server, that it is back.
+        """
+        denied = event is Event.CANCEL_ANSWERED and (self.accepted or detail == CANCEL_UNKNOWN_GOAL)
+        if event in SHOWS_ACCEPTANCE and self.state in MAY_TURN_UP and not denied:
             return self.on(Event.ACCEPTED, now) + self.on(event, now, detail)
         self.deadlines.follow(now)
         is_over = self.state in (State.LOST, State.DONE)
@@ -66,17 +72,6 @@ class Goal(Facts):
         self.state = state
         commands, self.commands = tuple(self.commands), []
         return commands
-
-    def _shows_acceptance(self, event: Event, detail: Any) -> bool:
-        """Whether only an accepted goal has this, and its acceptance was lost, or overtaken.
-
-        Of a goal that went out of sight with its server it shows that it is back.
-        """
-        if self.state not in MAY_TURN_UP:
-            return False
-        if event is Event.CANCEL_ANSWERED:
-            return detail != CANCEL_UNKNOWN_GOAL and not self.accepted
-        return event in (Event.FEEDBACK, Event.STATUS)
 
     def due(self, now: Now) -> Iterator[Event]:
         """Take each deadline that has passed, the earliest first, to be told to `on` at once."""

@@ -179,17 +179,13 @@ class Retry:
             raise ValueError(f"retry.attempts must be a whole number, not {self.attempts!r}")
         if self.attempts < 1:
             raise ValueError(f"retry.attempts must be 1 or more, not {self.attempts}")
-        for field in ("backoff", "max_backoff"):
-            checked = _seconds(f"retry.{field}", getattr(self, field), zero=True)
+        for field in ("backoff", "factor", "max_backoff", "jitter"):
+            checked = _seconds(f"retry.{field}", getattr(self, field), zero=field != "factor")
             object.__setattr__(self, field, checked)
-        factor = _seconds("retry.factor", self.factor, zero=False)
-        if factor < 1.0:
+        if self.factor < 1.0:
             raise ValueError(f"retry.factor must be 1 or more, not {self.factor!r}")
-        jitter = _seconds("retry.jitter", self.jitter, zero=True)
-        if jitter > 1.0:
+        if self.jitter > 1.0:
             raise ValueError(f"retry.jitter must lie between 0 and 1, not {self.jitter!r}")
-        object.__setattr__(self, "factor", factor)
-        object.__setattr__(self, "jitter", jitter)
         object.__setattr__(self, "outcomes", _outcomes(self.outcomes))
         if self.when is not None and not callable(self.when) and not isinstance(self.when, str):
             raise ValueError("retry.when must be a callable on the result or an expression as text")

@@ -8,20 +8,12 @@ clock: the caller locks, and gives up on behalf of a holder whose deadline passe
 from __future__ import annotations
 
 from collections.abc import Hashable
-from enum import Enum
 from typing import Generic, TypeVar
 
 from bt_actions.goals.policy import Busy
+from bt_actions.goals.terms import Event
 
 Holder = TypeVar("Holder", bound=Hashable)
-
-
-class Answer(Enum):
-    """What became of a request."""
-
-    GRANTED = "granted"
-    QUEUED = "queued"
-    TAKEN = "taken"
 
 
 class Resources(Generic[Holder]):
@@ -31,19 +23,22 @@ class Resources(Generic[Holder]):
         self._held: dict[Holder, frozenset[str]] = {}
         self._queue: dict[Holder, frozenset[str]] = {}
 
-    def request(self, holder: Holder, names: frozenset[str], busy: Busy) -> Answer:
-        """Ask for all of `names`; raises ValueError when `holder` has asked before."""
+    def request(self, holder: Holder, names: frozenset[str], busy: Busy) -> Event | None:
+        """Ask for all of `names`; return GRANTED or TAKEN, or None where `holder` has to wait.
+
+        Raises ValueError when it has asked before.
+        """
         if holder in self._held or holder in self._queue:
             raise ValueError(f"{holder!r} holds or waits already")
         free = not self.holders(names)
         waits = free and any(names & wanted for wanted in self._queue.values())
         if busy in (Busy.REPLACE, Busy.SHARE) or (free and not waits):
             self._held[holder] = names
-            return Answer.GRANTED
+            return Event.GRANTED
         if busy is Busy.FAIL:
-            return Answer.TAKEN
+            return Event.TAKEN
         self._queue[holder] = names
-        return Answer.QUEUED
+        return None
 
     def release(self, holder: Holder) -> list[Holder]:
         """Take `holder` out of the table or the queue; return who is granted thereby, in order."""

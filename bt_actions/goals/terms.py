@@ -57,16 +57,7 @@ MAY_STILL_BE_ACCEPTED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRES
 """It was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
 _SHOWN_AS_CANCELING = MAY_STILL_BE_ACCEPTED | {State.NOT_RECEIVED, State.LOST}
-MAY_TURN_UP = frozenset(
-    {
-        State.SENDING,
-        State.UNWANTED,
-        State.UNCONFIRMED,
-        State.PRESUMED_NOT_RECEIVED,
-        State.NOT_RECEIVED,
-        State.LOST,
-    }
-)
+MAY_TURN_UP = MAY_STILL_BE_ACCEPTED | {State.SENDING, State.NOT_RECEIVED, State.LOST}
 """Feedback or a status is news: it was accepted, and runs, or has run."""
 
 
@@ -141,4 +132,6 @@ FROM_SERVER = frozenset(
         Event.CANCEL_ANSWERED,
     }
 )
+SHOWS_ACCEPTANCE = (Event.FEEDBACK, Event.STATUS, Event.CANCEL_ANSWERED)
+"""Only an accepted goal has it; the last one, unless the answer is a denial."""
 ON_ROS_CLOCK = frozenset({Event.RESULT_DUE, Event.FEEDBACK_DUE})

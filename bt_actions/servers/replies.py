@@ -28,7 +28,8 @@ from bt_actions.goals.terms import (
 )
 from bt_actions.servers.presence import GID, Server, ServerWatch
 
-Told = list[tuple[Event, Any]]
+Told = tuple[Event, Any] | None
+"""What the goal is to be told, with its detail; None: nothing."""
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
 DENIALS = (CANCEL_UNKNOWN_GOAL, (0, None))
@@ -96,7 +97,7 @@ class Replies:
         """Take an answer to the goal request: accepted or not."""
         self._note_changes(watch, now)
         if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:
-            return []  # by one, twice
+            return None  # by one, twice
         accepted = sum(answers)
         self._accepted_by = max(self._accepted_by, accepted)
         if accepted:
@@ -106,21 +107,21 @@ class Replies:
             self.sent_to |= watch.gids
             watch.two_answered()
             self._fresh_since = now
-            return [(Event.SERVER_AMBIGUOUS, None)]
+            return Event.SERVER_AMBIGUOUS, None
         if answers[-1]:
             if not self._goal.accepted or len(self.sent_to) == 1:
-                return [(Event.ACCEPTED, None)]
+                return Event.ACCEPTED, None
             self._fresh_since = now  # one has shown it as accepted; this may be the other
-            return [(Event.SERVER_CHANGED, None)]
+            return Event.SERVER_CHANGED, None
         if any(answers):
-            return []  # it is refused here, and runs there
+            return None  # it is refused here, and runs there
         by_some = len(answers) < len(self.sent_to)
         if by_some and self._may_be_at_two(watch):
             self._refused = True
-            return []
+            return None
         if by_some and self._fresh_since > NEVER:
-            return [(Event.SERVER_AMBIGUOUS, None)]  # by the one that is gone?
-        return [(Event.REJECTED, None)]
+            return Event.SERVER_AMBIGUOUS, None  # by the one that is gone?
+        return Event.REJECTED, None
 
     def canceled(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[int]
@@ -129,17 +130,17 @@ class Replies:
         self._note_changes(watch, now)
         if answers[-1] != CANCEL_UNKNOWN_GOAL:
             self.spoke(watch, now)
-            return [(Event.CANCEL_ANSWERED, answers[-1])]
+            return Event.CANCEL_ANSWERED, answers[-1]
         if any(code != CANCEL_UNKNOWN_GOAL for code in answers):
-            return []
+            return None
         if len(answers) < _answers_wanted(watch):  # by some
             if self._may_be_at_two(watch):
-                return []
+                return None
             if len(self.sent_to) > 1 and asked < self._fresh_since:
-                return []
+                return None
             if watch.changed(self.sent_to) and not watch.gone(now, self.sent_to):
                 return self._denied(now)  # maybe by a newcomer
-        return [(Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL)]
+        return Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL
 
     def finished(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
@@ -149,7 +150,7 @@ class Replies:
         runs = [answer for answer in answers if answer[0] not in (0, *ENDS)]
         if runs:  # answered too soon, by a server that is none of rclpy's or rclcpp's
             self._ended = None
-            return [(Event.STATUS, runs[-1][0])]
+            return Event.STATUS, runs[-1][0]
         ended = [answer for answer in answers if answer[0] in ENDS]
         if ended:
             done = ended[-1]
@@ -157,19 +158,19 @@ class Replies:
                 done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), done)
             if len(self.sent_to) > 1:
                 if asked < self._fresh_since:
-                    return []
+                    return None
                 if len(answers) < _answers_wanted(watch) and self._may_be_at_two(watch):
                     self._ended = done
-                    return []
+                    return None
             if len(ended) > 1 and self._accepted_by < 2 and not self._told_of_two:  # both ran it
                 watch.two_answered()
-                return [(Event.SERVER_AMBIGUOUS, None), (Event.RESULT, done)]
-            return [(Event.RESULT, done)]
+                return Event.SERVER_AMBIGUOUS, done
+            return Event.RESULT, done
         by_each = len(answers) >= _answers_wanted(watch)
         if watch.changed(self.sent_to) and not (by_each and asked >= self._fresh_since):
             return self._denied(now)
         by_all = by_each or watch.state(now) is Server.READY
-        return [(Event.RESULT_UNKNOWN, None)] if by_all and asked >= self._fresh_since else []
+        return (Event.RESULT_UNKNOWN, None) if by_all and asked >= self._fresh_since else None
 
     def shown(self, watch: ServerWatch, now: float, status: int) -> Told:
         """Take the status that one server publishes of the goal."""
@@ -178,7 +179,7 @@ class Replies:
         doubtful = self._may_be_at_two(watch) or self._fresh_since > NEVER
         if status in ENDS and len(self.sent_to) > 1 and doubtful:
             status = STATUS_EXECUTING  # it has ended at one; that it was accepted is sure
-        return [(Event.STATUS, status)]
+        return Event.STATUS, status
 
     # Told by discovery
 
@@ -196,39 +197,39 @@ class Replies:
             is_there = not gone and none_dead and watch.state(now) is not Server.ABSENT
             if returned or (is_there and goal.end is not End.UNKNOWN):
                 self._forget(now)
-                return [(Event.SERVER_RETURNED, None)]
+                return Event.SERVER_RETURNED, None
             if gone and goal.end is End.UNKNOWN:  # it was left, not lost
-                return [(Event.SERVER_LOST, f"{name} is gone")]
-            return []
+                return Event.SERVER_LOST, f"{name} is gone"
+            return None
         if gone:
             how = "was restarted" if watch.gids else "went away"
-            return [(Event.SERVER_LOST, f"{name} {how} under the goal")]
+            return Event.SERVER_LOST, f"{name} {how} under the goal"
         if one_left:  # what was said before may have been its word: ask who is left
             refused = self._refused
             self._forget(now)
-            return [(Event.SERVER_AMBIGUOUS if refused else Event.SERVER_CHANGED, None)]
+            return Event.SERVER_AMBIGUOUS if refused else Event.SERVER_CHANGED, None
         if one_came:
             self._ended = None
-            return [(Event.SERVER_CHANGED, None)]
+            return Event.SERVER_CHANGED, None
         if self._may_be_at_two(watch):
             if not watch.both_live or self._told_of_two:
-                return []
+                return None
             self._told_of_two = True
-            return [(Event.SERVER_AMBIGUOUS, None)]
+            return Event.SERVER_AMBIGUOUS, None
         if self._ended is not None:
-            return [(Event.RESULT, self._ended)]
+            return Event.RESULT, self._ended
         if self._refused:
-            return [(Event.REJECTED, None)]
+            return Event.REJECTED, None
         if not watch.changed(self.sent_to | self._beside):
             self._denied_at = None
         elif watch.state(now) is Server.AMBIGUOUS:
             pass
         elif self._denied_at is not None and watch.alone_since(now, self._denied_at):
-            return [(Event.SERVER_LOST, f"{name} was restarted under the goal")]
+            return Event.SERVER_LOST, f"{name} was restarted under the goal"
         elif goal.accepted and now - self._asked_at > ASK_EVERY:
             self._asked_at = now
-            return [(Event.SERVER_CHANGED, None)]
-        return []
+            return Event.SERVER_CHANGED, None
+        return None
 
     def _note_changes(self, watch: ServerWatch, now: float) -> None:
         """Who has left may have answered what was asked before; who is back was not asked."""
@@ -254,7 +255,7 @@ class Replies:
         """Take note of a denial by one of several; `looked` finds out what that means."""
         if self._denied_at is None:
             self._denied_at = now
-        return []
+        return None
 
     def _forget(self, now: float) -> None:
         self._fresh_since = now

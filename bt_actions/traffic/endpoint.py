@@ -152,10 +152,14 @@ class ActionEndpoint:
 
     def pass_on(self, handle: GoalHandle, told: Told) -> None:
         """Tell a goal what is believed of what was said of it."""
-        for event, detail in told:
-            if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(handle):
-                self.tell(handle, Event.REPLACED)  # this has overtaken the rival's acceptance
-            self.tell(handle, event, detail)
+        if told is None:
+            return
+        event, detail = told
+        if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(handle):
+            self.tell(handle, Event.REPLACED)  # this has overtaken the rival's acceptance
+        self.tell(handle, event, detail)
+        if event is Event.SERVER_AMBIGUOUS and detail is not None:  # both have told how it ended
+            self.tell(handle, Event.RESULT, detail)
 
     def _rival_sent(self, handle: GoalHandle) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
@@ -276,7 +280,10 @@ class ActionEndpoint:
     # Which goals are here, and how the server is reached
 
     def take_in(self, handle: GoalHandle) -> None:
-        """See to this goal from now on."""
+        """See to this goal from now on; it may have been another's."""
+        if handle.endpoint is not self:
+            handle.endpoint = self
+            handle.replies.taken_over()
         self.goals[handle.goal.id] = handle
         self.domain.open[self] = None
         self._host.scheduler.add(self)

@@ -24,8 +24,6 @@ def take_over(endpoint: Endpoint, domain: Domain, now: float) -> None:
         for handle in list(other.goals.values()):
             servers = handle.replies.sent_to
             if handle.goal.lost and _sees_more(endpoint, other, servers, now):
-                handle.endpoint = endpoint
-                handle.replies.taken_over()
                 endpoint.take_in(handle)
                 other.retire(handle)
 
@@ -51,8 +49,7 @@ def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
             first = handle.not_gone_before == NEVER  # a later node need only have discovered
             until = host.steady() + (LEASE if first else TOO_NEW)
             handle.not_gone_before = max(handle.not_gone_before, until)
-        handle.endpoint, handle.reporter = endpoint, endpoint.reporter
-        handle.replies.taken_over()
+        handle.reporter = endpoint.reporter
         endpoint.take_in(handle)
 
 

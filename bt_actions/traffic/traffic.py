@@ -17,7 +17,6 @@ from typing import Any
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Timeouts
-from bt_actions.goals.resources import Answer
 from bt_actions.goals.terms import Event, Now, State
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
@@ -127,12 +126,10 @@ class Traffic:
             self.host.trace.begun(handle)
             endpoint.take_in(handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
-            if answer is Answer.GRANTED:
-                endpoint.tell(handle, Event.GRANTED)
-            elif answer is Answer.TAKEN:
-                endpoint.tell(handle, Event.TAKEN)
-            else:
+            if answer is None:
                 self.note(handle)
+            else:
+                endpoint.tell(handle, answer)
             return handle
 
     def _full_name(self, name: str) -> str:

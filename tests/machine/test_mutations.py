@@ -17,7 +17,7 @@ from bt_actions.goals.deadlines import Deadlines
 from bt_actions.goals.facts import Does, Facts, Step, drop
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
-from bt_actions.goals.resources import Answer, Resources
+from bt_actions.goals.resources import Resources
 from bt_actions.goals.steps import canceling, requested, running
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import MAY_STILL_BE_ACCEPTED, Command, Event, State
@@ -303,9 +303,9 @@ def loses_time_when_the_clock_jumps_back(patch: Patch) -> None:
 
 @mutation
 def grants_what_is_taken(patch: Patch) -> None:
-    def request(table: Any, holder: Any, names: frozenset[str], busy: Busy) -> Answer:
+    def request(table: Any, holder: Any, names: frozenset[str], busy: Busy) -> Event:
         table._held[holder] = names
-        return Answer.GRANTED
+        return Event.GRANTED
 
     patch.setattr(Resources, "request", request)
 
