@@ -21,8 +21,6 @@ from bt_actions.recovery.ledger import (
     Ledger,
     Sent,
     left_behind,
-    mark_lost,
-    strike_left,
 )
 
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
@@ -98,15 +96,16 @@ def test_what_is_struck_is_not_found_again(
 ) -> None:
     ids = die()
     first, *others = found()
-    strike_left([first])
+    first.strike()
     assert [sent.goal_id.hex() for sent in found()] == [ids[2], ids[3]]
-    strike_left(others)
+    for sent in others:
+        sent.strike()
     assert list(directory.iterdir()) == []
 
 
 def test_that_a_server_is_not_in_sight_is_kept() -> None:
     ids = die()
-    mark_lost(found()[1:2])
+    found()[1].mark_lost()
     assert [(sent.goal_id.hex(), sent.lost) for sent in found()] == [
         (ids[0], False),
         (ids[2], True),

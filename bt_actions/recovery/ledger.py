@@ -17,7 +17,6 @@ import contextlib
 import errno
 import json
 import os
-import re
 import stat
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator
@@ -36,7 +35,6 @@ SERVERS_AT_MOST = 8
 KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up."""
 _SUFFIX = ".goal"
-_NAME = re.compile(r"(?=.{1,255}\Z)(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +54,16 @@ class Sent:
     author: Author
     """Who is dead, or not `here`."""
     path: Path
+
+    def strike(self) -> None:
+        """It need not be asked for any more; where that fails, it is."""
+        with contextlib.suppress(OSError):
+            self.path.unlink()
+
+    def mark_lost(self) -> None:
+        """Have it on record that its servers are not in sight."""
+        with contextlib.suppress(OSError):
+            _write(self.path, self.action, self.domain, self.servers, self.accept, True)
 
 
 class Ledger(Record):
@@ -135,10 +143,9 @@ def left_behind(
     except OSError as error:
         failed(error)
         return
-    alive: dict[Author, bool] = {}
     for path in paths:
-        author = None if path in passed_over else _author(path)
-        if author is None or (author.here and alive.setdefault(author, author.alive)):
+        author = None if path in passed_over else _gone_author(path)
+        if author is None:
             continue
         with contextlib.suppress(FileNotFoundError):  # another cleanup was faster
             if path.stat().st_size == 0:
@@ -147,20 +154,6 @@ def left_behind(
                 yield _read(path, author)
             except OSError as error:
                 failed(error)
-
-
-def strike_left(goals: Iterable[Sent]) -> None:
-    """Remove goals that need not be asked for any more; where that fails, they are."""
-    for sent in goals:
-        with contextlib.suppress(OSError):
-            sent.path.unlink()
-
-
-def mark_lost(goals: Iterable[Sent]) -> None:
-    """Have it on record that the servers of these goals are not in sight."""
-    for sent in goals:
-        with contextlib.suppress(OSError):
-            _write(sent.path, sent.action, sent.domain, sent.servers, sent.accept, True)
 
 
 def directory(*, make: bool = True) -> Path:
@@ -184,12 +177,13 @@ def directory(*, make: bool = True) -> Path:
     return found
 
 
-def _author(path: Path) -> Author | None:
-    """Return whose file it is; None: nobody's of ours."""
+def _gone_author(path: Path) -> Author | None:
+    """Return whose file it is, if it is dead, or elsewhere; None: nobody's of ours."""
     try:
-        return author_of(bytes.fromhex(path.stem))
+        author = author_of(bytes.fromhex(path.stem))
     except ValueError:
         return None
+    return None if author is None or (author.here and author.alive) else author
 
 
 def _write(
@@ -217,24 +211,16 @@ def _read(path: Path, author: Author) -> Sent:
     text = path.read_bytes()
     try:
         entry = json.loads(text)
-        servers = frozenset(bytes.fromhex(each) for each in entry["servers"])
-        action, domain, lost = entry["action"], entry["domain"], entry["lost"]
-        accept = float(entry["accept"])
-        if not (_NAME.fullmatch(action) and type(domain) is int and type(lost) is bool):
-            raise ValueError
-        if not 0.0 <= accept <= KEPT_FOR:
-            raise ValueError
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        entry["servers"] = frozenset(map(bytes.fromhex, entry["servers"]))
+        return Sent(bytes.fromhex(path.stem), author=author, path=path, **entry)
+    except (ValueError, KeyError, TypeError, RecursionError):
         what = "damaged, or of another version (remove it when nothing runs there)"
         raise OSError(errno.EBADMSG, what, str(path)) from None
-    return Sent(bytes.fromhex(path.stem), action, domain, servers, accept, lost, author, path)
 
 
 def _tidy(directory: Path) -> None:
     """Remove what the dead have left and nobody has wanted for long."""
     for path in directory.glob("*" + _SUFFIX):
         with contextlib.suppress(OSError):
-            author = _author(path)
-            is_old = time.time() - path.lstat().st_mtime > KEPT_FOR
-            if is_old and author is not None and not (author.here and author.alive):
+            if time.time() - path.lstat().st_mtime > KEPT_FOR and _gone_author(path) is not None:
                 path.unlink()

@@ -25,7 +25,7 @@ from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.ids import Author, author_of
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
-from bt_actions.recovery.ledger import Sent, left_behind, mark_lost, strike_left
+from bt_actions.recovery.ledger import Sent, left_behind
 from bt_actions.recovery.left_behind import GONE, LeftBehind
 from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, RollCall
 from bt_actions.ros.onlooker import ActionView, CannotStart, Onlooker, onlooker
@@ -211,11 +211,11 @@ class _Sweep:
                 continue
             if left.awaited:
                 if was_looked_for and not self._calls[sent.action].servers:
-                    mark_lost([sent])
+                    sent.mark_lost()
             elif left.nothing_left == GONE:
-                mark_lost([sent])
+                sent.mark_lost()
             elif len(sent.servers) <= 1 or left.nothing_left:  # another may not have decided
-                strike_left([sent])
+                sent.strike()
 
     def _lacks(self) -> list[str]:
         """Return the actions that are looked for, and not known."""
