@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 
 from bt_actions.messages.fields import constants
 from bt_actions.messages.interfaces import PARTS, UnknownInterface, called, interface, short_name
-from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean, what_it_has
 from bt_actions.utilities.units import parse_duration
 
 _BILLION = 1_000_000_000
@@ -87,9 +87,8 @@ def constant(text: str, owner: type | None) -> object:
     assert place is not None
     known = constants(place)
     if match[2] not in known:
-        near = did_you_mean(match[2], known)
-        text = f"{short_name(place)} has no constant {match[2]!r}"
-        raise ValueError(text + (near or (f"; it has {', '.join(known)}" if known else "")))
+        near = what_it_has(match[2], known)
+        raise ValueError(f"{short_name(place)} has no constant {match[2]!r}{near}")
     return known[match[2]]
 
 

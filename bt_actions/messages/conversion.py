@@ -24,11 +24,11 @@ from bt_actions.messages.fields import (
     Message,
     Scalar,
     describe,
+    no_field,
 )
 from bt_actions.messages.interfaces import interface_name, short_name
 from bt_actions.utilities.plain_data import numbers_only, plain, scalar
 from bt_actions.utilities.shorten import shorten
-from bt_actions.utilities.suggest import did_you_mean
 from bt_actions.utilities.units import parse_angle
 
 Path = tuple[str | int, ...]
@@ -165,7 +165,7 @@ class _Filler:
         for name, item in value.items():
             kind = known.get(name) if isinstance(name, str) else None
             if kind is None:
-                self._bad((*path, str(name)), _no_field(cls, str(name), known), at_key=True)
+                self._bad((*path, str(name)), no_field(cls, str(name)), at_key=True)
                 continue
             before = len(self.problems)
             converted = self.convert(kind, item, (*path, name))
@@ -285,14 +285,6 @@ def _wrong_number(name: str, value: Any) -> str | None:
         if not FLOATS[name] < abs(float(value)) < math.inf:
             return None
     return f"{show(value)} does not fit a {name}"
-
-
-def _no_field(cls: type, name: str, known: Mapping[str, FieldType]) -> str:
-    text = f"{short_name(cls)} has no field {name!r}"
-    near = did_you_mean(name, known)
-    if near:
-        return text + near
-    return f"{text}; it has {', '.join(known)}" if known else f"{text}: it has no fields"
 
 
 def show(value: object) -> str:

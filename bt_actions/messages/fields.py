@@ -14,6 +14,7 @@ from typing import Any
 
 from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.plain_data import scalar
+from bt_actions.utilities.suggest import what_it_has
 
 _BITS = (8, 16, 32, 64)
 INTEGERS = MappingProxyType(
@@ -96,6 +97,12 @@ def describe(cls: type) -> Mapping[str, FieldType]:
     return MappingProxyType(
         {name: _type(slot) for name, slot in zip(names, generated.SLOT_TYPES, strict=True)}
     )
+
+
+def no_field(cls: type, name: str) -> str:
+    """Say that a message class has no such field, and what may be meant."""
+    near = what_it_has(name, describe(cls), ": it has no fields")
+    return f"{short_name(cls)} has no field {name!r}{near}"
 
 
 @lru_cache(maxsize=4096)

@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean, what_it_has
 
 RUN_TREE = "bt_actions_interfaces/action/RunTree"
 """The action of servers of trees."""
@@ -44,12 +44,15 @@ def interface(name: str | type, kind: Kind) -> type:
     folders = (Path(entry or ".") / package / kind for entry in sys.path)
     known = next(filter(None, map(_listed, folders)), None)
     if known is None:
-        raise UnknownInterface(_missing_package(package, kind))
+        text = f"package {package!r} is not installed here, or has no {_WORDS[kind]}s"
+        near = did_you_mean(package, packages(kind), cutoff=0.8)  # most end in _msgs
+        where = ": install it, or source the workspace it is built in"
+        raise UnknownInterface(text + (near or where))
     found = getattr(importlib.import_module(f"{package}.{kind}"), short, None)
     wanted = {"action": "Goal", "srv": "Request", "msg": "get_fields_and_field_types"}[kind]
     if isinstance(found, type) and hasattr(found, wanted):
         return found
-    near = did_you_mean(short, known) or _listing(known)
+    near = what_it_has(short, known)
     raise UnknownInterface(f"package {package!r} has no {_WORDS[kind]} {short!r}{near}")
 
 
@@ -139,13 +142,3 @@ def _listed(folder: Path) -> tuple[str, ...]:
         return ()
     own = rf"^from {folder.parent.name}\.{folder.name}\._\w+ import ([A-Za-z0-9]+)\b(?!_)"
     return tuple(sorted(set(re.findall(own, text, re.MULTILINE))))
-
-
-def _missing_package(package: str, kind: Kind) -> str:
-    text = f"package {package!r} is not installed here, or has no {_WORDS[kind]}s"
-    near = did_you_mean(package, packages(kind), cutoff=0.8)  # most end in _msgs
-    return text + (near or ": install it, or source the workspace it is built in")
-
-
-def _listing(known: tuple[str, ...]) -> str:
-    return f"; it has {', '.join(known[:8])}{' ...' if len(known) > 8 else ''}" if known else ""

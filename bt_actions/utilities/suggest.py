@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["closest", "did_you_mean", "folded", "listing"]
+__all__ = ["closest", "did_you_mean", "folded", "listing", "what_it_has"]
 
 _LONGEST = 60
 _MOST = 60
@@ -52,3 +52,9 @@ def did_you_mean(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
     """``"; did you mean 'distance'?"``, or nothing."""
     near = closest(word, known, cutoff=cutoff)
     return f"; did you mean {near!r}?" if near else ""
+
+
+def what_it_has(word: str, known: Iterable[str], nothing: str = "") -> str:
+    """``"; did you mean 'distance'?"``, or ``"; it has x, y"``, or, of what has none, `nothing`."""
+    known = list(known)
+    return did_you_mean(word, known) or (f"; it has {listing(known)}" if known else nothing)

@@ -22,9 +22,9 @@ from bt_actions.messages.fields import (
     Scalar,
     constants,
     describe,
+    no_field,
 )
-from bt_actions.messages.interfaces import short_name
-from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.suggest import what_it_has
 
 __all__ = [
     "BOOL", "FLOAT", "INTEGER", "TEXT", "Report", "common_type", "infer", "named",
@@ -215,16 +215,13 @@ class _Inference:
             return known[name]
         if name in constants(owner.cls):
             return type_of_literal(constants(owner.cls)[name])
-        near = did_you_mean(name, known) or (
-            f"; it has {', '.join(known)}" if known else ": it has no fields"
-        )
-        self._wrong(node, f"{short_name(owner.cls)} has no field {name!r}{near}", "BT203")
+        self._wrong(node, no_field(owner.cls, name), "BT203")
         return None
 
     def _key(self, node: ast.expr, owner: Record, name: str) -> FieldType | None:
         known = dict(owner.items)
         if name not in known:
-            near = did_you_mean(name, known) or (f"; it has {', '.join(known)}" if known else "")
+            near = what_it_has(name, known)
             self._wrong(node, f"this mapping has no key {name!r}{near}", "BT203")
         elif name in owner.sometimes and not self._asks_for(name):
             self._wrong(node, f"not every item has the key {name!r}", "BT313")
