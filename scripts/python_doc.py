@@ -101,7 +101,6 @@ BY_OURSELVES = {
     "VirtualBackend.publisher",
     "VirtualBackend.service",
     "VirtualBackend.subscription",
-    "VirtualBackend.wake",
     "VirtualNetwork.expand",
     "VirtualNetwork.publish",
     "VirtualNetwork.serve",

@@ -14,6 +14,7 @@ from bt_actions.expressions.expression import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend, Publisher
+from bt_actions.traffic.begun import waker
 from bt_actions.wiring import backend_of
 
 LOOKS = 0.05
@@ -32,13 +33,15 @@ class Latest:
         self.newest: tuple[Any, Stopwatch] | None = None
         """The latest one, and how old it is on the node's clock."""
         self.kept: deque[Any] = deque(maxlen=0)
+        self.wake: Callable[[], None] = waker()
+        """Whom each message wakes: who has set this up, or keeps its messages."""
         kind = interface(message_type, "msg")
         self.subscription = backend.subscription(kind, topic, qos, self._take)
         self.close = self.subscription.close
 
     def keep(self, *, with_newest: bool = False) -> None:
         """From now on keep each message in `kept`, the newest hundred."""
-        self.kept = deque(maxlen=KEPT)
+        self.kept, self.wake = deque(maxlen=KEPT), waker()
         if with_newest and self.newest is not None:
             self.kept.append(self.newest[0])  # twice, should it come at this moment
 
@@ -47,7 +50,7 @@ class Latest:
         self.newest = message, Stopwatch(lambda: clock.now().ros)
         self.came += 1
         self.kept.append(message)
-        self.backend.wake()
+        self.wake()
 
 
 class TopicValue:
@@ -64,11 +67,14 @@ class TopicValue:
         self._look_again_at = 0.0
 
     def connect(self, node: Any) -> None:
-        """Subscribe on a node; again for the same node: nothing."""
-        backend = None if node is None else backend_of(node)
-        if backend is not None and (self._latest is None or self._latest.backend is not backend):
+        """Subscribe on a node; not again for the same one."""
+        if node is None:
+            return
+        backend = backend_of(node)
+        if self._latest is None or self._latest.backend is not backend:
             self.close()
             self._latest = Latest(backend, *self._given)
+        self._latest.wake = waker()
 
     def close(self) -> None:
         """Unsubscribe."""

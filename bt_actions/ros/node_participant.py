@@ -94,7 +94,7 @@ class NodeParticipant:
 
     def service(self, service_type: type, name: str) -> ServiceClient:
         """Become a client of a service."""
-        return ServiceClient(self.node, service_type, name, self.wake)
+        return ServiceClient(self.node, service_type, name)
 
     def subscription(
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
@@ -105,11 +105,6 @@ class NodeParticipant:
     def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
         """Become a publisher on a topic."""
         return Publisher(self.node, self.seen_since, message_type, topic, qos)
-
-    def wake(self) -> None:
-        """Have whoever runs a tree on this node tick it soon; callable from any thread."""
-        with host.lock:
-            self.traffic.notify(None)
 
     def log(self, level: str, text: str) -> None:
         """Write a line to the node's log."""

@@ -1,11 +1,10 @@
-"""A service client that calls once at a time and wakes the tree when the answer is there.
+"""A service client that calls once at a time and wakes who has called when the answer is there.
 
 Decides nothing: neither how long to wait nor whether to call again. Never blocks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -13,15 +12,15 @@ from rclpy.node import Node
 
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.in_sight import without_service
+from bt_actions.traffic.begun import waker
 
 
 class ServiceClient:
     """A client of one service on a node; the Service of traffic/backend.py."""
 
-    def __init__(self, node: Node, service_type: type, name: str, wake: Callable[[], None]) -> None:
+    def __init__(self, node: Node, service_type: type, name: str) -> None:
         self._node = node
         self._type = service_type
-        self._wake = wake
         self._future: Any = None
         self._client = node.create_client(
             service_type, name, callback_group=MutuallyExclusiveCallbackGroup()
@@ -55,7 +54,8 @@ class ServiceClient:
         """Begin a call; what is still under way is dropped."""
         self.drop()
         self._future = self._client.call_async(request)
-        self._future.add_done_callback(lambda _: self._wake())
+        wake = waker()
+        self._future.add_done_callback(lambda _: wake())
 
     def answer(self) -> Any:
         """Return the answer of a call that was answered; the call is over."""

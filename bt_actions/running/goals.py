@@ -1,7 +1,7 @@
 """The goals of a tree's runs: which are its own, what is told of them, which are unaccounted for.
 
-A goal is the tree's where it began in one of its ticks, wherever its leaf is by now, or where its
-leaf is in the tree. Changes are noted on any thread, and told on the one that ticks. Sends nothing.
+A goal is the tree's where its leaf, wherever that is by now, was last ticked in one of its ticks.
+Changes are noted on any thread, and told on the one that ticks. Sends nothing.
 """
 
 from __future__ import annotations
@@ -11,12 +11,10 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from py_trees.trees import BehaviourTree
-
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.traffic.handle import Change, GoalHandle, begun_in
-from bt_actions.utilities.places import root_of
+from bt_actions.traffic.begun import begun_in
+from bt_actions.traffic.handle import Change, GoalHandle, Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +33,6 @@ class RunGoals:
 
     def __init__(
         self,
-        tree: BehaviourTree,
         emit: Callable[[GoalChanged], None],
         wake: Callable[[], None],
         changed: Callable[[], None],
@@ -44,8 +41,8 @@ class RunGoals:
 
         `changed` is called, under the lock of the traffic, where one of ours has changed.
         """
-        self._tree, self._emit, self._wake, self._changed = tree, emit, wake, changed
-        self._token = object()  # in ours, which outlive the tree
+        self._emit, self._wake, self._changed = emit, wake, changed
+        self._run = Run(self._note)
         self._changes: deque[Change] = deque()
         self._handles: dict[GoalHandle, None] = {}  # in the order in which they began
         self.run_goes_on = False
@@ -53,8 +50,8 @@ class RunGoals:
 
     @contextlib.contextmanager
     def begun_here(self) -> Iterator[None]:
-        """What this thread begins meanwhile is ours."""
-        before = begun_in.set(self._token)
+        """What this thread sets up and ticks meanwhile is ours."""
+        before = begun_in.set(self._run)
         try:
             yield
         finally:
@@ -86,23 +83,18 @@ class RunGoals:
             and (handle.goal.outcome is not None or not self.run_goes_on)
         ]
 
-    def note(self, change: Change | None) -> None:
-        """Take note of a change of a goal of our node; called under the lock of the traffic."""
-        if change is not None and self._is_ours(change.handle):
+    def close(self) -> None:
+        """Take note of nothing any more."""
+        self._run.tell = lambda change: None
+
+    def _note(self, change: Change | None) -> None:
+        if change is not None:
             self._handles[change.handle] = None
             self._changes.append(change)
             self._changed()
         elif not self.run_goes_on:
             return
         self._wake()
-
-    def _is_ours(self, handle: GoalHandle) -> bool:
-        """Whether it is the tree's; between two runs, also whether a run has left it."""
-        began, owner = handle.begun_in is self._token, handle.owner
-        if not self.run_goes_on:
-            return handle in self._handles or (began and not handle.is_over)
-        in_tree = owner is not None and root_of(owner) is self._tree.root
-        return began or in_tree or handle in self._handles
 
     def tell(self, now: float) -> None:
         """Tell what was noted, and forget what is over."""

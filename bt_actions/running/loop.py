@@ -76,7 +76,7 @@ class TickLoop:
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
         self._observers: list[Observer] = []
-        self.goals = RunGoals(tree, self._emit, wake, lambda: self.watchdog.watch())
+        self.goals = RunGoals(self._emit, wake, lambda: self.watchdog.watch())
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
         self._left = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
@@ -91,7 +91,6 @@ class TickLoop:
         self._error: BaseException | None = None
         """What is raised after the drain; also what an observer raised to end the program."""
         self._drain: Drain | None = None
-        self._traffic.observe(self.goals.note)
 
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event, in the step; one that raises is removed."""
@@ -136,7 +135,9 @@ class TickLoop:
         self._now = now
         if self._drain is None:
             try:
-                if (seconds := self._go_on()) is not None:
+                with self.goals.begun_here():
+                    seconds = self._go_on()
+                if seconds is not None:
                     return Sleep(seconds)
             except BaseException as error:  # noqa: BLE001 - raised again after the drain
                 self.fail(error)
@@ -215,8 +216,7 @@ class TickLoop:
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
         try:
-            with self.goals.begun_here():
-                self._guarded(lambda: tick_once(self.tree, self._visitor))
+            self._guarded(lambda: tick_once(self.tree, self._visitor))
         except _Abandoned:
             pass
         finally:
@@ -325,7 +325,7 @@ class TickLoop:
 
     def close(self, now: float) -> None:
         """Listen to goals no more, and tell what has only now become known of them."""
-        self._traffic.unobserve(self.goals.note)
+        self.goals.close()
         self.goals.tell(now)
 
     # Who is told

@@ -12,6 +12,7 @@ from bt_actions.goals.terms import Now
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
+from bt_actions.traffic.begun import waker
 from bt_actions.traffic.traffic import Traffic
 
 
@@ -35,7 +36,7 @@ class VirtualBackend:
 
     def service(self, service_type: type, name: str) -> VirtualService:
         """Become a client of a service."""
-        return VirtualService(self.network, service_type, name, self.wake)
+        return VirtualService(self.network, service_type, name)
 
     def subscription(
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
@@ -46,10 +47,6 @@ class VirtualBackend:
     def publisher(self, message_type: type, topic: str, qos: str) -> VirtualSpeaker:
         """Become a publisher on a topic."""
         return VirtualSpeaker(self.network, topic, qos)
-
-    def wake(self) -> None:
-        """Have the tree ticked soon."""
-        self.traffic.notify(None)
 
     def log(self, level: str, text: str) -> None:
         """Write a line of the tree's to the network's log."""
@@ -74,13 +71,10 @@ class VirtualClock:
 class VirtualService:
     """A client of one service, and its call under way."""
 
-    def __init__(
-        self, network: VirtualNetwork, service_type: type, name: str, wake: Callable[[], None]
-    ) -> None:
+    def __init__(self, network: VirtualNetwork, service_type: type, name: str) -> None:
         self.name = network.expand(name)
         self._network = network
         self._type = service_type
-        self._wake = wake
         self._call: list[Any] | None = None
         """The answer of the call under way, once it is there."""
 
@@ -106,7 +100,7 @@ class VirtualService:
     def call(self, request: Any) -> None:
         """Begin a call."""
         call: list[Any] = []
-        self._call = call
+        self._call, wake = call, waker()
         if served := self._network.service(self._type, self.name):
             answer, takes = served
 
@@ -117,7 +111,7 @@ class VirtualService:
             def arrive(response: Any) -> None:
                 if self._call is call:
                     call.append(response)
-                    self._wake()
+                    wake()
 
             self._network.soon(reply)
 

@@ -31,7 +31,7 @@ class Clock(Protocol):
 
 
 class Service(Protocol):
-    """A client of one service, and its call under way, if any. Wakes the tree at the answer."""
+    """A client of one service, and its call under way, if any. Its answer wakes who has called."""
 
     @property
     def name(self) -> str:
@@ -135,9 +135,6 @@ class Backend(Protocol):
 
     def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
         """Become a publisher."""
-
-    def wake(self) -> None:
-        """Have whoever runs a tree here tick it soon; callable from any thread."""
 
     def log(self, level: str, text: str) -> None:
         """Write a line of the tree's; `level` is one of `LEVELS`."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bt_actions.goals.terms import Command, Event, State
+from bt_actions.traffic.begun import note, wake
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.effects import Do, Effect
 from bt_actions.traffic.handle import Endpoint, GoalHandle
@@ -28,7 +29,7 @@ class EffectRunner:
         """`failed` is told what could not be done, which is asked for again later."""
         self._endpoint, self._host, self._domain, self._failed = endpoint, host, domain, failed
         self._does: dict[Do | Command, Callable[[GoalHandle], None]] = {
-            Do.NOTE: lambda handle: handle.reporter.note(handle),
+            Do.NOTE: lambda handle: note(host, handle),
             Do.WAKE_WAITING: self._wake_waiting,
             Do.RECORD: self._record_again,
             Do.STRIKE: lambda handle: host.record.strike(handle.goal.id),
@@ -108,6 +109,5 @@ class EffectRunner:
 
     def _wake_waiting(self, _: GoalHandle) -> None:
         """Wake those of all nodes whose goals wait: there may be room, or no conflict any more."""
-        waiting = [each.reporter for each in self._domain.open if each.has_unsent]
-        for reporter in dict.fromkeys(waiting):
-            reporter.notify(None)
+        handles = (handle for each in self._domain.open for handle in each.goals.values())
+        wake(handle for handle in handles if not handle.goal.sent)

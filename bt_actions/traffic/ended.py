@@ -50,7 +50,7 @@ class EndedGoals:
 
         def again() -> GoalHandle:
             new = turned_up_again(*what, endpoint.participant.now())
-            return GoalHandle(new, endpoint, endpoint.reporter, owner(), *whose)
+            return GoalHandle(new, endpoint, owner(), *whose)
 
         self._ended[goal.id] = Ended(
             again, goal.accepted, handle.replies.sent_to, self._host.steady()

@@ -22,11 +22,12 @@ from bt_actions.goals.terms import (
 )
 from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
 from bt_actions.servers.replies import DENIALS, Told
+from bt_actions.traffic.begun import wake
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.effect_runner import EffectRunner
 from bt_actions.traffic.effects import Before, Effect, what_follows
 from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.handle import GoalHandle, Reporter
+from bt_actions.traffic.handle import GoalHandle, NodeTraffic
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import Predecessors
 from bt_actions.traffic.route import Route
@@ -53,12 +54,12 @@ class ActionEndpoint:
         host: Host,
         participant: Participant,
         domain: Domain,
-        reporter: Reporter,
+        traffic: NodeTraffic,
         action_type: Any,
         name: str,
     ) -> None:
         self._host = host
-        self.participant, self.domain, self.reporter = participant, domain, reporter
+        self.participant, self.domain, self._traffic = participant, domain, traffic
         self.action_type = action_type
         self.name = name
         self.users = 0
@@ -113,7 +114,7 @@ class ActionEndpoint:
         self.tell(handle, Event.FEEDBACK, feedback)
         if handle.keeps_feedback and handle.goal.outcome is None:
             handle.feedback.append(feedback)
-            self.reporter.notify(None)
+            wake([handle])
 
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
@@ -130,11 +131,11 @@ class ActionEndpoint:
     def probe_answered(self, probe: int) -> None:
         """Pass on the answer to a probe."""
         self.watch.probe_answered(self._host.steady(), probe)
-        self.reporter.notify(None)
+        wake(self.goals.values())
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
-        self.reporter.drop_if_unused(self)
+        self._traffic.drop_if_unused(self)
 
     def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight.
@@ -244,7 +245,7 @@ class ActionEndpoint:
         commands = goal.on(event, now, detail)
         trace.told(handle, event, detail, commands)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
-            goal.reason += self.reporter.why_not(handle)
+            goal.reason += self._traffic.why_not(handle)
         newly_gone = goal.lost and not was_lost and goal.end is End.SERVER_GONE
         if newly_gone and handle.look_out_left is None:
             handle.look_out_left = LOOKED_OUT_FOR
@@ -303,7 +304,7 @@ class ActionEndpoint:
             self.domain.open.pop(self, None)
             self._host.scheduler.remove(self)
             self.watcher.rest()
-            self.reporter.drop_if_unused(self)
+            self._traffic.drop_if_unused(self)
         self._host.trace.retired(handle)
 
     def goals_of(self, owner: Any) -> list[GoalHandle]:

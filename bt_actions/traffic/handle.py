@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -22,18 +21,9 @@ from bt_actions.traffic.transport import ActionTransport, Listener, Participant
 FEEDBACK_KEPT = 100
 """Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
 
-begun_in: ContextVar[object] = ContextVar("begun_in", default=None)
-"""Which run begins goals on this thread, set by whoever ticks its tree; None: nobody said it."""
 
-
-class Reporter(Protocol):
-    """Who reports what becomes of goals (Traffic)."""
-
-    def note(self, handle: GoalHandle) -> None:
-        """Report a goal's change."""
-
-    def notify(self, change: Change | None) -> None:
-        """Tell the observers, and whoever waits; None: something may be sent, or can be read."""
+class NodeTraffic(Protocol):
+    """What an endpoint asks of its node (Traffic)."""
 
     def why_not(self, handle: GoalHandle) -> str:
         """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
@@ -46,7 +36,6 @@ class Endpoint(Listener, Protocol):
     """One action as one node sees it (ActionEndpoint), as its parts and its neighbors know it."""
 
     participant: Participant
-    reporter: Reporter
     name: str
     action_type: Any
     users: int
@@ -118,14 +107,12 @@ class GoalHandle:
     goal: Goal
     endpoint: Endpoint
     """Where it is sent; the endpoint that sees a lost goal's server again takes it over."""
-    reporter: Reporter
-    """Of the node that is told of its changes: where it was begun, or was adopted later."""
     owner: Any
     """The leaf; None where it is gone, and a second server has taken its goal, too."""
     name: str
     """The leaf's."""
-    begun_in: object = None
-    """Which run it belongs to; None where nobody said it."""
+    begun_in: Run | None = None
+    """Which run it belongs to: the last one that ticked its leaf; None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
@@ -171,9 +158,8 @@ class GoalHandle:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What an observer is told: a goal has a new state, outcome or end."""
+    """What a run is told: a goal of its has a new state, outcome or end."""
 
-    time: float
     handle: GoalHandle
     state: State
     outcome: Outcome | None
@@ -181,5 +167,9 @@ class Change:
     reason: str
 
 
-Observer = Callable[[Change | None], None]
-"""Called under the lock, on any thread; None means: something to read, no change of a goal."""
+@dataclass(eq=False)
+class Run:
+    """Who runs a tree, as its goals know it, which outlive both."""
+
+    tell: Callable[[Change | None], None]
+    """Takes note, on any thread, of a change, under the lock; of None: there is reason to tick."""

@@ -45,11 +45,10 @@ def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
     """Take over what was lost, or left, at this action before, to cancel it first."""
     for handle in domain.lost.pop((endpoint.name, endpoint.action_type), []):
         saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at
-        if handle.reporter is not endpoint.reporter and not saw_it:
+        if handle.endpoint.participant is not endpoint.participant and not saw_it:
             first = handle.not_gone_before == NEVER  # a later node need only have discovered
             until = host.steady() + (LEASE if first else TOO_NEW)
             handle.not_gone_before = max(handle.not_gone_before, until)
-        handle.reporter = endpoint.reporter
         endpoint.take_in(handle)
 
 

@@ -5,28 +5,28 @@ goal is driven by what arrives, whether or not anybody ticks: answers, deadlines
 the servers (scheduler.py). What a leaf leaves behind is thereby drained without it.
 
 One lock guards all of it. Under the lock nothing waits, and of the user's code only what says so:
-observers, which take note, and `ActionBehaviour.settles`. This file decides nothing about a goal
-(goals/goal.py), its tries (goals/attempts.py), or whether it may be sent (admission.py).
+`ActionBehaviour.settles`. This file decides nothing about a goal (goals/goal.py), its tries
+(goals/attempts.py), or whether it may be sent (admission.py).
 """
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from bt_actions.goals.goal import Goal
-from bt_actions.goals.policy import Busy, End, Timeouts
+from bt_actions.goals.policy import Busy, Timeouts
 from bt_actions.goals.terms import Event, Now, State
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
 from bt_actions.traffic.admission import Admission
+from bt_actions.traffic.begun import begun_in, note
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Change, Endpoint, GoalHandle, Observer, begun_in
+from bt_actions.traffic.handle import Endpoint, GoalHandle
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.transport import Participant
-from bt_actions.utilities.plain_text import in_words, raised
+from bt_actions.utilities.plain_text import in_words
 
 
 class Traffic:
@@ -40,7 +40,6 @@ class Traffic:
         self._endpoints: dict[str, ActionEndpoint] = {}
         self._admission = Admission(host, self._domain, self._endpoints, self._open_to)
         self.why_not = self._admission.why_not
-        self._observers: list[Observer] = []
 
     def now(self) -> Now:
         """Return this moment, by both clocks of the node."""
@@ -118,16 +117,15 @@ class Traffic:
                 self.host.new_goal_id(), endpoint.name, timeouts, self.now(),
                 resources=held, busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
-            began = begun_in.get()
             handle = GoalHandle(
-                goal, endpoint, self, owner, owner.name, began, attempt, keeps_feedback
+                goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback
             )
             handle.begun_at = self.host.steady()
             self.host.trace.begun(handle)
             endpoint.take_in(handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
             if answer is None:
-                self.note(handle)
+                note(self.host, handle)
             else:
                 endpoint.tell(handle, answer)
             return handle
@@ -144,10 +142,11 @@ class Traffic:
     def advance(self, handle: GoalHandle, make_message: Callable[[], Any]) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
 
-        `make_message` is called without the lock, on the caller's thread, at most once a call (the
-        server may go meanwhile); what it raises makes the goal INVALID_GOAL.
+        It belongs from now on to the run that ticks its leaf. `make_message` is called without the
+        lock, on the caller's thread, at most once a call (the server may go meanwhile); what it
+        raises makes the goal INVALID_GOAL.
         """
-        endpoint = handle.endpoint
+        endpoint, handle.begun_in = handle.endpoint, begun_in.get() or handle.begun_in
         with self.host.lock:
             if handle.goal.state is State.DONE:
                 return
@@ -198,45 +197,6 @@ class Traffic:
                 if handle.paused_at is not None:
                     handle.goal.postpone(self.host.steady() - handle.paused_at)
                     handle.paused_at = None
-
-    # Who watches
-
-    def observe(self, observer: Observer) -> None:
-        """Call `observer` at every change, under the lock: it must only take note."""
-        with self.host.lock:
-            self._observers.append(observer)
-
-    def unobserve(self, observer: Observer) -> None:
-        """Stop calling `observer`."""
-        with self.host.lock, contextlib.suppress(ValueError):
-            self._observers.remove(observer)
-
-    def note(self, handle: GoalHandle) -> None:
-        """Report a goal's change to the log and the observers."""
-        goal, log = handle.goal, self.host.log
-        unknown = goal.outcome is not None and goal.end is End.UNKNOWN
-        if unknown and not handle.told_unknown:
-            if handle.told_gone:
-                log.warning(
-                    f"{goal!r}: its server is back; canceling it, should it still run there"
-                )
-            else:
-                why = f"{goal.reason}{goal.cancel_said}"
-                log.error(f"{goal!r}: not accounted for, it may still be running: {why}")
-        elif not unknown and handle.told_unknown:
-            log.info(f"{goal!r}: accounted for at last")
-        handle.told_unknown, handle.told_gone = unknown, goal.end is End.SERVER_GONE
-        self.notify(Change(self.now().ros, handle, goal.state, goal.outcome, goal.end, goal.reason))
-
-    def notify(self, change: Change | None) -> None:
-        """Tell the observers, and whoever waits."""
-        for observer in list(self._observers):
-            try:
-                observer(change)
-            except Exception as error:  # noqa: BLE001 - the run goes on without it
-                self._observers.remove(observer)
-                self.host.log.error(f"an observer of goals raised and was removed: {raised(error)}")
-        self.host.changed.notify_all()
 
     def drain(
         self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False

@@ -11,6 +11,7 @@ import contextlib
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
+from bt_actions.traffic.begun import wake
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint, GoalHandle
 from bt_actions.traffic.host import Host
@@ -118,10 +119,10 @@ class Watcher:
         self._was_away = False
         held_back = (now - endpoint.in_sight_since < BESIDE, self._route.holds_back(now))
         if any(was and not still for was, still in zip(self._held_back, held_back, strict=True)):
-            endpoint.reporter.notify(None)  # what was held back for it may be sent
+            wake(endpoint.goals.values())  # what was held back for it may be sent
         self._held_back = held_back
         if state is not before:
-            endpoint.reporter.notify(None)
+            wake(endpoint.goals.values())
             self._domain.ever_lost_sight |= state is Server.ABSENT
             self._domain.known.add((endpoint.name, endpoint.action_type))
         self._route.seek(now)

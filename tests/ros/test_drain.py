@@ -38,7 +38,7 @@ def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> 
     endpoint: Any = Endpoint(
         in_doubt=lambda _: 0.0, is_parents=False, cancels=Cancels(), tell=tell, **nothing
     )
-    made = GoalHandle(goal, endpoint, endpoint, None, "m")
+    made = GoalHandle(goal, endpoint, None, "m")
     made.look_out_left = look_out_left
     return made
 

@@ -19,6 +19,7 @@ from py_trees.common import Status
 from py_trees.composites import Selector
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
+from bt_actions.events import Event, GoalChanged
 from bt_actions.goals.attempts import AttemptRecord
 from bt_actions.goals.terms import State
 from bt_actions.ros.action_transport import RosTransport
@@ -32,7 +33,6 @@ from bt_actions.servers.presence import (
     ServerWatch,
 )
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Change
 from tests.support.middleware import AS_IT_COMES, NOTHING_SET
 from tests.support.processes import Host, HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -1004,17 +1004,16 @@ class TestTwice:
         other.freeze()
         runner = TreeRunner(leaf, node=node)
         assert runner.run(30.0) is Status.SUCCESS
-        told = list[Change | None]()
-        traffic_of(node).observe(told.append)
+        told = list[Event]()
+        runner.observe(told.append)
         other.thaw()
         until(lambda: not leaf.drained, 10.0)
-        if loop == "our runner":
-            runner.shutdown()
-        else:
+        if loop == "a foreign loop":
             runner.tree.shutdown()
-        traffic_of(node).unobserve(told.append)
+            assert leaf.drained
+        runner.shutdown()
         assert "canceled" in of_process(journal, other.pid)
-        ends = [(change.outcome, change.end) for change in told if change is not None]
+        ends = [(event.outcome, event.end) for event in told if isinstance(event, GoalChanged)]
         assert ends[-1] == (Outcome.SERVER_AMBIGUOUS, End.CANCELED)
         assert leaf.drained
         assert runner.unaccounted == []

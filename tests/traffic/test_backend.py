@@ -12,6 +12,8 @@ from std_srvs.srv import SetBool
 
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
+from bt_actions.traffic.begun import begun_in
+from bt_actions.traffic.handle import Run
 from bt_actions.wiring import backend_of
 from tests.support.waiting import until
 
@@ -114,9 +116,9 @@ def name() -> str:
 def told(world: World) -> Iterator[list[Any]]:
     """What who runs a tree here is told; None is a wake-up."""
     told: list[Any] = []
-    world.backend.traffic.observe(told.append)
+    before = begun_in.set(Run(told.append))
     yield told
-    world.backend.traffic.unobserve(told.append)
+    begun_in.reset(before)
 
 
 def switched(request: Any) -> Any:
@@ -134,11 +136,6 @@ def test_time_goes_on_and_a_stamp_is_of_the_node_s_own_clock(world: World) -> No
     world.until(lambda: clock.now().steady > first.steady and clock.now().ros > first.ros)
     assert isinstance(first_stamp, int)
     assert clock.stamp() > first_stamp
-
-
-def test_who_runs_a_tree_is_woken(world: World, told: list[Any]) -> None:
-    world.backend.wake()
-    assert told == [None]
 
 
 def test_a_line_of_each_level_can_be_logged(world: World) -> None:
