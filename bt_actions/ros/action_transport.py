@@ -283,6 +283,12 @@ class RosTransport:
         """Return the GIDs of the servers in sight; raises InvalidHandle where the node is gone."""
         return servers(self._node, self._name)
 
+    def count(self) -> int:
+        """How many readers of goal requests are shown, at a tenth of the cost of `servers`."""
+        node = self._node.handle
+        with node:
+            return int(node.get_count_services(f"{self._name}/_action/send_goal"))
+
     def ready(self) -> bool:
         """Whether all parts of a server are in sight; raises InvalidHandle as well."""
         with self._node.handle:

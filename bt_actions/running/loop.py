@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from py_trees.behaviour import Behaviour
@@ -20,7 +20,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.running.goals import RunGoals
-from bt_actions.running.ticking import ChangeVisitor, Misbehaviour, tick_once
+from bt_actions.running.ticking import RARELY, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain
 from bt_actions.utilities.places import culprit_of, path_of
@@ -65,7 +65,8 @@ class TickLoop:
         Args:
             tree: what is ticked.
             node: what each behaviour is set up with; a Backend may stand for it.
-            heartbeat: seconds after which it ticks though nothing has happened.
+            heartbeat: seconds after which it ticks though nothing has happened; less often where
+                nothing that was ticked watches the clock (ticking.py).
             wake: is called on any thread, and in signal handlers, where a step is wanted now.
             ready: is called in each run when the tree is set up, before the first tick.
             check: is called before each tick; what it raises ends the run.
@@ -172,16 +173,16 @@ class TickLoop:
         if self.is_to_end(self._now):
             return None
         self.goals.tell(self._now)
-        wait = min(self.heartbeat, LONGEST_WAIT, max(0.0, self._deadline - self._now))
+        wait = min(LONGEST_WAIT, max(0.0, self._deadline - self._now))
         if self._held():
-            return wait
+            return min(wait, self.heartbeat)
         self._burst = (self._burst + 1) % BURST if self._tick() else 0
         if self.watchdog.gave_up:
             return None
         if self.tree.root.status in (Status.SUCCESS, Status.FAILURE):
             self._status = self.tree.root.status
             return None
-        return 0.0 if self._burst else min([wait, *self._dues()])
+        return 0.0 if self._burst else min(wait, self._rests_for())
 
     def _set_up_missing(self) -> None:
         """Set up what was not yet: the tree, in the first run, or what is new in it."""
@@ -230,12 +231,16 @@ class TickLoop:
             raise _Abandoned
         return self._misbehaved()
 
-    def _dues(self) -> Iterator[float]:
-        """The deadlines that running behaviours have of their own, as seconds from now."""
-        for due_in in self._visitor.timed:
+    def _rests_for(self) -> float:
+        """Seconds until the next tick, where nothing happens before."""
+        tree, visitor = self.tree, self._visitor
+        others = tree.pre_tick_handlers or tree.post_tick_handlers or len(tree.visitors) > 1
+        rest = self.heartbeat * (1.0 if others or visitor.watching else RARELY)
+        for due_in in visitor.timed:
             due = due_in()
             if isinstance(due, int | float):
-                yield max(due, 0.001)
+                rest = min(rest, self.heartbeat, max(due, 0.001))
+        return rest
 
     def _held(self) -> bool:
         """Whether the tree is paused; carries a change of that over to goals not sent yet."""

@@ -47,7 +47,8 @@ class TreeRunner:
             all runners that give neither this nor any of what follows but `heartbeat`. A node that
             is in an executor is never spun here: its owner spins it.
         executor: "multi" (the default), "single", or an executor; one without nodes is spun here.
-        heartbeat: seconds after which the tree is ticked though nothing has happened.
+        heartbeat: seconds after which the tree is ticked though nothing has happened; 20 times as
+            many where what it ticked waits for goals alone, as only others watch the clock.
         namespace: of the node that is made here.
         name: of that node; one that no other has where it is left out.
         context: for that node; it is shut down with it.

@@ -4,10 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 
+from py_trees import composites, decorators
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
+
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.decorators import Subtree
+from bt_actions.behaviours.loops import ForEach, Repeat, RetryChild
+from bt_actions.behaviours.parallel import Parallel
+
+RARELY = 20.0
+"""Heartbeats until a tree is ticked in which nothing watches the clock, come what may."""
+_PASS_ON = {
+    composites.Sequence,
+    composites.Selector,
+    composites.Parallel,
+    decorators.Inverter,
+    decorators.FailureIsSuccess,
+    decorators.SuccessIsFailure,
+    decorators.OneShot,
+    Parallel,
+    Subtree,
+    RetryChild,
+    Repeat,
+    ForEach,
+}
+"""Kinds that make their status of that of their children, and look at nothing else."""
 
 
 def tick_once(tree: BehaviourTree, changes: ChangeVisitor) -> None:
@@ -54,6 +78,8 @@ class ChangeVisitor(VisitorBase):
         self._running: list[Behaviour] = []
         self.timed: list[Callable[[], object]] = []
         """`due_in` of those that run and have one (ActionBehaviour.due_in)."""
+        self.watching = True
+        """Whether any that was ticked may watch what tells nobody, as the clock or a variable."""
         self._before, self._after_each = before, after_each
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
@@ -108,6 +134,10 @@ class ChangeVisitor(VisitorBase):
             self._running = [node for node in visited if node.status is Status.RUNNING]
             dues = [getattr(node, "due_in", None) for node in self._running]
             self.timed = [due for due in dues if callable(due)]
+            self.watching = any(
+                type(node) not in _PASS_ON and type(node).update is not ActionBehaviour.update
+                for node in visited
+            )
         return changes
 
     def stopped(self) -> list[tuple[Behaviour, Status]]:

@@ -138,6 +138,10 @@ class VirtualTransport:
             raise RuntimeError("this participant is gone")
         return frozenset(server.gid for server in self._shown())
 
+    def count(self) -> int:
+        """Count them."""
+        return len(self.servers())
+
     def ready(self) -> bool:
         """Whether a server is shown."""
         return bool(self.servers())

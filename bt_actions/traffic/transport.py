@@ -92,6 +92,9 @@ class ActionTransport(Protocol):
     def servers(self) -> frozenset[GID]:
         """Return who is shown to take goal requests; raises where the participant is gone."""
 
+    def count(self) -> int:
+        """How many `servers` are shown, for a fraction of the time; raises as that does."""
+
     def ready(self) -> bool:
         """Whether a server is shown with all of its parts; raises as `servers` does."""
 

@@ -19,10 +19,11 @@ from bt_actions.traffic.route import Route
 
 LOOK_WHILE_WAITING = 0.05
 LOOK_WHILE_RUNNING = 0.2
-LOOK_WHILE_LOST = 1.0
+LOOK_WHILE_LOST = LOOK_AT_REST = 1.0
 DELIVER_EVERY = 0.01
 """Seconds between two looks at a server: somebody waits for it; goals run on it; only its return
-would matter. The last: between two takes of answers, where nobody spins."""
+would matter, or it is ready and alone, so that it does to count those in sight meanwhile (at least
+every AT_LEAST_EVERY). The last: between two takes of answers, where nobody spins."""
 LATE = 0.5
 """Seconds by which a look is so late that answers may have come in between, unseen."""
 SILENT_FOR = 40.0
@@ -39,7 +40,8 @@ class Watcher:
     def __init__(self, endpoint: Endpoint, host: Host, domain: Domain, route: Route) -> None:
         self._endpoint, self._host, self._domain, self._route = endpoint, host, domain, route
         self._look_at = 0.0
-        self._looked_like = Server.ABSENT  # at the last look
+        self._counted = 0  # at the last look
+        self._looked_like = Server.ABSENT
         self._was_away = False  # seen between two looks
         self._held_back = (True, True)  # as a server has just come; by `Route.holds_back`
         self._looked_out_at = host.steady()
@@ -49,13 +51,15 @@ class Watcher:
         """Look, send and apply deadlines as far as due; return the seconds until there is more."""
         endpoint = self._endpoint
         self._look_out(now)
-        if now >= self._look_at:
+        if now >= self._look_at or self._counts_others():
             self.observe_and_tell(now)
             unclear = endpoint.watch.state(now) is Server.UNCLEAR
             if unclear or endpoint.has_unsent:
                 self._look_at = now + LOOK_WHILE_WAITING
             elif any(not handle.is_over for handle in endpoint.goals.values()):
-                self._look_at = now + LOOK_WHILE_RUNNING
+                alone = self._looked_like is Server.READY and not endpoint.watch.is_crowded
+                rests = alone and not any(self._held_back)
+                self._look_at = now + (LOOK_AT_REST if rests else LOOK_WHILE_RUNNING)
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
@@ -71,6 +75,13 @@ class Watcher:
                 wait = min(wait, due)
         handover.bound_the_lost(endpoint, self._host)
         return max(wait, 0.001)
+
+    def _counts_others(self) -> bool:
+        """Whether a server has come or gone since the last look, or our node was destroyed."""
+        try:
+            return self._endpoint.transport.count() != self._counted
+        except Exception:  # noqa: BLE001 - the middleware's: any
+            return not self._endpoint.orphaned
 
     def rest(self) -> None:
         """No look is due any more, and none will be late."""
@@ -146,6 +157,7 @@ class Watcher:
     def _ask_discovery(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""
         transport = self._endpoint.transport
+        self._counted = transport.count()
         ready, servers = transport.ready(), transport.servers()
         self._endpoint.watch.observe(now, ready, servers, concludes=concludes)
 

@@ -55,6 +55,9 @@ class ModelTransport:
         self._caller.looks += 1
         return self._caller.world.shown(self._name, self._node)
 
+    def count(self) -> int:
+        return len(self._caller.world.shown(self._name, self._node))
+
     def send(self, goal_id: bytes, goal: Any) -> None:
         caller = self._caller
         if caller.takes("fails_to_send"):

@@ -14,7 +14,7 @@ from robot_control_interfaces.action import MoveRobot as Move
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeError
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
-from tests.support.trees import in_sequence, state, together
+from tests.support.trees import Gate, in_sequence, state, together
 
 
 class Stage:
@@ -61,6 +61,16 @@ class TestTicks:
         assert stage.runner.run() is status
         assert stage.runner.now < by
         assert tree.count < 40
+
+    @pytest.mark.parametrize(("beside", "ticks"), [([], range(9)), ([Gate()], range(80, 99))])
+    def test_come_at_heartbeats_where_more_than_a_goal_is_waited_for(
+        self, beside: list[Behaviour], ticks: range
+    ) -> None:
+        tree = BehaviourTree(together(MoveRobot("m", 1.0), *beside))
+        runner = Stage(tree).runner
+        runner.start()
+        runner.advance(8.0)
+        assert tree.count in ticks
 
     def test_come_at_once_where_one_leaf_follows_another(self) -> None:
         leaves = [MoveRobot(f"m{number}", 0.0) for number in range(20)]

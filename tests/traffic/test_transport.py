@@ -170,8 +170,9 @@ def test_who_is_there_is_in_sight_until_it_goes(side: Side) -> None:
     (gid,) = side.transport.servers()
     side.serve()
     assert gid in side.transport.servers()
+    assert side.transport.count() == 2
     first.close()
-    side.world.until(lambda: len(side.transport.servers()) == 1)
+    side.world.until(lambda: side.transport.count() == len(side.transport.servers()) == 1)
     assert gid not in side.transport.servers()
 
 
