@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import yaml
 
@@ -26,6 +26,7 @@ MAX_DEPTH = 200
 """Levels of YAML nesting, aliases unfolded; a level of the tree takes two."""
 MAX_NODES = 2_000_000
 """Nodes of a text, its aliases unfolded; a tree of 100,000 nodes has about a third of it."""
+_TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
 NO_LIBYAML = (
     "trees are read with libyaml, and PyYAML is installed without it here; its wheels hold it: "
     "pip install --force-reinstall --only-binary :all: PyYAML"
@@ -52,118 +53,148 @@ def compose_written(source: Source) -> tuple[Node | None, dict[int, str]]:
 
 
 def _composed(composer: _Composer, source: Source) -> Node | None:
-    if not yaml.__with_libyaml__:
-        raise ImportError(NO_LIBYAML, name="libyaml")
     try:
-        composer.read(yaml.CSafeLoader(source.text).get_event)
+        return composer.read()
     except yaml.YAMLError as error:
         report_syntax(source, error)
-        return None
-    except TooManyErrors:
-        return None
-    return None if composer.gave_up else composer.root
+    except (TooManyErrors, _GaveUp):
+        pass
+    return None
 
 
-class _Open:
-    """A collection whose end has not come yet."""
-
-    __slots__ = ("anchor", "before", "height", "items", "key", "keys", "node", "pairs", "refused")
-
-    def __init__(self, node: Mapping | Listing, anchor: str | None, before: int) -> None:
-        self.node = node
-        self.anchor = anchor
-        self.items = node.items if isinstance(node, Listing) else None
-        self.pairs = node.pairs if isinstance(node, Mapping) else []
-        self.key: Scalar | None = None
-        self.keys: dict[str, Scalar] = {}
-        self.refused = False
-        """Whether a list or a mapping stands as a key."""
-        self.before = before
-        """How many nodes there were before it."""
-        self.height = 1
-        """Collections inside each other, this one among them."""
+class _GaveUp(Exception):
+    """What was reported lets nothing be read on."""
 
 
 class _Composer:
-    """Puts events together. No recursion: the depth of a text is the text's author's."""
+    """Puts events together, by recursion: no deeper than `MAX_DEPTH`."""
 
     def __init__(self, source: Source, *, unfold: bool = True) -> None:
-        self.root: Node | None = None
-        self.gave_up = False
+        if not yaml.__with_libyaml__:
+            raise ImportError(NO_LIBYAML, name="libyaml")
         self._source = source
+        self._next: Callable[[], Any] = yaml.CSafeLoader(source.text).get_event
         self.anchored: dict[int, str] = {}
         self._unfold = unfold
-        self._stack: list[_Open] = []
         self._anchors: dict[str, tuple[Node, int, int] | None] = {}
         """What names stand for, with its size and its height; None while it is open."""
-        self._documents = 0
         self._size = 0
-
-    def read(self, next_event: Callable[[], Any]) -> None:
-        """Take all events, or those before the first with which it gives up."""
-        takes = {
+        self._level = 0
+        """How many collections are open."""
+        self._deepest = 0
+        """How many have been since the last of `_named` began."""
+        self._named: list[tuple[int, int]] = []
+        """Of each open collection that has an anchor, the size and the deepest before it."""
+        self._takes: dict[type, Callable[[Any], Node]] = {
+            yaml.ScalarEvent: self._scalar,
             yaml.MappingStartEvent: self._mapping,
-            yaml.MappingEndEvent: self._end,
             yaml.SequenceStartEvent: self._listing,
-            yaml.SequenceEndEvent: self._end,
             yaml.AliasEvent: self._alias,
-            yaml.DocumentStartEvent: self._document,
-            yaml.StreamStartEvent: _nothing,
-            yaml.DocumentEndEvent: _nothing,
         }
-        while (kind := type(event := next_event())) is not yaml.StreamEndEvent:
-            if kind is yaml.ScalarEvent:
-                node = Scalar()
-                node.text = event.value
-                node.plain = not event.style
-                node.begin, node.end = event.start_mark, event.end_mark
-                if event.tag is not None or event.anchor is not None:
-                    self._marked(node, event)
-                self._add(node, 0)
-            else:
-                takes[kind](event)
-            if self._size > MAX_NODES and not self.gave_up:
-                text = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
-                self._report("BT105", event, text)
-                self.gave_up = True
-            if self.gave_up:
-                return
 
-    def _document(self, event: Any) -> None:
-        self._documents += 1
-        if self._documents == 2:
-            self._report("BT106", event, "a second document begins here; one file, one tree")
-            self.gave_up = True
+    def read(self) -> Node | None:
+        """The document, after all events were taken. Raises _GaveUp."""
+        root = None
+        while type(event := self._next()) is not yaml.StreamEndEvent:
+            if type(event) is yaml.DocumentStartEvent:
+                if root is not None:
+                    self._give_up(
+                        "BT106", event, "a second document begins here; one file, one tree"
+                    )
+                event = self._next()
+                root = self._takes[type(event)](event)
+        return root
 
-    def _report(self, code: str, event: Any, message: str, hint: str | None = None) -> None:
-        self._source.report(code, _event_span(event), message, hint=hint)
+    def _report(self, code: str, event: Any, message: str) -> None:
+        self._source.report(code, _event_span(event), message)
 
-    def _marked(self, node: Scalar, event: Any) -> None:
+    def _give_up(self, code: str, event: Any, message: str) -> NoReturn:
+        self._report(code, event, message)
+        raise _GaveUp
+
+    def _count(self, event: Any) -> None:
+        self._size += 1
+        if self._size > MAX_NODES:
+            text = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
+            self._give_up("BT105", event, text)
+
+    def _scalar(self, event: Any) -> Scalar:
+        node = Scalar()
+        node.text = event.value
+        node.plain = not event.style
+        node.begin, node.end = event.start_mark, event.end_mark
         if event.tag is not None:
             node.plain = False
-        if event.tag not in (None, "!", "tag:yaml.org,2002:str"):
-            self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
-            self._source.settled.add(_event_span(event))
-            self._source.unread.nodes.append(node)
+            if event.tag not in ("!", "tag:yaml.org,2002:str"):
+                self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
+                self._source.settled.add(_event_span(event))
+                self._source.unread.nodes.append(node)
         if event.anchor is not None:
             self._source.anchored = True
             self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = (node, 1, 0)
+        self._count(event)
+        return node
 
-    def _mapping(self, event: Any) -> None:
-        node = Mapping()
-        node.pairs = []
-        self._begin(node, event)
-
-    def _listing(self, event: Any) -> None:
+    def _listing(self, event: Any) -> Listing:
         node = Listing()
-        node.items = []
+        node.items = items = []
+        anchor = event.anchor
         self._begin(node, event)
+        next_event, takes = self._next, self._takes
+        while (kind := type(event := next_event())) is not yaml.SequenceEndEvent:
+            items.append(takes[kind](event))
+        self._end(node, event, items[-1] if items else None)
+        if anchor is not None:
+            self._close(anchor, node)
+        return node
+
+    def _mapping(self, event: Any) -> Mapping:
+        node = Mapping()
+        node.pairs = pairs = []
+        anchor = event.anchor
+        self._begin(node, event)
+        keys: dict[str, Scalar] = {}
+        refused = False
+        next_event, takes = self._next, self._takes
+        while (kind := type(event := next_event())) is not yaml.MappingEndEvent:
+            key = takes[kind](event)
+            if type(key) is not Scalar:
+                hint = _braced(key) or "a text that begins with { or [ needs quotes"
+                message = "a key is a single word, not a list or a mapping"
+                self._source.report("BT109", span_of(key), message, hint=hint)
+                refused, taken = True, False
+            else:
+                key.text = sys.intern(key.text)  # a tree has few keys, and says them often
+                taken = keys.setdefault(key.text, key) is key
+                if not taken:
+                    self._report_twice(key, keys[key.text])
+            event = next_event()
+            value = takes[type(event)](event)
+            if taken:
+                pairs.append((key, value))
+            else:
+                self._source.unread.nodes.append(value)
+        self._end(node, event, pairs[-1][1] if pairs else None)
+        if "<<" in keys and self._unfold:
+            self._merge(node)
+        if refused and not pairs:
+            self._source.settled.add(span_of(node))
+        if anchor is not None:
+            self._close(anchor, node)
+        return node
+
+    def _report_twice(self, key: Scalar, first: Scalar) -> None:
+        place = Place(self._source.name, first.line, first.column)
+        self._source.report(
+            "BT104", span_of(key), f"the key {key.text!r} is here twice",
+            hint="<<: [*a, *b]" if key.text == "<<" else None,
+            related=Related(place, "first here"),
+        )  # fmt: skip
 
     def _begin(self, node: Mapping | Listing, event: Any) -> None:
-        if len(self._stack) >= MAX_DEPTH:
-            self._too_deep(event)
-            return
+        if self._level >= MAX_DEPTH:
+            self._give_up("BT105", event, _TOO_DEEP)
         if event.tag is not None and event.tag != "!":
             self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
         node.begin, node.end = event.start_mark, event.end_mark
@@ -172,90 +203,43 @@ class _Composer:
             self._source.anchored = True
             self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = None
-        self._stack.append(_Open(node, event.anchor, self._size))
+            self._named.append((self._size, self._deepest))
+            self._deepest = self._level
+        self._level += 1
+        if self._level > self._deepest:
+            self._deepest = self._level
 
-    def _too_deep(self, event: Any) -> None:
-        self._report("BT105", event, f"nested deeper than {MAX_DEPTH} levels")
-        self.gave_up = True
-
-    def _end(self, event: Any) -> None:
-        done = self._stack.pop()
-        node = done.node
+    def _end(self, node: Mapping | Listing, event: Any, last: Node | None) -> None:
+        self._level -= 1
         if node.flow:
             node.end = event.end_mark
-        elif done.items or done.pairs:
-            last = done.items[-1] if done.items else done.pairs[-1][1]
-            if last.end.index > node.begin.index:
-                node.end = last.end
-        size = self._size - done.before + 1
-        if isinstance(node, Mapping) and "<<" in done.keys and self._unfold:
-            self._merge(node)
-        if done.refused and not done.pairs:
-            self._source.settled.add(span_of(node))
-        if done.anchor is not None:
-            self._anchors[done.anchor] = (node, size, done.height)
-        self._add(node, done.height)
+        elif last is not None and last.end.index > node.begin.index:
+            node.end = last.end
+        self._count(event)
 
-    def _alias(self, event: Any) -> None:
+    def _close(self, anchor: str, node: Node) -> None:
+        before, deepest = self._named.pop()
+        self._anchors[anchor] = (node, self._size - before, self._deepest - self._level)
+        self._deepest = max(deepest, self._deepest)
+
+    def _alias(self, event: Any) -> Node:
         if event.anchor not in self._anchors:
-            self._report("BT102", event, f"there is no anchor &{event.anchor} above")
-            self.gave_up = True
-            return
+            self._give_up("BT102", event, f"there is no anchor &{event.anchor} above")
         found = self._anchors[event.anchor]
         if found is None:
-            self._report("BT105", event, f"*{event.anchor} holds itself")
-            self.gave_up = True
-            return
+            self._give_up("BT105", event, f"*{event.anchor} holds itself")
         if not self._unfold:
             alias = Alias()
             alias.name = event.anchor
             alias.begin, alias.end = event.start_mark, event.end_mark
-            self._add(alias, 0)
-            return
+            self._count(event)
+            return alias
         node, size, height = found
-        if len(self._stack) + height > MAX_DEPTH:
-            self._too_deep(event)
-            return
+        if self._level + height > MAX_DEPTH:
+            self._give_up("BT105", event, _TOO_DEEP)
+        self._deepest = max(self._deepest, self._level + height)
         self._size += size - 1
-        self._add(node, height)
-
-    def _add(self, node: Node, height: int) -> None:
-        self._size += 1
-        if not self._stack:
-            if self.root is None:
-                self.root = node
-            return
-        frame = self._stack[-1]
-        if height >= frame.height:
-            frame.height = height + 1
-        if frame.items is not None:
-            frame.items.append(node)
-        elif (key := frame.key) is None:
-            frame.key = self._key(frame, node)
-        else:
-            frame.key = None
-            if key is _REFUSED:
-                self._source.unread.nodes.append(node)
-            else:
-                frame.pairs.append((key, node))
-
-    def _key(self, frame: _Open, node: Node) -> Scalar:
-        if type(node) is not Scalar:
-            hint = _braced(node) or "a text that begins with { or [ needs quotes"
-            message = "a key is a single word, not a list or a mapping"
-            self._source.report("BT109", span_of(node), message, hint=hint)
-            frame.refused = True
-            return _REFUSED
-        node.text = sys.intern(node.text)  # a tree has few keys, and says them often
-        first = frame.keys.setdefault(node.text, node)
-        if first is not node:
-            place = Place(self._source.name, first.line, first.column)
-            self._source.report(
-                "BT104", span_of(node), f"the key {node.text!r} is here twice",
-                hint="<<: [*a, *b]" if node.text == "<<" else None,
-                related=Related(place, "first here"),
-            )  # fmt: skip
-            return _REFUSED
+        self._count(event)
         return node
 
     def _merge(self, node: Mapping) -> None:
@@ -279,9 +263,6 @@ class _Composer:
         node.pairs = pairs
 
 
-_REFUSED = Scalar()
-
-
 def _braced(node: Node) -> str | None:
     """What to write for `{{ x }}`, where the inner braces stand as a key."""
     if not isinstance(node, Mapping) or len(node.pairs) != 1 or not node.flow:
@@ -290,10 +271,6 @@ def _braced(node: Node) -> str | None:
     empty = isinstance(value, Scalar) and value.plain and not value.text
     named = re.fullmatch(r"[A-Za-z_][\w.]*", key.text, re.ASCII)
     return f"a variable is written ${key.text}" if empty and named else None
-
-
-def _nothing(event: Any) -> None:
-    """Of this event nothing is to be kept."""
 
 
 def _event_span(event: Any) -> Span:
