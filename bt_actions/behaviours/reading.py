@@ -10,7 +10,9 @@ import ast
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from bt_actions.behaviours.variables import read, write
+from py_trees.blackboard import Blackboard
+
+from bt_actions.behaviours.variables import key, read
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
@@ -54,7 +56,7 @@ def condition_of(
 class Reading:
     """The `expect`, `save` and `retry.when` of an action; a result is read first, saved later."""
 
-    __slots__ = ("_expect", "_given", "_names", "_save", "to_save", "when")
+    __slots__ = ("_expect", "_given", "_names", "_save", "_to_save", "when")
 
     def __init__(
         self,
@@ -67,10 +69,9 @@ class Reading:
         self._names = names
         self._given = expect, when, save
         self._expect = condition_of(expect, "expect", names)
-        self._save = {key: function_of(place, "save", names) for key, place in save.items()}
+        self._save = {key(name): function_of(place, "save", names) for name, place in save.items()}
         self.when = condition_of(when, "retry.when", names)
-        self.to_save: dict[str, Any] = {}
-        """What the last result gave, by blackboard key."""
+        self._to_save: list[tuple[str, Any]] = []  # of the last result, by blackboard key
 
     def unknown_field(self, result_type: Any) -> str:
         """Say which field one of them reads that a result of this type has not; or ""."""
@@ -98,12 +99,11 @@ class Reading:
         except ExpressionError as error:
             return str(error)
         try:
-            self.to_save = {key: value(result) for key, value in self._save.items()}
+            self._to_save = [(name, value(result)) for name, value in self._save.items()]
         except ValueError as error:  # ExpressionError, or what is saved does not fit
             return str(error)
         return ""
 
     def write(self) -> None:
-        """Save it."""
-        for target, value in self.to_save.items():
-            write(target, value)
+        """Save it, under keys that the leaf has registered."""
+        Blackboard.storage.update(self._to_save)

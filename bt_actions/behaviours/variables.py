@@ -70,11 +70,6 @@ def _step(value: Any, step: str, name: str) -> Any:
         raise MissingVariable(f"variable {name!r}: {step!r} is no field of a {kind}") from None
 
 
-def write(name: str, value: Any) -> None:
-    """Set a variable, as the blackboard's own clients see it."""
-    Blackboard.set(key(name), value)
-
-
 def register(leaf: Behaviour, read: Iterable[str], written: Iterable[str]) -> None:
     """Tell the blackboard, once for a leaf, which keys it reads and which variables it sets."""
     access = [*((name, Access.READ) for name in read)]

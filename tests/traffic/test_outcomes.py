@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Retry, Timeouts, Var
-from bt_actions.behaviours.variables import read, write
+from bt_actions.behaviours.variables import read
 from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
 from tests.support.trees import Gate, in_sequence, in_turn, together
@@ -81,11 +82,11 @@ class TestSucceeded:
 
     def test_variables_are_read_when_the_goal_is_sent(self, world: World) -> None:
         world.serve("1:abort")
-        write("outcome_way", {"steps": [0.3, 0.1]})
+        Blackboard.set("outcome_way", {"steps": [0.3, 0.1]})
         goals = iter([0.2])
 
         def first_fails(result: Any) -> bool:
-            write("outcome_way", {"steps": [0.3, next(goals)]})
+            Blackboard.set("outcome_way", {"steps": [0.3, next(goals)]})
             return True
 
         leaf = world.run(

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from bt_actions.behaviours.topics import TopicValue
 from bt_actions.document.building.scope import Scope
 from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.classes import Python
+from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import Computed, resolve
 from bt_actions.document.reading.inputs import convert
 from bt_actions.document.reading.settings import join_names, text_of
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
+from bt_actions.messages import fields
 
 __all__ = ["Condition", "Context", "plain_name", "table_of", "written_text"]
 
 
 Root = str | Callable[[Any], Mapping[str, object]] | None
 """The bare name that an expression has for what it is a function of; or what gives several."""
+
+
+_NUMBERS = {*fields.FLOATS, *fields.INTEGERS} - {"byte"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +60,10 @@ class Context:
 
         Raises ValueError for one that does not fit, or is too large to be kept.
         """
-        declared = self.document.outputs.get(name) or self.document.inputs.get(name)
-        kind = None if declared is None else declared.values.get("type")
+        kind = self._declared(name)
         try:
             refuse_large(value)
-            return convert(value, kind, types=self.types) if isinstance(kind, str) else value
+            return value if kind is None else convert(value, kind, types=self.types)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
@@ -79,15 +85,46 @@ class Context:
             return None
         return Condition(written.expression, root, self.read)
 
-    def saved(self, written: object, root: Root) -> dict[str, Callable[[Any], object]]:
+    def saved(
+        self, written: object, root: Root, cls: type | None = None
+    ) -> dict[str, Callable[[Any], object]]:
         """What `save` keeps, by the variable's name, as functions of a bare root.
 
-        They raise ValueError for what has no value, or does not fit its variable.
+        They raise ValueError for what has no value, or does not fit its variable. `cls` is the
+        message that the root is, where that is known.
         """
         return {
-            name: Part(place.expression, root, self, name)
+            name: self._field(place.expression, root, cls, name)
+            or Part(place.expression, root, self, name)
             for name, place in table_of(written).items()
         }
+
+    def _field(
+        self, expression: Expression, root: Root, cls: type | None, name: str
+    ) -> Callable[[Any], object] | None:
+        """What gets a field of numbers that needs no look: it is of its variable's type."""
+        path, node = list[str](), expression.tree
+        while isinstance(node, ast.Attribute):
+            path.insert(0, node.attr)
+            node = node.value
+        if cls is None or not path or not isinstance(node, ast.Name) or node.id != root:
+            return None
+        kind: fields.FieldType | None = fields.Message(cls)
+        for part in path:
+            inner = fields.describe(kind.cls) if isinstance(kind, fields.Message) else {}
+            kind = inner.get(part)
+        item = kind.item if isinstance(kind, fields.Listing) and kind.size is None else kind
+        if not isinstance(item, fields.Scalar) or item.name not in _NUMBERS:
+            return None
+        declared = self._declared(name)
+        fits = declared is None or parse_type(declared) == kind
+        return attrgetter(".".join(path)) if fits else None
+
+    def _declared(self, name: str) -> str | None:
+        """The type of a variable, where it is declared."""
+        declared = self.document.outputs.get(name) or self.document.inputs.get(name)
+        kind = None if declared is None else declared.values.get("type")
+        return kind if isinstance(kind, str) else None
 
     def holds(self, written: object) -> Callable[[], bool]:
         """A condition over variables alone as a function, which raises ExpressionError."""

@@ -31,13 +31,14 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
     settings = settings_of(node, context.document)
     goal = settings.get("goal", {})
     dynamic = any(True for _ in computed_in(goal))
+    action = _interface(settings["type"], "action", context)
     return ActionBehaviour(
         node.name,
-        _interface(settings["type"], "action", context),
+        action,
         context.name(settings, "server"),
         context.value(goal) if dynamic else goal,
         timeout=_timeouts(tuple(table_of(settings.get("timeout")).items())),
-        **_terms(settings, context, "result"),
+        **_terms(settings, context, "result", action.Result if context.types else None),
     )
 
 
@@ -54,9 +55,11 @@ def _run_tree(node: TreeNode, context: Context) -> Behaviour:
     )
 
 
-def _terms(settings: Mapping[str, object], context: Context, root: Root) -> dict[str, Any]:
+def _terms(
+    settings: Mapping[str, object], context: Context, root: Root, result: type | None = None
+) -> dict[str, Any]:
     """What a goal is sent and judged by, whatever it says."""
-    saved = context.saved(settings.get("save"), root)
+    saved = context.saved(settings.get("save"), root, result)
     given = settings.get("resources")
     resources = given if isinstance(given, list) else []
     return {
