@@ -82,20 +82,22 @@ def fill_value(kind: FieldType, data: object) -> object:
 
 
 def _filled(kind: FieldType, data: object, now: Callable[[], int]) -> Any:
-    filler = _Filler(now, None)
+    filler = _Filler(now)
     value = filler.convert(kind, data, ())
     if filler.problems:
         raise MessageError(filler.problems)
     return value
 
 
-def examine(kind: FieldType, data: object, hole: Hole | None = None) -> list[Problem]:
+def examine(
+    kind: FieldType, data: object, hole: Hole = lambda _value, _kind, _path: False
+) -> list[Problem]:
     """What is wrong with the data; makes nothing.
 
     `hole` is asked first about each value, with the type it must have: True means that it is
     settled there (a variable, whose type the caller checks).
     """
-    filler = _Filler(time.time_ns, hole, makes=False)
+    filler = _Filler(time.time_ns, hole)
     filler.convert(kind, data, ())
     return filler.problems
 
@@ -127,49 +129,46 @@ def dotted(path: Iterable[str | int]) -> str:
 class _Filler:
     """Walks type and data together; collects problems instead of raising at the first."""
 
-    def __init__(self, now: Callable[[], int], hole: Hole | None, *, makes: bool = True) -> None:
-        """With `makes=False` only the problems count: what a hole stands for is not there yet."""
+    def __init__(self, now: Callable[[], int], hole: Hole | None = None) -> None:
+        """With a `hole` only the problems count: what it stands for is not there yet."""
         self.problems: list[Problem] = []
         self._now = now
         self._hole = hole
-        self._makes = makes
         self._owner: type | None = None
 
     def convert(self, kind: FieldType, value: object, path: Path) -> Any:
+        """What the field has to hold; None where the value is settled elsewhere, or wrong."""
         if self._hole is not None and self._hole(value, kind, path):
             return None
-        if isinstance(kind, Message):
-            return self._message(kind.cls, value, path)
-        if isinstance(kind, Listing):
-            return self._listing(kind, value, path)
-        assert isinstance(kind, Scalar), "a message has no field of another kind"
-        return self._scalar(kind, value, path)
-
-    def _bad(self, path: Path, text: str, *, at_key: bool = False) -> None:
-        self.problems.append(Problem(path, text, at_key))
+        try:
+            if isinstance(kind, Message):
+                return self._message(kind.cls, value, path)
+            if isinstance(kind, Listing):
+                return self._listing(kind, value, path)
+            assert isinstance(kind, Scalar), "a message has no field of another kind"
+            return self._scalar(kind, scalar(value))
+        except ValueError as error:
+            self.problems.append(Problem(path, str(error)))
+            return None
 
     def _message(self, cls: type, value: object, path: Path) -> Any:
         if isinstance(value, cls):
             return value
-        try:
-            value = self._convenience(cls, value, path)
-        except ValueError as error:
-            self._bad(path, str(error))
-            return None
+        value = self._convenience(cls, value, path)
         if not isinstance(value, Mapping):
-            self._bad(path, f"the fields of a {short_name(cls)} are needed, not {show(value)}")
-            return None
+            raise ValueError(f"the fields of a {short_name(cls)} are needed, not {show(value)}")
         known = describe(cls)
-        message: Any = cls() if self._makes else None
+        message: Any = cls() if self._hole is None else None
         outer, self._owner = self._owner, cls
         for name, item in value.items():
             kind = known.get(name) if isinstance(name, str) else None
             if kind is None:
-                self._bad((*path, str(name)), no_field(cls, str(name)), at_key=True)
+                problem = Problem((*path, str(name)), no_field(cls, str(name)), at_key=True)
+                self.problems.append(problem)
                 continue
             before = len(self.problems)
             converted = self.convert(kind, item, (*path, name))
-            if self._makes and len(self.problems) == before and converted is not None:
+            if self._hole is None and len(self.problems) == before:
                 setattr(message, name, converted)
         self._owner = outer
         return message
@@ -192,99 +191,75 @@ class _Filler:
         return parse_angle(value)
 
     def _listing(self, kind: Listing, value: object, path: Path) -> Any:
-        code = _CODES.get(str(kind.item))
+        name = str(kind.item)
         items: Any = array.array("B", value) if isinstance(value, (bytes, bytearray)) else value
-        if hasattr(items, "tolist") and getattr(items, "typecode", None) != code:  # numpy's, too
-            items = items.tolist()
+        if hasattr(items, "tolist") and getattr(items, "typecode", None) != _CODES.get(name):
+            items = items.tolist()  # numpy's, too
         if not isinstance(items, (list, tuple, array.array)):
-            self._bad(path, f"a list of {kind.item} is needed, not {show(value)}")
-            return None
-        if kind.size is not None and len(items) != kind.size:
-            self._bad(path, f"exactly {kind.size} items are needed, not {len(items)}")
-        elif kind.limit is not None and len(items) > kind.limit:
-            self._bad(path, f"at most {kind.limit} items fit, not {len(items)}")
+            raise ValueError(f"a list of {name} is needed, not {show(value)}")
+        converted: Any = None
         if self._hole is None:  # there may be millions
-            numbers = items if isinstance(items, array.array) else _numbers(str(kind.item), items)
-            if numbers is not None:
-                return numbers
-        return [self.convert(kind.item, item, (*path, at)) for at, item in enumerate(items)]
+            converted = items if isinstance(items, array.array) else _numbers(name, items)
+        if converted is None:
+            converted = [self.convert(kind.item, each, (*path, n)) for n, each in enumerate(items)]
+        if kind.size is not None and len(items) != kind.size:
+            raise ValueError(f"exactly {kind.size} items are needed, not {len(items)}")
+        if kind.limit is not None and len(items) > kind.limit:
+            raise ValueError(f"at most {kind.limit} items fit, not {len(items)}")
+        return converted
 
-    def _scalar(self, kind: Scalar, value: object, path: Path) -> Any:
-        value = scalar(value)
+    def _scalar(self, kind: Scalar, value: Any) -> Any:
         if isinstance(value, str) and kind.name not in ("string", "wstring"):
-            try:
-                value = constant(value, self._owner)
-            except ValueError as error:
-                self._bad(path, str(error))
-                return None
-        text = _wrong(kind, value)
-        if text is not None:
-            self._bad(path, text)
-            return None
+            value = constant(value, self._owner)
+        if kind.name in FLOATS or kind.name in INTEGERS:
+            _check_number(kind.name, value)
+        elif kind.name == "bool":
+            if not isinstance(value, bool):
+                raise ValueError(f"true or false is needed, not {show(value)}")
+        elif not isinstance(value, str):
+            raise ValueError(f"a text is needed, not {show(value)}")
+        elif kind.limit is not None and len(value) > kind.limit:
+            raise ValueError(f"at most {kind.limit} characters fit, not {len(value)}")
+        elif _NO_TEXT.search(value):
+            raise ValueError("this text holds characters that no ROS string can carry")
         if kind.name in FLOATS:
-            return float(value)  # type: ignore[arg-type]
-        if kind.name == "byte" and isinstance(value, int):
-            return bytes([value])
-        return value
+            return float(value)
+        return bytes([value]) if kind.name == "byte" else value
 
 
 def _numbers(name: str, items: Sequence[Any]) -> list[Any] | None:
     """A list of a numeric type, checked without a loop of Python's; None for what needs one."""
-    kinds, numbers = set(map(type, items)), [*items]
+    kinds = set(map(type, items))
     if name in FLOATS and kinds <= {int, float}:
         with contextlib.suppress(OverflowError):
-            floats = [*map(float, numbers)]
+            floats = [*map(float, items)]
             if name == "float64" or max(map(abs, floats), default=0.0) <= FLOATS[name]:
                 return floats
-    elif kinds == {int} and name in _CODES:
+    elif name in _CODES and kinds == {int}:
         least, greatest = INTEGERS[name]
-        if least <= min(numbers) and max(numbers) <= greatest:
-            return numbers
-    elif kinds == {bool} and name == "bool":
-        return numbers
+        if least <= min(items) and max(items) <= greatest:
+            return [*items]
     return None
 
 
-def _wrong(kind: Scalar, value: object) -> str | None:
-    """Why a value does not fit a scalar type, or None."""
-    if kind.name == "bool":
-        return None if isinstance(value, bool) else f"true or false is needed, not {show(value)}"
-    if kind.name in FLOATS or kind.name in INTEGERS:
-        return _wrong_number(kind.name, value)
-    if not isinstance(value, str):
-        return f"a text is needed, not {show(value)}"
-    if kind.limit is not None and len(value) > kind.limit:
-        return f"at most {kind.limit} characters fit, not {len(value)}"
-    if _NO_TEXT.search(value):
-        return "this text holds characters that no ROS string can carry"
-    return None
-
-
-def _number_in(value: object) -> str:
-    """What to write instead of a text that begins with a number; "" for anything else."""
-    found = _NUMBER.fullmatch(value) if isinstance(value, str) and len(value) < 40 else None
-    if found is None:
-        return ""
-    if not found["unit"]:
-        return ": without its quotes it is one"
-    return ": write the number alone, in the unit that is expected"
-
-
-def _wrong_number(name: str, value: Any) -> str | None:
+def _check_number(name: str, value: Any) -> None:
     whole = name in INTEGERS
     if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
-        what = "a whole number" if whole else "a number"
-        return f"{what} ({name}) is needed, not {show(value)}{_number_in(value)}"
+        what, hint = "a whole number" if whole else "a number", ""
+        if isinstance(value, str) and len(value) < 40 and (found := _NUMBER.fullmatch(value)):
+            hint = ": write the number alone, in the unit that is expected"
+            hint = hint if found["unit"] else ": without its quotes it is one"
+        raise ValueError(f"{what} ({name}) is needed, not {show(value)}{hint}")
     if whole:
         least, greatest = INTEGERS[name]
-        if least <= value <= greatest:
-            return None
-        a = "an" if name.startswith("i") else "a"
-        return f"{show(value)} does not fit {a} {name}: {least} to {greatest}"
+        if not least <= value <= greatest:
+            a = "an" if name.startswith("i") else "a"
+            raise ValueError(f"{show(value)} does not fit {a} {name}: {least} to {greatest}")
+        return
     with contextlib.suppress(OverflowError):
         if not FLOATS[name] < abs(float(value)) < math.inf:
-            return None
-    return f"{show(value)} does not fit a {name}"
+            return
+    raise ValueError(f"{show(value)} does not fit a {name}")
 
 
 def show(value: object) -> str:
