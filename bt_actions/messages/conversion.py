@@ -264,10 +264,6 @@ def _check_number(name: str, value: Any) -> None:
 
 def show(value: object) -> str:
     """A value as a message shows it: as it is written in YAML where that is short."""
-    if value is None:
-        return "nothing"
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, Mapping):
         return "a mapping"
     if isinstance(value, (list, tuple)):

@@ -81,15 +81,9 @@ def packages(kind: Kind) -> dict[str, Path]:
     """The packages that hold interfaces of a kind, with the folder of their Python classes."""
     found: dict[str, Path] = {}
     for entry in sys.path:
-        try:
-            children = sorted(Path(entry or ".").iterdir())
-        except OSError:
-            continue
-        for child in children:
-            if child.name not in found and _PACKAGE.fullmatch(child.name):
-                folder = child / kind
-                if _listed(folder):
-                    found[child.name] = folder
+        for file in sorted(Path(entry or ".").glob(f"*/{kind}/__init__.py")):
+            if _listed(file.parent):
+                found.setdefault(file.parent.parent.name, file.parent)
     return found
 
 
@@ -111,12 +105,9 @@ def interface_name(cls: type) -> str:
 
 def short_name(cls: type) -> str:
     """The class as people call it: ``MoveRobot.Goal``, ``SetBool.Request``, ``Pose``."""
-    name = cls.__name__
-    for part in PARTS:
-        owner = name.removesuffix(f"_{part}")
-        if owner != name and ".msg" not in cls.__module__:
-            return f"{owner}.{part}"
-    return name
+    owner, _, part = cls.__name__.rpartition("_")
+    is_part = owner and part in PARTS and ".msg" not in cls.__module__
+    return f"{owner}.{part}" if is_part else cls.__name__
 
 
 def _split(name: str, kind: Kind) -> tuple[str, str]:
