@@ -87,7 +87,7 @@ class ChangeVisitor(VisitorBase):
 
     def initialise(self) -> None:
         """Begin a tick (py_trees calls this)."""
-        self._visited_before, self._visited = self._visited, []
+        self._visited = []
         self._before()
 
     def run(self, behaviour: Behaviour) -> None:
@@ -126,6 +126,7 @@ class ChangeVisitor(VisitorBase):
         """Return the changes of a tick, also of one that raised: what it visited and stopped."""
         visited, stopped = self._visited, list[Behaviour]()
         is_as_before = visited == self._visited_before
+        self._visited_before = visited
         if not is_as_before:
             seen = set(visited)
             stopped = [node for node in self._running if node not in seen]
