@@ -3,7 +3,7 @@
 A server shows the goals that it has accepted. Of one that it has received, and has not decided on
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
 So each goal without an answer has a file, named by its id, which tells its process (goals/ids.py).
-It outlives that process, and cleanup reads it (recovery/unanswered.py). It lies in memory
+It outlives that process, and cleanup reads it (recovery/sweep.py). It lies in memory
 (/dev/shm), so that writing it waits for no disk, in a directory that only this user may write to.
 
 It is written before the goal is sent, and removed when that has been answered; not where its server

@@ -92,10 +92,14 @@ class Row:
             self._goals[event.goal_id] = event
         else:
             self._goals.pop(event.goal_id, None)
-        if is_new:
-            self._begin(event)
-        elif not is_latest:
+        if not is_latest and not is_new:
             return  # an older goal, on its way to its end
+        if is_new:
+            self._latest, self.attempt, self.outcome = event.goal_id, event.attempt, None
+            self.attempts += 1
+            if event.attempt <= 1:
+                self.visits += 1
+                self.begun, self.counted = event.time, self.duration
         if event.outcome is not None and self.outcome is None:
             self.duration = self.seconds(event.time)
         self.state, self.outcome, self.end = event.state, event.outcome, event.end
@@ -121,14 +125,6 @@ class Row:
         if self.outcome is not None:
             return self.duration
         return self.counted + max(0.0, now - self.begun)
-
-    def _begin(self, event: GoalChanged) -> None:
-        self._latest, self.outcome = event.goal_id, None
-        self.attempts += 1
-        self.attempt = event.attempt
-        if event.attempt <= 1:
-            self.visits += 1
-            self.begun, self.counted = event.time, self.duration
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +227,12 @@ class Report:
         """Return the leaves by whose failure the root has failed, in tree order."""
         if self.status is not Status.FAILURE:
             return []
-        return [self._culprit(leaf, self._why(leaf)) for leaf in self._failed_leaves()]
+        return [
+            self._culprit(  # which may not be what it said first of that status
+                leaf, leaf.feedback_message if self._as_it_ended(leaf) else self.message_of(leaf)
+            )
+            for leaf in self._failed_leaves()
+        ]
 
     def _culprit(self, node: Behaviour, message: str) -> Culprit:
         return Culprit(node, path_of(node), message, place_of(node), self._rows.get(node.id))
@@ -239,10 +240,6 @@ class Report:
     def _as_it_ended(self, node: Behaviour) -> bool:
         """Whether it was not stopped since it ended."""
         return node.status is self.status_of(node)
-
-    def _why(self, node: Behaviour) -> str:
-        """Return what a node says of its failure, which may not be its first of that status."""
-        return node.feedback_message if self._as_it_ended(node) else self.message_of(node)
 
     def _failed_leaves(self) -> Iterator[Behaviour]:
         """Go down from the root along what failed.

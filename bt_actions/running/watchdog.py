@@ -29,7 +29,6 @@ class Watchdog:
         self._traffic, self._host, self._goals = traffic, traffic.host, goals
         self.ends_at = math.inf
         """When the run is to end (seconds, steady clock)."""
-        self._watches = False
         self._ticks_on: int | None = None
         self.gave_up = False
         """Whether it was so in this run: what the tree says since is of no account."""
@@ -65,15 +64,12 @@ class Watchdog:
 
     def watch(self) -> None:
         """Look at the goals until none is wanted; the caller holds the lock."""
-        if not self._watches:  # each time it would be looked at, at once
-            self._watches = True
-            self._host.scheduler.add(self)
+        self._host.scheduler.add(self)
 
     def run_due(self, now: float) -> float:
         """Cancel what is wanted where the last tick is overdue; return the seconds until a look."""
         wanted = self._goals.wanted
         if not wanted:
-            self._watches = False
             self._host.scheduler.remove(self)
         if wanted and self.is_overdue(now) and not self._host.stalls.answers_take(now):
             self._give_up()
