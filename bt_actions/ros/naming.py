@@ -1,4 +1,4 @@
-"""The name of a run's node: made valid, and not one that another node is seen to have already.
+"""Nodes of our own. That of a run has a valid name that no other is seen to have already.
 
 A node cannot be renamed, and what a participant sees of the graph comes bit by bit. So the context
 is opened before its node is needed, and what it has seen by then counts; nobody waits for more.
@@ -10,6 +10,7 @@ import itertools
 import os
 import re
 import unicodedata
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.node import Node
@@ -37,24 +38,29 @@ def _letter(char: str) -> str:
     return f"u{ord(char):x}" if char.isalnum() else "_"
 
 
+def own_node(
+    name: str, *, args: list[str] | None = None, domain: int | None = None, **given: Any
+) -> Node:
+    """Return a node in a context of its own, without services; raises what rclpy raises."""
+    context = Context()
+    try:
+        context.init(args=args, domain_id=domain)
+        return Node(
+            name, context=context, enable_rosout=False, start_parameter_services=False, **given
+        )
+    except BaseException:
+        context.try_shutdown()
+        raise
+
+
 class Outlook:
     """A context of our own that looks at the graph before it has the node that it is for."""
 
     def __init__(self) -> None:
         """Raises what rclpy raises where ROS cannot start."""
-        self.context = Context()
-        self.context.init()
-        try:
-            self._node = Node(
-                f"bt_actions_{os.getpid()}_outlook",
-                context=self.context,
-                use_global_arguments=False,
-                enable_rosout=False,
-                start_parameter_services=False,
-            )
-        except BaseException:
-            self.context.try_shutdown()
-            raise
+        name = f"bt_actions_{os.getpid()}_outlook"
+        self._node = own_node(name, use_global_arguments=False)
+        self.context: Context = self._node.context
 
     def hand_over(self) -> None:
         """Leave the context to the node that was made in it meanwhile."""

@@ -12,13 +12,13 @@ from typing import Any
 
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
-from rclpy.context import Context
 from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.ros.graph import servers
+from bt_actions.ros.naming import own_node
 from bt_actions.ros.workarounds import participant
 
 STATUS = "/_action/status"
@@ -111,19 +111,11 @@ class Onlooker:
 @contextlib.contextmanager
 def onlooker(namespace: str) -> Iterator[Onlooker]:
     """Look from a node in a context of its own. Raises CannotStart."""
-    context = Context()
     try:
-        context.init()
-        node = Node(
-            "bt_actions_cleanup",
-            context=context,
-            namespace=namespace,
-            start_parameter_services=False,
-        )
+        node = own_node("bt_actions_cleanup", namespace=namespace)
     except (RuntimeError, OSError, NameValidationException) as error:
-        context.try_shutdown()
         raise CannotStart(str(error).splitlines()[0]) from error
     try:
         yield Onlooker(node)
     finally:
-        participant.close(node, context)
+        participant.close(node, node.context)

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -27,6 +26,7 @@ from bt_actions.messages.fields import (
     Scalar,
     describe,
 )
+from bt_actions.ros.naming import own_node
 from bt_actions.ros.workarounds import participant
 from bt_actions.utilities.plain_text import as_json
 
@@ -38,29 +38,23 @@ def parameters_in(words: Sequence[str], namespace: str = "", name: str = "") -> 
 
     Raises ValueError, with rcl's reason, for words that it does not understand.
     """
-    context = Context()
     try:
-        context.init(args=["--ros-args", *words])
-        node = Node(
+        node = own_node(
             name or f"bt_actions_{os.getpid()}_parameters",
-            context=context,
+            args=["--ros-args", *words],
             namespace=namespace,
-            enable_rosout=False,
-            start_parameter_services=False,
             automatically_declare_parameters_from_overrides=True,
         )
         try:
             found = node.get_parameters_by_prefix("")
         finally:
-            participant.close(node, context)
+            participant.close(node, node.context)
     except RuntimeError as error:  # rclpy's RCLError
         if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
             unknown = shlex.join(ast.literal_eval(str(error)))
             why = f"ROS does not know {unknown}; options of bt-actions stand before --ros-args"
             raise ValueError(why) from error
         raise ValueError(str(error).splitlines()[0]) from error
-    finally:
-        context.try_shutdown()
     for name in _OF_EVERY_NODE & found.keys():
         if not isinstance(found[name].value, bool):
             raise ValueError(f"{name} is true or false, not {found[name].value!r}")

@@ -14,20 +14,19 @@ here, and nothing decided about goals.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import itertools
+import math
 import os
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
-
-from rclpy.context import Context
-from rclpy.node import Node
 
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.graph import servers
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
+from bt_actions.ros.naming import own_node
 from bt_actions.ros.workarounds import participant
 from bt_actions.traffic.transport import ActionTransport, Listener, Seeker
 from bt_actions.utilities.plain_text import raised
@@ -48,9 +47,9 @@ AHEAD = 0.7
 """Seconds by which a new participant may be ahead of one that is not blind (0.1 measured)."""
 
 _number = itertools.count(1)
-_participants: set[SecondParticipant] = set()
-_threads: set[threading.Thread] = set()
 _by_domain: dict[tuple[int, str], Rediscovery] = {}
+_bell = threading.Condition(host.lock)
+"""Rings where something is missed, a participant is not used any more, or the process ends."""
 _closing = False  # the process ends
 
 
@@ -59,54 +58,27 @@ class SecondParticipant:
 
     def __init__(self, domain: int, enclave: str) -> None:
         """Raises what rclpy raises where it cannot be made."""
-        context = Context()
-        context.init(args=["--ros-args", "--enclave", enclave], domain_id=domain)
-        name = f"bt_actions_rediscovery_{os.getpid()}_{next(_number)}"
-        try:
-            self.node = Node(
-                name,
-                context=context,
-                use_global_arguments=False,
-                enable_rosout=False,
-                start_parameter_services=False,
-            )
-        except BaseException:
-            context.try_shutdown()
-            raise
+        self.node = own_node(
+            f"bt_actions_rediscovery_{os.getpid()}_{next(_number)}",
+            args=["--ros-args", "--enclave", enclave],
+            domain=domain,
+            use_global_arguments=False,
+        )
         self.made_at = time.monotonic()
         self.users: set[ActionTransport] = set()
         """Those that somebody goes on with."""
-        self.looking = True
-        """A look goes on in it, which must not find it closed."""
-        self.closed = False
-        self._context = context
-        with host.lock:
-            _participants.add(self)
-
-    def shows(self, action: str) -> frozenset[bytes]:
-        """The GIDs of the servers of an action."""
-        return servers(self.node, action)
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
         """Become a client of an action here."""
         return RosTransport(self.node, action_type, name, listener, self.made_at, self._left_by)
 
     def _left_by(self, transport: ActionTransport) -> None:
-        """Close it when nobody uses it any more; on another thread, as the caller has the lock."""
-        if transport not in self.users:
-            return
         self.users.discard(transport)
-        if not self.users and not self.looking:
-            _start(self.close)  # or else at exit
+        _bell.notify_all()
 
     def close(self) -> None:
-        """Take the participant away, unless somebody uses it by now."""
-        with host.lock:
-            if self.closed or ((self.users or self.looking) and not _closing):
-                return
-            self.closed = True
-            _participants.discard(self)
-        participant.close(self.node, self._context)
+        """Take the participant away."""
+        participant.close(self.node, self.node.context)
 
 
 def look_for(
@@ -128,166 +100,141 @@ class Rediscovery:
 
     On one thread, which waits from then on for the next to be missed: looks on threads of their own
     would each leave another megabyte behind, because glibc keeps what a thread took for the threads
-    that come later.
+    that come later. It also takes participants away: who uses one last holds the lock.
     """
 
     def __init__(self, domain: int, enclave: str) -> None:
-        self._domain = domain
-        self._enclave = enclave
+        self._where = domain, enclave
         self._missing: dict[Seeker, str] = {}  # and the action's name
-        self._bell = threading.Condition(host.lock)
+        self._participants: list[SecondParticipant] = []
         self._thread: threading.Thread | None = None
         self._waiting: set[Seeker] = set()
+        self._pause = FIRST_AFTER
+        self._look_at = math.inf
+        self._is_urgent = True
         self._told = False
-        self._is_urgent = False
 
-    def add(self, seeker: Seeker, action: str, *, at_once: bool = False) -> None:
+    def add(self, seeker: Seeker, action: str, *, at_once: bool) -> None:
         """Look for what this one misses, too."""
         if seeker not in self._missing:
             self._missing[seeker] = action
             self._is_urgent |= at_once
-            self._bell.notify_all()
+            _bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
-            self._thread = _start(self._run)
+            thread = threading.Thread(target=self._run, name="bt_actions-rediscovery", daemon=True)
+            with contextlib.suppress(RuntimeError):  # there can be no more
+                thread.start()
+                self._thread = thread
 
-    def wake(self) -> None:
-        """See whether there is still something to look for; the caller holds the lock."""
-        self._bell.notify_all()
+    def close(self) -> None:
+        """Let no thread be within Fast DDS, and no participant be open, when Python goes."""
+        if self._thread is not None:
+            self._thread.join(LASTS)
+        for second in self._participants:
+            second.close()
 
     def _run(self) -> None:
-        while True:
+        while not _closing:
+            if self._is_time():
+                try:
+                    found = self._look()
+                except Exception as error:  # noqa: BLE001 - no resources, no permission, rclpy's
+                    found = False
+                    if not self._told:
+                        self._told = True
+                        log.warning(f"no second look for lost servers: {raised(error)}")
+                self._pause = FIRST_AFTER if found else min(2 * self._pause, LONGEST_PAUSE)
+                self._look_at = time.monotonic() + self._pause
             with host.lock:
-                self._bell.wait_for(lambda: self._missing or _closing)
-                if _closing:
-                    return
-            self._search()
+                unused = self._unused()
+                self._participants = [each for each in self._participants if each.users]
+            for second in unused:
+                second.close()
 
-    def _search(self) -> None:
-        """Look now and then, until nothing is missed."""
-        pause = FIRST_AFTER
-        while self._waits(pause):
-            if self._is_urgent:
-                pause, self._is_urgent = FIRST_AFTER, False
-            try:
-                found = self._look()
-            except Exception as error:  # noqa: BLE001 - no resources, no permission, rclpy's
-                found = False
-                if not self._told:
-                    self._told = True
-                    log.warning(f"no second look for lost servers: {raised(error)}")
-            pause = FIRST_AFTER if found else min(2 * pause, LONGEST_PAUSE)
-
-    def _waits(self, pause: float) -> bool:
-        """Wait for the next look, less long when somebody begins to wait; is anything missed?"""
+    def _is_time(self) -> bool:
+        """Wait for something to do; whether that is a look. Sooner when somebody begins to wait."""
         with host.lock:
-            until = time.monotonic() + pause
-            while self._still_missing():
+            while not (_closing or self._unused()):
+                if not self._still_missing():
+                    self._look_at, self._is_urgent = math.inf, True
+                    _bell.wait()
+                    continue
                 waiting = {seeker for seeker in self._missing if seeker.has_unsent}
-                self._is_urgent |= bool(waiting - self._waiting)
+                now = time.monotonic()
+                if self._is_urgent or waiting - self._waiting:
+                    self._pause, self._is_urgent = FIRST_AFTER, False
+                    self._look_at = min(self._look_at, now + FIRST_AFTER)
                 self._waiting = waiting
-                if self._is_urgent:
-                    until = min(until, time.monotonic() + FIRST_AFTER)
-                left = until - time.monotonic()
-                if left <= 0.0:
+                if now >= self._look_at:
                     return True
-                self._bell.wait(min(left, GOES_ON))
+                _bell.wait(min(self._look_at - now, GOES_ON))
         return False
 
+    def _unused(self) -> list[SecondParticipant]:
+        return [each for each in self._participants if not each.users]
+
     def _still_missing(self) -> bool:
-        self._missing = {
-            seeker: action
-            for seeker, action in self._missing.items()
-            if not _closing and seeker.misses()
-        }
+        missing = self._missing.items()
+        self._missing = {seeker: action for seeker, action in missing if seeker.misses()}
         return bool(self._missing)
 
     def _look(self) -> bool:
         """Make a participant, and wait until clients in it are ready that ours are missing."""
-        second = SecondParticipant(self._domain, self._enclave)
-        look = _Look(second)
+        second = SecondParticipant(*self._where)
+        self._participants.append(second)
+        tried: dict[Seeker, ActionTransport] = {}
+        ready_since: dict[Seeker, float] = {}
+        until = time.monotonic() + LASTS
         try:
-            until = time.monotonic() + LASTS
-            while time.monotonic() < until:
-                with host.lock:
-                    seekers = dict(self._missing) if self._still_missing() else {}
-                    look.advance(seekers)
-                if not seekers:
-                    break
+            while time.monotonic() < until and self._goes_on(second, tried, ready_since):
                 time.sleep(GLANCE)
         finally:
             with host.lock:
-                look.clear_up()
-                second.looking = False
-                found = bool(second.users)
-            second.close()
-        return found
+                for transport in tried.values():  # which nobody took
+                    transport.close()
+        return bool(second.users)
 
-
-class _Look:
-    """One look: transports on trial in a new participant. All of it under the lock."""
-
-    def __init__(self, second: SecondParticipant) -> None:
-        self._second = second
-        self._tried: dict[Seeker, ActionTransport] = {}
-        self._ready_since: dict[Seeker, float] = {}
-
-    def advance(self, seekers: dict[Seeker, str]) -> None:
+    def _goes_on(
+        self,
+        second: SecondParticipant,
+        tried: dict[Seeker, ActionTransport],
+        ready_since: dict[Seeker, float],
+    ) -> bool:
         """Try where a server is shown; move all for whom that is ready, together.
 
-        Together, because what one of them has lost may conflict with another's next goal.
+        Together, because what one of them has lost may conflict with another's next goal. Whether
+        anything is still missed.
         """
-        now = time.monotonic()
-        for seeker, action in seekers.items():
-            if seeker not in self._tried and self._second.shows(action):
-                self._tried[seeker] = seeker.try_in(self._second)
-            if seeker in self._tried and self._tried[seeker].ready():
-                self._ready_since.setdefault(seeker, now)
-        ready = [
-            seeker
-            for seeker in seekers
-            if seeker in self._ready_since and seeker.try_and_compare(self._tried[seeker])
-        ]
-        if any(now - self._ready_since[seeker] >= AHEAD for seeker in ready):
-            for seeker in ready:
-                transport = self._tried.pop(seeker)
-                self._second.users.add(transport)
-                seeker.move_to(transport)
-
-    def clear_up(self) -> None:
-        """Close what nobody took."""
-        for transport in self._tried.values():
-            transport.close()
-        self._tried.clear()
-
-
-def _start(what: Callable[[], None]) -> threading.Thread | None:
-    """Start a thread; None where there can be no more."""
-    thread = threading.Thread(target=what, name="bt_actions-rediscovery", daemon=True)
-    with host.lock:
-        _threads.difference_update([each for each in _threads if not each.is_alive()])
-        try:
-            thread.start()
-        except RuntimeError:
-            return None
-        _threads.add(thread)
-    return thread
+        with host.lock:
+            if _closing or not self._still_missing():
+                return False
+            now = time.monotonic()
+            for seeker, action in self._missing.items():
+                if seeker not in tried and servers(second.node, action):
+                    tried[seeker] = seeker.try_in(second)
+                if seeker in tried and tried[seeker].ready():
+                    ready_since.setdefault(seeker, now)
+            ready = [
+                seeker
+                for seeker in self._missing
+                if seeker in ready_since and seeker.try_and_compare(tried[seeker])
+            ]
+            if any(now - ready_since[seeker] >= AHEAD for seeker in ready):
+                for seeker in ready:
+                    transport = tried.pop(seeker)
+                    second.users.add(transport)
+                    seeker.move_to(transport)
+            return True
 
 
 @atexit.register
 def _close_at_exit() -> None:
-    """Let no thread of ours be within Fast DDS, and no participant be open, when Python goes."""
     global _closing
     with host.lock:
         _closing = True
-        for rediscovery in _by_domain.values():
-            rediscovery.wake()
-        threads = list(_threads)
-    for thread in threads:
-        thread.join(LASTS)
-    with host.lock:
-        sights = list(_participants)
-    for second in sights:
-        second.close()
+        _bell.notify_all()
+    for rediscovery in list(_by_domain.values()):
+        rediscovery.close()
 
 
 os.register_at_fork(after_in_child=lambda: atexit.unregister(_close_at_exit))

@@ -59,9 +59,7 @@ def of_a_runner(_: int) -> None:
 
 
 def of_a_rediscovery(domain: int) -> None:
-    sight = SecondParticipant(domain, "/")
-    sight.looking = False
-    sight.close()
+    SecondParticipant(domain, "/").close()
 
 
 @pytest.mark.parametrize(

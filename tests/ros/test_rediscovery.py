@@ -6,7 +6,6 @@ has the real thing, which Fast DDS does to a node in about every second trial.
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -57,10 +56,8 @@ def is_of(route: Route, name: str) -> bool:
 
 
 def nobody_looks() -> bool:
-    """Nobody has anything to look for, and no participant is being closed."""
-    threads = [each for each in threading.enumerate() if each.name == "bt_actions-rediscovery"]
-    known = rediscovery._by_domain.values()
-    return len(threads) <= len(known) and not any(each._missing for each in known)
+    """Nobody has anything to look for."""
+    return not any(each._missing for each in rediscovery._by_domain.values())
 
 
 def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
@@ -81,7 +78,7 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     assert journal.max_live == 1
     until(nobody_looks)
     until(
-        lambda: not rediscovery._participants,
+        lambda: not any(each._participants for each in rediscovery._by_domain.values()),
         what="the participant is taken away with its last line",
     )
 
@@ -158,7 +155,6 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     with process.lock:
         leaf._endpoint.route.seek(now())
     sight = SecondParticipant(domain, enclaves[0])
-    sight.looking = False
     assert {enclave(secure), enclave(sight.node)} == {"/kitchen/robot"}
     sight.close()
     leaf.shutdown()

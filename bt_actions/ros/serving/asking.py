@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from bt_actions.messages.interfaces import interface_name
+from bt_actions.ros.naming import own_node
 from bt_actions.ros.serving.endpoints import kept
 from bt_actions.ros.topics import DISCOVERS
 from bt_actions.ros.workarounds import participant
@@ -23,16 +23,14 @@ Spin = Callable[[], None]
 
 @contextlib.contextmanager
 def _asking() -> Iterator[tuple[Node, Spin]]:
-    context = Context()
-    context.init()
-    node = Node("bt_actions_asks", context=context)
-    executor = SingleThreadedExecutor(context=context)
+    node = own_node("bt_actions_asks")
+    executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     try:
         yield node, lambda: executor.spin_once(timeout_sec=0.05)
     finally:
         executor.shutdown()
-        participant.close(node, context)
+        participant.close(node, node.context)
 
 
 def heard(message_type: type, depth: int) -> Generator[Any]:
