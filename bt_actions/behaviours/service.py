@@ -14,7 +14,7 @@ from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
-from bt_actions.traffic.backend import Backend, Service
+from bt_actions.traffic.backend import Backend, Call, Service
 
 
 class CallService(Connected[Service]):
@@ -59,12 +59,11 @@ class CallService(Connected[Service]):
         self._save = save
 
     def _make(self, backend: Backend) -> Service:
+        self._call: Call | None = None
         self.service_type = interface(self.service_type, "srv")
         return backend.service(self.service_type, self._name)
 
     def initialise(self) -> None:
-        _, client = self._there()
-        client.drop()
         self._tries = 0
         self._pausing = False
         super().initialise()
@@ -83,17 +82,18 @@ class CallService(Connected[Service]):
 
     def do(self) -> Status:
         backend, client = self._there()
-        if client.answered:
-            self._response = client.answer()
+        call = self._call
+        if call is not None and call.done():
+            self._call, self._response = None, call.result()
             if self._expect is not None and not self._expect(self._response):
                 raise ValueError("the answer is not what was expected")
             if self._save is not None:
                 self._save(self._response)
             return Status.SUCCESS
-        if client.calling:
+        if call is not None:
             self.feedback_message = f"waiting for an answer of {client.name}"
             if self.left() <= 0.0:
-                client.drop()
+                self._drop()
                 raise ValueError(f"no answer within {self._patience:g} s")
         elif client.ready:
             try:
@@ -102,7 +102,7 @@ class CallService(Connected[Service]):
             except ValueError:
                 self._tries = self.retry.attempts  # no other try would get further
                 raise
-            client.call(request)
+            self._call = client.call(request)
             self.give(self._patience)
             self.feedback_message = f"called {client.name}"
         else:
@@ -113,13 +113,17 @@ class CallService(Connected[Service]):
         return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        if self._own is not None:
-            self._own.drop()
+        self._drop()
 
     def due_in(self) -> float | None:
         """Seconds until the next deadline, try or look."""
-        known = self._pausing or self._own is None or self._own.calling
-        return self.left() if known else LOOKS
+        return self.left() if self._pausing or self._call is not None else LOOKS
+
+    def _drop(self) -> None:
+        """Take no interest in an answer any more."""
+        if self._call is not None:
+            self._call.cancel()
+        self._call = None
 
     def _again(self) -> bool:
         """Whether what has failed is tried again; the pause before that begins."""

@@ -1,6 +1,6 @@
-"""A service client that calls once at a time and wakes who has called when the answer is there.
+"""A service client that wakes who has called when the answer is there.
 
-Decides nothing: neither how long to wait nor whether to call again. Never blocks.
+Decides nothing, and never blocks.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from rclpy.node import Node
 
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.in_sight import without_service
+from bt_actions.traffic.backend import Call
 from bt_actions.traffic.begun import waker
 
 
@@ -21,7 +22,6 @@ class ServiceClient:
     def __init__(self, node: Node, service_type: type, name: str) -> None:
         self._node = node
         self._type = service_type
-        self._future: Any = None
         self._client = node.create_client(
             service_type, name, callback_group=MutuallyExclusiveCallbackGroup()
         )
@@ -40,35 +40,13 @@ class ServiceClient:
         """Whether the service is there."""
         return bool(self._client.service_is_ready())
 
-    @property
-    def calling(self) -> bool:
-        """Whether a call was begun and not dropped since."""
-        return self._future is not None
-
-    @property
-    def answered(self) -> bool:
-        """Whether the call was answered."""
-        return self._future is not None and bool(self._future.done())
-
-    def call(self, request: Any) -> None:
-        """Begin a call; what is still under way is dropped."""
-        self.drop()
-        self._future = self._client.call_async(request)
+    def call(self, request: Any) -> Call:
+        """Begin a call, which wakes who has called when it is done."""
+        future: Call = self._client.call_async(request)
         wake = waker()
-        self._future.add_done_callback(lambda _: wake())
-
-    def answer(self) -> Any:
-        """Return the answer of a call that was answered; the call is over."""
-        future, self._future = self._future, None
-        return future.result()
-
-    def drop(self) -> None:
-        """Take no interest in an answer any more."""
-        if self._future is not None and not self._future.done():
-            self._client.remove_pending_request(self._future)
-        self._future = None
+        future.add_done_callback(lambda _: wake())  # type: ignore[attr-defined]
+        return future
 
     def close(self) -> None:
-        """Drop the call and destroy the client."""
-        self.drop()
+        """Destroy the client."""
         self._node.destroy_client(self._client)

@@ -6,6 +6,7 @@ Topics and services are those of the network; nothing on it is ever undiscovered
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 from bt_actions.goals.terms import Now
@@ -69,38 +70,25 @@ class VirtualClock:
 
 
 class VirtualService:
-    """A client of one service, and its call under way."""
+    """A client of one service."""
 
     def __init__(self, network: VirtualNetwork, service_type: type, name: str) -> None:
         self.name = network.expand(name)
         self._network = network
         self._type = service_type
-        self._call: list[Any] | None = None
-        """The answer of the call under way, once it is there."""
 
     @property
     def ready(self) -> bool:
         """Whether the service is there."""
         return self._network.service(self._type, self.name) is not None
 
-    @property
-    def calling(self) -> bool:
-        """Whether a call was begun and neither answered nor dropped since."""
-        return self._call is not None
-
-    @property
-    def answered(self) -> bool:
-        """Whether the answer of the call is here."""
-        return bool(self._call)
-
     def why_absent(self) -> str:
         """Say nothing more."""
         return ""
 
-    def call(self, request: Any) -> None:
+    def call(self, request: Any) -> Future[Any]:
         """Begin a call."""
-        call: list[Any] = []
-        self._call, wake = call, waker()
+        call, wake = Future[Any](), waker()
         if served := self._network.service(self._type, self.name):
             answer, takes = served
 
@@ -109,25 +97,15 @@ class VirtualService:
                 self._network.timeline.call_in(takes, lambda: self._network.soon(arrive, response))
 
             def arrive(response: Any) -> None:
-                if self._call is call:
-                    call.append(response)
+                if not call.cancelled():
+                    call.set_result(response)
                     wake()
 
             self._network.soon(reply)
-
-    def answer(self) -> Any:
-        """Take the answer of a call that was answered."""
-        call, self._call = self._call, None
-        assert call
-        return call[0]
-
-    def drop(self) -> None:
-        """Take no interest in an answer any more."""
-        self._call = None
+        return call
 
     def close(self) -> None:
-        """Drop the call."""
-        self.drop()
+        """Have nothing to let go of."""
 
 
 class VirtualSubscription:

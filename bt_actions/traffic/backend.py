@@ -30,8 +30,21 @@ class Clock(Protocol):
         """The node's own clock in nanoseconds, as the headers of messages have it."""
 
 
+class Call(Protocol):
+    """A call of a service, as futures are."""
+
+    def done(self) -> bool:
+        """Whether the answer is here."""
+
+    def result(self) -> Any:
+        """The answer of a call that is done."""
+
+    def cancel(self) -> object:
+        """Take no interest in an answer any more."""
+
+
 class Service(Protocol):
-    """A client of one service, and its call under way, if any. Its answer wakes who has called."""
+    """A client of one service."""
 
     @property
     def name(self) -> str:
@@ -41,28 +54,14 @@ class Service(Protocol):
     def ready(self) -> bool:
         """Whether the service is there."""
 
-    @property
-    def calling(self) -> bool:
-        """Whether a call was begun and neither answered nor dropped since."""
-
-    @property
-    def answered(self) -> bool:
-        """Whether the answer of the call is here, and was not taken yet."""
-
     def why_absent(self) -> str:
         """What is there in place of the service, behind a colon; or an empty text."""
 
-    def call(self, request: Any) -> None:
-        """Begin a call; what is still under way is dropped."""
-
-    def answer(self) -> Any:
-        """Take the answer of a call that was answered; the call is over."""
-
-    def drop(self) -> None:
-        """Take no interest in an answer any more."""
+    def call(self, request: Any) -> Call:
+        """Begin a call, which wakes who has called when it is done."""
 
     def close(self) -> None:
-        """Drop the call and let go of the service."""
+        """Let go of the service."""
 
 
 class Subscription(Protocol):

@@ -188,19 +188,18 @@ def test_a_service_answers_and_wakes_who_runs_the_tree(
 ) -> None:
     service = world.backend.service(SetBool, name)
     assert service.name == f"{world.namespace}/{name}"
-    assert (service.ready, service.calling, service.answered) == (False, False, False)
+    assert not service.ready
     why = service.why_absent()
     assert not why or why.startswith(": ")
     world.serve(SetBool, name, switched)
     world.until(lambda: service.ready)
     for data in (True, False):
         del told[:]
-        service.call(SetBool.Request(data=data))
-        assert (service.calling, service.answered) == (True, False)
-        world.until(lambda: service.answered and told)
+        call = service.call(SetBool.Request(data=data))
+        assert not call.done()
+        world.until(lambda call=call: call.done() and told)
         assert told == [None]
-        assert service.answer() == SetBool.Response(success=data, message="switched")
-        assert (service.calling, service.answered) == (False, False)
+        assert call.result() == SetBool.Response(success=data, message="switched")
     service.close()
 
 
@@ -216,12 +215,10 @@ def test_an_answer_to_a_call_that_was_dropped_is_no_answer_to_the_next(
     service = world.backend.service(SetBool, name)
     world.serve(SetBool, name, answer)
     world.until(lambda: service.ready)
-    service.call(SetBool.Request(data=True))
-    service.drop()
-    assert not service.calling
-    service.call(SetBool.Request(data=True))
-    service.call(SetBool.Request(data=False))
-    world.until(lambda: service.answered and len(served) == 3)
-    assert service.answer().success is False
+    dropped = service.call(SetBool.Request(data=True))
+    dropped.cancel()
+    call = service.call(SetBool.Request(data=False))
+    world.until(lambda: call.done() and len(served) == 2)
+    assert call.result().success is False
     service.call(SetBool.Request(data=True))
     service.close()
