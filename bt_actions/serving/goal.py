@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from bt_actions.ros.serving.action_server import AcceptedGoal
 from bt_actions.serving.messages import feedback
 from bt_actions.serving.run import Run
 
@@ -18,7 +18,8 @@ FASTEST, SLOWEST = 0.1, 1.0
 class Goal:
     """A goal that runs, or waits for its turn."""
 
-    client: AcceptedGoal
+    client: Any
+    """rclpy's handle of it."""
     run: Run
     tree: str
     begun: bool = False
@@ -28,11 +29,11 @@ class Goal:
     @property
     def id(self) -> bytes:
         """Its goal id."""
-        return self.client.id
+        return bytes(self.client.goal_id.uuid)
 
     def tell(self, now: float) -> None:
         """Tell its client how far it is; to be called every FASTEST seconds."""
         changes = self.run.changes
         if changes != self._told or now - self._told_at >= SLOWEST - FASTEST / 2:
             self._told, self._told_at = changes, now
-            self.client.tell(feedback(self.run.running(), self.run.leaves_ended))
+            self.client.publish_feedback(feedback(self.run.running(), self.run.leaves_ended))

@@ -21,7 +21,7 @@ from bt_actions.document import Tree
 from bt_actions.document.reading.find import tree_folder
 from bt_actions.ros.log import log
 from bt_actions.ros.rosout import Rosout
-from bt_actions.ros.serving.action_server import AcceptedGoal, DeferredActionServer
+from bt_actions.ros.serving.action_server import DeferredActionServer
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.ros.serving.lifecycle import Lifecycle
 from bt_actions.serving.catalog import Catalog
@@ -102,6 +102,7 @@ class TreeServer:
         self._is_drained = False
         self._turns: Turns[Goal] = Turns(Policy(policy), most)
         self._goals: dict[bytes, Goal] = {}
+        self._canceled_early: set[bytes] = set()
         self._refuses = "it is unconfigured"
         self._last: dict[str, RunOutcome] = {}
         self._underway = Underway(node.context.get_domain_id())
@@ -148,7 +149,7 @@ class TreeServer:
             self.lifecycle.stop()
         self.halt(Ending.DEACTIVATED)
         self._endpoints.off.wait(_LAST_WORDS)
-        self._action.flush(_LAST_WORDS)
+        self._action.flush()
         self._is_drained = True
 
     def close(self) -> None:
@@ -245,7 +246,7 @@ class TreeServer:
         if self._refuses:
             raise Refused("INACTIVE", f"this server accepts no goals: {self._refuses}")
 
-    def _on_accepted(self, client: AcceptedGoal, admitted: _Admitted) -> None:
+    def _on_accepted(self, client: Any, admitted: _Admitted) -> None:
         run = Run(
             admitted.tree,
             admitted.inputs,
@@ -260,10 +261,11 @@ class TreeServer:
             self._goals[goal.id] = goal
             begun, halted = self._turns.come(goal)
             self._answered.notify_all()
-            refuses = self._refuses
+            refuses, canceled = self._refuses, goal.id in self._canceled_early
+            self._canceled_early.discard(goal.id)
         for each in halted:
             self._end(each, Ending.REPLACED)
-        if client.canceled():
+        if canceled:
             self._end(goal, Ending.CANCELED)
         if refuses:  # it was admitted before
             self._end(goal, Ending.DEACTIVATED)
@@ -274,19 +276,21 @@ class TreeServer:
             self._turns.expected -= 1
             self._answered.notify_all()
 
-    def _on_cancel(self, goal_id: bytes) -> bool:
+    def _on_cancel(self, client: Any) -> None:
+        goal_id = bytes(client.goal_id.uuid)
         with self._lock:
             goal = self._goals.get(goal_id)
+            if goal is None:
+                self._canceled_early.add(goal_id)  # for `_on_accepted`, which is about to come
         if goal is not None:
             self._end(goal, Ending.CANCELED)
-        return goal is not None
 
     async def _on_list(self, _: Any, response: ListTrees.Response) -> ListTrees.Response:
         entries = await self._off(self.catalog.entries)
         with self._lock:
             goals = list(self._goals.values())
         response.trees = [
-            info(entry, [goal.client.handle.goal_id for goal in goals if goal.tree == entry.name])
+            info(entry, [goal.client.goal_id for goal in goals if goal.tree == entry.name])
             for entry in entries
         ]
         return response
@@ -335,7 +339,7 @@ class TreeServer:
             with self._lock:  # the timer's callback stops it where nothing has begun
                 goal.begun = True
                 self._timer.reset()
-            goal.client.begin()
+            self._action.begin(goal.client)
             self._tell_all("info", f"{goal.tree}: begins")
             goal.run.start()
 
