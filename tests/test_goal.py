@@ -15,6 +15,7 @@ from bt_actions.goals.asking import (
     ASK_LESS,
     DENIED_FOR_GOOD,
     DOUBTS,
+    LOOKED_OUT_FOR,
     RESULT_QUESTIONS,
     UNHEARD,
 )
@@ -650,7 +651,7 @@ def test_a_lost_server_frees_the_leaf_and_the_resource() -> None:
     assert life.on(Event.SERVER_LOST, "gone") == [RELEASE]
     life.is_free(Outcome.SERVER_LOST, End.SERVER_GONE)
     assert life.goal.lost
-    assert life.due_in is None
+    assert life.due_in == LOOKED_OUT_FOR
 
 
 def test_a_lost_server_that_is_back_is_told_to_cancel_first_of_all() -> None:

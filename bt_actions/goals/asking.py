@@ -28,6 +28,10 @@ DENIED_FOR_GOOD = 30.0
 """Seconds for which a server must have denied a request that it never answered, until the end of
 the tree need not wait for it. Should it turn up all the same, it is canceled."""
 
+LOOKED_OUT_FOR = 3.0
+"""Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
+went away: one that was only stopped still runs its goal."""
+
 
 @dataclass(slots=True)
 class Asking:

@@ -25,6 +25,10 @@ class Deadlines:
             now = self.now.ros if event in ON_ROS_CLOCK else self.now.steady
             self._due[event] = now + seconds
 
+    def __contains__(self, event: Event) -> bool:
+        """Whether this one is set."""
+        return event in self._due
+
     def disarm(self, *events: Event) -> None:
         """Forget these."""
         for event in events:

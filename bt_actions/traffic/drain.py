@@ -19,8 +19,6 @@ JUST_PAST = 0.1
 """Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
 LAST_REQUESTS = 0.4
 """Seconds, at most, in which cancel requests go out that waited for room when it was given up."""
-LOOKS_OUT_AT_MOST = 30.0
-"""Seconds for which servers are looked out for though this process stands still again and again."""
 LOOK = 0.005
 """Seconds between two looks, where nothing wakes it."""
 
@@ -66,12 +64,11 @@ class Drain:
                 for handle in self._wanted
                 if _may_end(handle) and not handle.goal.drain_gave_up
             ]
-            self._deadline = 0.0
-            self._began = now = host.steady()
             self._gives_up_at: float | None = None
             self._lost: set[GoalHandle] = set()
-            self._were_back: set[GoalHandle] = set()
-            self._allow({handle for handle in self._waits if not handle.looked_out_for}, now)
+            self._until: dict[tuple[GoalHandle, bool], float] = {}
+            self._not_before = 0.0
+            self._allow(host.steady())
 
     def step(self, now: float, *, hurry: bool = False) -> Sleep | Done[list[GoalHandle]]:
         """Take what has come and do what is due (`now`: seconds, steady clock).
@@ -116,21 +113,20 @@ class Drain:
             return True
         doubts = (handle.endpoint.in_doubt(now) for handle in self._waits)
         if max(self._host.stalls.answers_take(now), *doubts, 0.0) > 0.0:
-            self._deadline = max(self._deadline, now + ASK_AGAIN)
-        self._lost.update(handle for handle in self._waits if handle.goal.lost)
-        back = {each for each in self._lost if each.goal.state not in (State.LOST, State.DONE)}
-        self._allow(back - self._were_back, now)  # once: else one that comes and goes had no end
-        self._lost, self._were_back = self._lost - back, self._were_back | back
+            self._not_before = now + ASK_AGAIN
+        self._allow(now)
         looks_out = any(handle.looked_out_for for handle in self._waits)
-        if looks_out and now < self._began + LOOKS_OUT_AT_MOST:
-            return False
-        return now >= self._deadline
+        return not looks_out and now >= max(self._not_before, *self._until.values())
 
-    def _allow(self, handles: set[GoalHandle], now: float) -> None:
-        """Give these goals the time that their cancel may take."""
-        if handles:
-            within = max(handle.goal.drains_within for handle in handles)
-            self._deadline = max(self._deadline, now + within + JUST_PAST)
+    def _allow(self, now: float) -> None:
+        """Give each goal the time that its cancel may take, and once more when it is back."""
+        for handle in self._waits:
+            is_back = handle in self._lost and not handle.goal.lost
+            if not handle.looked_out_for:
+                until = now + handle.goal.drains_within + JUST_PAST
+                self._until.setdefault((handle, is_back), until)
+            if handle.goal.lost:
+                self._lost.add(handle)
 
 
 def _may_end(handle: GoalHandle) -> bool:

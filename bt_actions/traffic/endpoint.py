@@ -35,10 +35,6 @@ from bt_actions.traffic.transport import ActionTransport, Participant, Request
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING, Watcher
 from bt_actions.utilities.plain_text import raised
 
-LOOKED_OUT_FOR = 3.0
-"""Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
-went away: one that was only stopped still runs its goal. Once for each goal."""
-
 
 class ActionEndpoint:
     """One action as one node sees it: the shared transport, and the goals on it.
@@ -232,23 +228,20 @@ class ActionEndpoint:
         waits = goal.state is State.WAITING_FOR_SERVER
         open_question = self.holds_back if waits else self.in_doubt
         in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
-        servers = stalls.servers_take(now.steady) if waits else 0.0
+        servers = stalls.servers_take(now.steady) if waits or goal.lost else 0.0
         goal.deadlines.suspend(max(stalls.answers_take(now.steady), servers, in_doubt), now)
 
     def _apply(
         self, handle: GoalHandle, event: Event, now: Now, detail: Any = None, message: Any = None
     ) -> None:
         goal, trace = handle.goal, self._host.trace
-        before, was_lost = Before.of(handle), goal.lost
+        before = Before.of(handle)
         waited = goal.state in (State.QUEUED, State.WAITING_FOR_SERVER)
         trace.tells(handle, event)
         commands = goal.on(event, now, detail)
         trace.told(handle, event, detail, commands)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
             goal.reason += self._traffic.why_not(handle)
-        newly_gone = goal.lost and not was_lost and goal.end is End.SERVER_GONE
-        if newly_gone and handle.look_out_left is None:
-            handle.look_out_left = LOOKED_OUT_FOR
         for do in what_follows(handle, before, commands):
             self.domain.effects.put(self._effect_runner.carry_out, Effect(do, handle, message))
         if (due := goal.due_in(now)) is not None:

@@ -120,8 +120,6 @@ class GoalHandle:
     told_unknown: bool = False
     """The log says that it is not accounted for; and later, on whatever node, that it is."""
     told_gone: bool = False
-    look_out_left: float | None = None
-    """Seconds for which a server that went away with it is looked out for yet; None: none did."""
     held_back_since: float | None = None
     """Since when (steady clock) it is not sent though a server is in sight (Route.holds_back)."""
     paused_at: float | None = None
@@ -153,7 +151,7 @@ class GoalHandle:
     @property
     def looked_out_for(self) -> bool:
         """Whether a server is looked out for that went away with it, and has not told its end."""
-        return self.goal.lost and bool(self.look_out_left)
+        return self.goal.lost and Event.LOOK_OUT_DUE in self.goal.deadlines
 
 
 @dataclass(frozen=True, slots=True)

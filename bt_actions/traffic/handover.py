@@ -59,7 +59,7 @@ def park(endpoint: Endpoint, host: Host, domain: Domain, *, all_of_them: bool = 
         if all_of_them or (goal.outcome is not None and not goal.claims_resources):
             endpoint.tell(handle, Event.PARKED)
         if goal.lost:
-            handle.look_out_left = 0.0  # nobody does from now on
+            goal.deadlines.clear()  # nobody looks out for its server from now on
             domain.keep_lost((endpoint.name, endpoint.action_type), handle, host.record.strike)
             endpoint.retire(handle)
 

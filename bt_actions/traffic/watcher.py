@@ -13,7 +13,7 @@ from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
 from bt_actions.traffic.begun import wake
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import Route
 
@@ -44,13 +44,11 @@ class Watcher:
         self._looked_like = Server.ABSENT
         self._was_away = False  # seen between two looks
         self._held_back = (True, True)  # as a server has just come; by `Route.holds_back`
-        self._looked_out_at = host.steady()
         self._warned_crowd = False
 
     def run_due(self, now: float) -> float:
         """Look, send and apply deadlines as far as due; return the seconds until there is more."""
         endpoint = self._endpoint
-        self._look_out(now)
         if now >= self._look_at or self._counts_others():
             self.observe_and_tell(now)
             unclear = endpoint.watch.state(now) is Server.UNCLEAR
@@ -118,8 +116,11 @@ class Watcher:
             gone = watch.gone(now, handle.replies.sent_to)
             if not gone:
                 handle.not_gone_before = NEVER  # it has been discovered
-            if (gone and now < handle.not_gone_before) or self._is_hidden(handle):
+            if gone and now < handle.not_gone_before:
                 continue  # it has not been discovered yet, though its status may have come already
+            in_sight = handle.replies.sent_to <= watch.gids and not gone
+            if not in_sight and self._host.stalls.servers_take(self._host.steady()) > 0.0:
+                continue  # as this process stood still
             if handle.goal.sent:
                 if gone and not handle.goal.lost:
                     endpoint.deliver_arrived()  # its last words
@@ -161,19 +162,6 @@ class Watcher:
         ready, servers = transport.ready(), transport.servers()
         self._endpoint.watch.observe(now, ready, servers, concludes=concludes)
 
-    def _look_out(self, now: float) -> None:
-        """Count the time for which servers are looked out for; not that of a stall.
-
-        Nor that after one, in which a server that is there may be out of sight.
-        """
-        passed = min(now - self._looked_out_at, 2 * LOOK_WHILE_RUNNING)
-        self._looked_out_at = now
-        if self._host.stalls.servers_take(now) > 0.0:
-            return
-        for handle in self._endpoint.goals.values():
-            if handle.goal.lost and handle.look_out_left:
-                handle.look_out_left = max(0.0, handle.look_out_left - passed)
-
     def _deliver_pending(self, now: float) -> None:
         """Deliver pending answers before judging silence, where several servers are shown."""
         if self._endpoint.watch.is_crowded:
@@ -195,13 +183,6 @@ class Watcher:
             if handle.goal.sent:
                 endpoint.pass_on(handle, handle.replies.looked(watch, now))
 
-    def _is_hidden(self, handle: GoalHandle) -> bool:
-        """Whether a server of this goal may be out of sight because this process stood still."""
-        sent_to, now = handle.replies.sent_to, self._host.steady()
-        watch = self._endpoint.watch
-        in_sight = sent_to <= watch.gids and not watch.gone(now, sent_to)
-        return not in_sight and self._host.stalls.servers_take(now) > 0.0
-
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""
         endpoint, now = self._endpoint, self._host.steady()
@@ -210,7 +191,7 @@ class Watcher:
             if any(not handle.accounted_for for handle in endpoint.goals.values()):
                 self._host.log.warning(f"{endpoint.name}: the node is gone; canceling what it left")
         for handle in list(endpoint.goals.values()):  # also one that was begun since
-            handle.look_out_left = 0.0  # from here nobody sees it come back
+            handle.goal.deadlines.disarm(Event.LOOK_OUT_DUE)  # from here nobody sees it come back
             if handle.goal.outcome is None:
                 endpoint.tell(handle, Event.INTERRUPTED)
         patience = max((each.goal.drains_within for each in endpoint.goals.values()), default=0.0)

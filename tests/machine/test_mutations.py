@@ -354,7 +354,7 @@ def forget(deadline: Event) -> Callable[[Patch], None]:
     return make
 
 
-for _deadline in (event for event in Event if event.name.endswith("_DUE")):
+for _deadline in (each for each in Event if each.name.endswith("_DUE") and "LOOK" not in each.name):
     MUTATIONS[f"forgets {_deadline.name}"] = forget(_deadline)
 
 

@@ -12,7 +12,7 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome, Timeouts
 from bt_actions.goals.terms import Event, Now, State
 from bt_actions.traffic.cancel_queue import Cancels
-from bt_actions.traffic.drain import JUST_PAST, LOOKS_OUT_AT_MOST, Drain
+from bt_actions.traffic.drain import JUST_PAST, Drain
 from bt_actions.traffic.handle import GoalHandle
 from bt_actions.utilities.stepping import Done, Sleep
 
@@ -34,13 +34,13 @@ def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> 
     """One whose server has gone."""
     goal = Goal(b"1" * 16, "/move", LIMITS, Now(0.0, 0.0))
     goal.outcome, goal.end, goal.state = Outcome.SERVER_LOST, end, state
+    goal.deadlines.clear()
+    goal.deadlines.arm(Event.LOOK_OUT_DUE, look_out_left)
     nothing = dict.fromkeys(("deliver_arrived", "apply_deadlines"), lambda *_: None)
     endpoint: Any = Endpoint(
         in_doubt=lambda _: 0.0, is_parents=False, cancels=Cancels(), tell=tell, **nothing
     )
-    made = GoalHandle(goal, endpoint, None, "m")
-    made.look_out_left = look_out_left
-    return made
+    return GoalHandle(goal, endpoint, None, "m")
 
 
 def tell(handle: GoalHandle, event: Event) -> None:
@@ -59,12 +59,11 @@ class Endpoint(SimpleNamespace):
     ("end", "look_out_left", "state", "over"),
     [
         (End.SERVER_GONE, 2.0, State.LOST, False),
-        (End.SERVER_GONE, 0.0, State.LOST, True),
         (End.SERVER_GONE, None, State.LOST, True),
         (End.SUCCEEDED, 2.0, State.DONE, True),
-        (End.UNKNOWN, 0.0, State.LOST, False),
+        (End.UNKNOWN, None, State.LOST, False),
     ],
-    ids=["looked out for", "long enough", "not at all", "has told its end", "unknown"],
+    ids=["looked out for", "not, or long enough", "has told its end", "unknown"],
 )
 def test_a_goal_is_over_when_nothing_of_it_is_waited_for(
     end: End, look_out_left: float | None, state: State, over: bool
@@ -77,18 +76,14 @@ def test_who_is_looked_out_for_is_waited_for_but_not_without_end() -> None:
     lost = handle(End.SERVER_GONE, 2.0)
     drain = Drain(host, [lost])
     host.now += 10.0
-    assert isinstance(drain.step(host.now), Sleep), (
-        "looks count, not time: the process may stand still"
-    )
-    host.now += LOOKS_OUT_AT_MOST
-    assert drain.step(host.now) == Done([lost])
-    assert lost.goal.drain_gave_up
-    assert Drain(host, [lost]).step(host.now) == Done([lost]), "once"
+    assert isinstance(drain.step(host.now), Sleep), "the process may have stood still"
+    assert list(lost.goal.due(Now(host.now, 0.0))) == [Event.LOOK_OUT_DUE]
+    assert drain.step(host.now) == Done([])
 
 
 def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal() -> None:
     host: Any = Host()
-    left = handle(End.UNKNOWN, 0.0)
+    left = handle(End.UNKNOWN, None)
     drain = Drain(host, [left])
     host.now += left.goal.drains_within
     assert isinstance(drain.step(host.now), Sleep)
@@ -98,7 +93,7 @@ def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal() -> None
 
 def test_who_is_back_has_the_time_of_a_cancel_but_only_once() -> None:
     host: Any = Host()
-    handles = [handle(End.SERVER_GONE, 2.0), handle(End.UNKNOWN, 0.0)]
+    handles = [handle(End.SERVER_GONE, 2.0), handle(End.UNKNOWN, None)]
     drain, goal = Drain(host, handles), handles[0].goal
     for back_again in (False, True):
         goal.state, goal.end = State.LOST, End.SERVER_GONE
@@ -111,7 +106,7 @@ def test_who_is_back_has_the_time_of_a_cancel_but_only_once() -> None:
 
 def test_who_is_in_a_hurry_waits_for_no_end() -> None:
     host: Any = Host()
-    left = handle(End.UNKNOWN, 0.0)
+    left = handle(End.UNKNOWN, None)
     drain = Drain(host, [left])
     assert isinstance(drain.step(host.now), Sleep)
     assert drain.step(host.now, hurry=True) == Done([left])

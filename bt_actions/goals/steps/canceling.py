@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bt_actions.goals.asking import ASK_AGAIN
+from bt_actions.goals.asking import ASK_AGAIN, LOOKED_OUT_FOR
 from bt_actions.goals.facts import Facts, Step, leads_to
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.steps import requested
@@ -133,7 +133,10 @@ def server_lost(goal: Facts, detail: Any) -> State:
     goal.asking.denied_since = None
     if goal.phase is not State.NOT_RECEIVED:  # what was denied for less may have come since
         goal.end = End.SERVER_GONE
-    return _keep(goal)
+    state = _keep(goal)
+    if goal.state is not state is State.LOST and goal.end is End.SERVER_GONE:
+        goal.deadlines.arm(Event.LOOK_OUT_DUE, LOOKED_OUT_FOR)
+    return state
 
 
 @leads_to(State.LOST, State.DONE)
@@ -184,6 +187,11 @@ def ask_another(goal: Facts, detail: Any) -> None:
         goal.commands.append(Command.CANCEL)
     if goal.accepted:
         goal.commands.append(Command.ASK_RESULT)
+
+
+@leads_to()
+def looked_out(goal: Facts, detail: Any) -> None:
+    """Nobody waits for it any more; should its server be back all the same, it is canceled."""
 
 
 @leads_to(State.DONE)
