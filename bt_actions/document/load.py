@@ -135,6 +135,11 @@ class Tree:
         setattr(root, LOADED, Loaded(self._document, scope))
         return root
 
+    def release(self) -> None:
+        """Let go of what only `build` needs, which is not called again."""
+        for document in self._workspace.documents:
+            document.release()
+
 
 @_no_collecting()
 def open_tree(
@@ -173,7 +178,10 @@ def load_tree(
     Raises DocumentError with everything that is wrong with the tree, InputError for inputs that do
     not fit; both are ValueErrors.
     """
-    return open_tree(path, types=types, python=python).build(inputs)
+    tree = open_tree(path, types=types, python=python)
+    root = tree.build(inputs)
+    tree.release()
+    return root
 
 
 def tree_inputs(path: PathLike) -> dict[str, TreeInput]:

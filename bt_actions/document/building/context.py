@@ -132,7 +132,7 @@ class Context:
         return lambda: written.expression.holds({}, self.read)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Condition:
     """An expression as a function of its bare root; `text` says what was expected."""
 
@@ -150,7 +150,7 @@ class Condition:
         return self.expression.holds(_roots(self.root, given), self.read)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Part:
     """What is kept of a result or a message, as a function of it; `text` says what that is."""
 

@@ -30,7 +30,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
     """The behaviour of an action, by its name in the document or in place."""
     settings = settings_of(node, context.document)
     goal = settings.get("goal", {})
-    dynamic = any(True for _ in computed_in(goal))
+    dynamic = next(computed_in(goal), None) is not None
     action = _interface(settings["type"], "action", context)
     return ActionBehaviour(
         node.name,

@@ -254,8 +254,10 @@ class Checker:
         expression = computed.expression
         if expression.variables:
             self.reads.setdefault(id(self.reader), []).append(computed)
-            if not self.variables.keys() >= expression.names:
-                self._unknown(computed)
+            for name in expression.variables:
+                if name not in self.variables:
+                    self._unknown(computed)
+                    break
 
         def report(code: str, message: str, start: int, end: int) -> None:
             self.source.report(code, computed.span(self.source, start, end), message)

@@ -281,14 +281,10 @@ class Condition:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Place(Condition):
     """A place in a result or a message, or an expression over it: ``result.pose.position``."""
 
-    roots: frozenset[str]
     words: str = "a place, such as result.final_pose,"
-
-    def read(self, node: Node, source: Source) -> object:
-        return Condition(self.roots, self.words).read(node, source)
 
     def schema(self) -> Schema:
         return {"type": "string"}

@@ -328,7 +328,7 @@ def computed_in(value: object) -> Iterator[Computed]:
 def constant_of(computed: Computed) -> object:
     """The value of an expression over nothing but numbers and texts; None for any other."""
     expression = computed.expression
-    if expression.names or expression.roots or expression.constants:
+    if expression.variables or expression.roots or expression.constants:
         return None
     try:
         return computed.evaluate(lambda _name: None)

@@ -54,6 +54,7 @@ class _Reader:
     def __init__(self, document: Document) -> None:
         self._source = document.source
         self._actions = document.actions
+        self._kinds = dict.fromkeys((*KINDS, *document.actions))
         self._doubts = Doubts(document)
         actions = document.node.get("actions")
         own = actions.pairs if isinstance(actions, Mapping) else []
@@ -86,12 +87,12 @@ class _Reader:
             hint = None
             if isinstance(written, Scalar):
                 word, _, name = written.text.partition(":")
-                if word in KINDS or word in self._actions:
+                if word in self._kinds:
                     hint = f"write '{word}: {name or 'name'}'"
             message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
             source.report("BT111", span_of(written), message, hint=hint)
             return None
-        key = None if self._typed(written) else self._kind_key(written)
+        key = self._kind_key(written)
         if key is None:
             self._only_children(written)
             return None
@@ -104,12 +105,11 @@ class _Reader:
             self._fill(node, kind.keys, kind, _NEEDS[kind.name])
         return node
 
-    def _typed(self, written: Mapping) -> bool:
+    def _typed(self, written: Mapping, said: Node) -> bool:
         """Whether a node says its kind behind 'type:', which is reported."""
-        said = written.get("type")
         if not isinstance(said, Scalar) or "/" in said.text:
             return False
-        kinds = {folded(kind): kind for kind in (*KINDS, *self._actions)}
+        kinds = {folded(kind): kind for kind in self._kinds}
         word, here = kinds.get(folded(said.text)), kind_here(said.text)
         keys = {key.text for key, _ in written.pairs if key.text in kinds.values()}
         if not (word or (here and "action" not in keys)) or keys - _BESIDE_TYPE:
@@ -129,7 +129,10 @@ class _Reader:
 
     def _kind_key(self, written: Mapping) -> Scalar | None:
         """The one key that is a kind or an alias, or None after reporting."""
-        kinds = [key for key, _ in written.pairs if key.text in KINDS or key.text in self._actions]
+        kinds = [key for key, _ in written.pairs if key.text in self._kinds]
+        said = written.get("type")
+        if said is not None and self._typed(written, said):
+            return None
         if len(kinds) == 1 and kinds[0].text not in _BESIDE_CHILD:
             return kinds[0]
         has_child = any(key.text == "child" for key, _ in written.pairs)
@@ -288,10 +291,7 @@ class _Reader:
         """Whether this is a list, or a node, rather than a setting."""
         return isinstance(inner, Listing) or (
             isinstance(inner, Mapping)
-            and any(
-                key.text in KINDS or key.text in _CHILDREN or key.text in self._actions
-                for key, _ in inner.pairs
-            )
+            and any(key.text in self._kinds or key.text in _CHILDREN for key, _ in inner.pairs)
         )
 
     def _report_unknown(self, node: TreeNode, key: Scalar, keys: MappingType[str, Key]) -> None:

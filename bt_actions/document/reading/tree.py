@@ -129,6 +129,12 @@ class Document:
                 yield one
                 waiting.extend(one.imported)
 
+    def release(self) -> None:
+        """Keep of the text of each node only where it stands: nothing more is made from it."""
+        for node in self.nodes():
+            node.node.pairs = []
+            node.written = {}
+
     def nodes(self) -> tuple[TreeNode, ...]:
         """All nodes of the tree, which was read to its end, in the order of the text."""
         if not self._nodes and self.root is not None:

@@ -14,7 +14,7 @@ __all__ = ["cut_hint", "warn_cut"]
 
 def warn_cut(node: Scalar, source: Source, what: str) -> None:
     """Say so where a comment begins without a space behind its '#'; `what` was cut."""
-    rest = _behind(node, source)
+    rest = _behind(node, source) if source.commented else ""
     if not rest:
         return
     mark = rest.lstrip()
@@ -37,6 +37,6 @@ def cut_hint(node: Scalar, source: Source) -> str | None:
 
 def _behind(node: Scalar, source: Source) -> str:
     """What stands behind a plain text on its line, if a '#' is on that."""
-    if not source.commented or not node.plain or node.end_line not in source.commented:
+    if not node.plain or node.end_line not in source.commented:
         return ""
     return (source.line(node.end_line) or "")[node.end_column - 1 :]
