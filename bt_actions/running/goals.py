@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.terms import State
 from bt_actions.traffic.begun import begun_in
 from bt_actions.traffic.handle import Change, GoalHandle, Run
 
@@ -47,6 +48,8 @@ class RunGoals:
         self._handles: dict[GoalHandle, None] = {}  # in the order in which they began
         self.run_goes_on = False
         """Between two runs only what earlier ones have left is of interest."""
+        self.is_watched = True
+        """Whether anybody but its leaf acts on what becomes of a goal."""
 
     @contextlib.contextmanager
     def begun_here(self) -> Iterator[None]:
@@ -89,9 +92,13 @@ class RunGoals:
 
     def _note(self, change: Change | None) -> None:
         if change is not None:
+            is_news = change.handle in self._handles  # else its leaf is just beginning it
             self._handles[change.handle] = None
             self._changes.append(change)
             self._changed()
+            may_be_sent = is_news and change.state is State.WAITING_FOR_SERVER
+            if not (self.is_watched or may_be_sent or change.outcome is not None):
+                return  # its leaf would do nothing
         elif not self.run_goes_on:
             return
         self._wake()

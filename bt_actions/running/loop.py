@@ -235,7 +235,9 @@ class TickLoop:
         """Seconds until the next tick, where nothing happens before."""
         tree, visitor = self.tree, self._visitor
         others = tree.pre_tick_handlers or tree.post_tick_handlers or len(tree.visitors) > 1
-        rest = self.heartbeat * (1.0 if others or visitor.watching else RARELY)
+        watched = bool(others) or visitor.watching
+        self.goals.is_watched = watched or bool(self._observers)
+        rest = self.heartbeat * (1.0 if watched else RARELY)
         for due_in in visitor.timed:
             due = due_in()
             if isinstance(due, int | float):

@@ -79,6 +79,14 @@ class TestTicks:
         assert stage.runner.now < 5.0
         assert not stage.loop.goals._handles, "what is over is forgotten"
 
+    def test_do_not_come_with_what_neither_a_leaf_nor_anybody_else_acts_on(self) -> None:
+        tree = BehaviourTree(in_sequence(*[MoveRobot(f"m{number}", 1.0) for number in range(5)]))
+        stage = Stage(tree, lasts=1.0, heartbeat=30.0)
+        stage.loop._observers.clear()
+        assert stage.runner.run() is Status.SUCCESS
+        assert stage.runner.now < 6.0
+        assert tree.count == 12, "at each end of a goal, and once more as that changed a status"
+
 
 class TestItsEnd:
     def test_out_of_time_it_drains_and_raises_and_may_run_again(self) -> None:
