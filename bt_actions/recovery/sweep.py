@@ -31,10 +31,8 @@ from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, RollCall
 from bt_actions.ros.onlooker import ActionView, CannotStart, Onlooker, onlooker
 from bt_actions.servers.stalls import Stalls
 
-TURN = 0.05
-"""Seconds between two looks for what has come in;"""
-GLANCE = 0.1
-"""and, at least, between two looks at the graph, and for who is still alive."""
+TURN = 0.1
+"""Seconds between two looks for what has come in, at the graph, and for who is still alive."""
 LOOK_LONGEST = 30.0
 """Seconds for which servers may take to answer, in all: a dead server is shown for 20."""
 AWAIT_LONGER = 2 * SETTLE
@@ -138,7 +136,6 @@ class _Sweep:
         self._sight = sight
         self._wanted = None if wanted is None else {sight.full_name(name) for name in wanted}
         self._views: dict[str, ActionView] = {}
-        self._glanced_at = float("-inf")
         self._questions: dict[tuple[str, int], LeftBehind] = {}
         for name in self._wanted or ():
             self._calls[name]  # looked for from now on
@@ -248,10 +245,8 @@ class _Sweep:
                 self._read(action, message)
                 still.lives(time.monotonic())  # there may be many, each of thousands of goals
         now = time.monotonic()
-        if now - self._glanced_at >= GLANCE:
-            self._glanced_at = now
-            self._glance(now)
-            self._find()
+        self._glance(now)
+        self._find()
         for action, view in self._views.items():
             call = self._calls[action]
             # of a goal that is nobody's: any answer shows that a server lives
@@ -295,9 +290,9 @@ class _Sweep:
 
     def _find(self) -> None:
         """See who of those that left goals is dead by now: a status comes at a change only."""
-        dead = {author for author in {by for _, by in self._of_others.values()} if not author.alive}
-        for goal_id, (action, author) in list(self._of_others.items()) if dead else ():
-            if author in dead:
+        alive = {author: author.alive for author in {by for _, by in self._of_others.values()}}
+        for goal_id, (action, author) in list(self._of_others.items()):
+            if not alive[author]:
                 del self._of_others[goal_id]
                 self._is_left(LeftBehind(action, goal_id, author.pid))
         self._read_records()

@@ -100,19 +100,6 @@ def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
     assert name in swept.unknown
 
 
-def test_an_action_that_nobody_wants_is_named_where_it_is_not_known(
-    new_host: HostFactory, name: str, domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    host = new_host(short_lease=False)
-    host.open(name)
-    when_sighted(name, monkeypatch, lambda: host.send(signal.SIGSTOP))
-    swept = sweep([])
-    host.send(signal.SIGCONT)
-    assert swept.missing == [], "and in nobody's way"
-    assert name in swept.unknown
-    assert name not in swept.known
-
-
 def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
     left: str, name: str, domain: int
 ) -> None:
@@ -160,7 +147,9 @@ def test_cleanup_does_not_take_silence_for_nothing(
         host.send(signal.SIGCONT)
         return swept
 
-    assert look(wanted=[]).missing == told == [], "who wants no action is in no server's way"
+    swept = look(wanted=[])
+    assert swept.missing == told == [], "who wants no action is in no server's way"
+    assert name in swept.unknown, "and it is named all the same"
     assert name in look(wanted=None).missing
     assert [name in actions for actions in told] == [True]
 
