@@ -229,8 +229,8 @@ class TreeRunner:
         if before is not None:
             before.tell_unheard(self._log.error)
         try:
-            self._started.begin()
-        except RuntimeError:
+            self._started.start()
+        except RuntimeError:  # there can be no more threads
             self._started = before
             self._release()
             raise
@@ -343,16 +343,14 @@ class TreeRunner:
 
     def _take_down(self) -> None:
         if self._started is not None:
-            self._started.join()
+            if self._started is not threading.current_thread():  # as in a done callback
+                self._started.join()
             self._started.tell_unheard(self._log.error)
-        try:
+        guests = self._close_guests if self._on_close else None
+        with contextlib.ExitStack() as last:
+            last.callback(lambda: self._loop.close(time.monotonic()))
+            last.callback(self._spinner.stop, self._wake_up.set, guests)
             self._loop.shutdown()
-        finally:
-            try:
-                guests = self._close_guests if self._on_close else None
-                self._spinner.stop(self._wake_up.set, guests)
-            finally:
-                self._loop.close(time.monotonic())
 
     def __enter__(self) -> TreeRunner:
         return self
