@@ -274,8 +274,7 @@ class TickLoop:
             try:
                 root.stop(Status.INVALID)
             except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
-                self._log.error(f"terminate of a behaviour raised: {raised(error)}")
-                self._leave_with(error)
+                self._raised("terminate of a behaviour raised", error)
                 self._let_go(culprit_of(error))
         self.watchdog.end()
         return Drain(self._traffic.host, self.goals.not_over)
@@ -288,8 +287,7 @@ class TickLoop:
                     if node is not culprit:
                         node.terminate(Status.INVALID)
                 except BaseException as error:  # noqa: BLE001 - the user's: any
-                    self._log.error(f"terminate of {node.name} raised: {raised(error)}")
-                    self._leave_with(error)
+                    self._raised(f"terminate of {node.name} raised", error)
                 node.status = Status.INVALID
 
     def _wind_up(self, drain: Drain) -> Sleep | Done[Status]:
@@ -327,7 +325,7 @@ class TickLoop:
             try:  # ours must let go though another one raises
                 shutdown()
             except Exception as error:  # noqa: BLE001 - the user's: any
-                self._log.error(f"shutdown of a behaviour raised: {raised(error)}")
+                self._raised("shutdown of a behaviour raised", error)
         self._traffic.drain(self.goals.not_over)
 
     def close(self, now: float) -> None:
@@ -348,11 +346,11 @@ class TickLoop:
                 observer(event)
             except BaseException as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
-                self._log.error(f"an observer raised and was removed: {raised(error)}")
-                self._leave_with(error)
+                self._raised("an observer raised and was removed", error)
 
-    def _leave_with(self, error: BaseException) -> None:
-        """End the run, and then raise what is meant to end the program, as SystemExit is."""
+    def _raised(self, what: str, error: BaseException) -> None:
+        """Log it, and end the run where it is meant to end the program, as SystemExit is."""
+        self._log.error(f"{what}: {raised(error)}")
         if not isinstance(error, Exception):
             self._error = self._error or error
             self._wake()

@@ -252,7 +252,6 @@ class TreeRunner:
         if started is None:
             raise RuntimeError("nothing to wait for: the tree has not been started")
         future = started.future
-        _check_seconds(timeout)
         if self._runs_on == threading.get_ident():
             raise RuntimeError("wait() within the run would wait for itself")
         if timeout is None and not future.done() and self._spinner.is_here():
@@ -364,7 +363,6 @@ class TreeRunner:
     def _run(self, timeout: float | None) -> Status:
         if self._closed:
             raise RuntimeError("this runner has been shut down")
-        _check_seconds(timeout)
         self._runs_on = threading.get_ident()
         self._loop.begin(time.monotonic(), timeout)
         while True:
@@ -389,8 +387,3 @@ def _waits_for_itself(call: str, instead: str) -> RuntimeError:
     return RuntimeError(
         f"{call} would wait for the thread that it is called on, which spins the node: {instead}"
     )
-
-
-def _check_seconds(timeout: float | None) -> None:
-    if timeout is not None and timeout != timeout:
-        raise ValueError(f"timeout must be a number of seconds, not {timeout!r}")
