@@ -41,7 +41,7 @@ from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds.statuses import status_reader
 from bt_actions.servers.reachability import Reachability
-from bt_actions.traffic.transport import GOALS_KEPT, Listener
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, nobodys
 from bt_actions.utilities.plain_text import raised
 
 TAKE_AT_MOST = 200
@@ -149,9 +149,9 @@ class RosTransport:
             self._keep(self._cancel_requests, number, question := _Question(goal_id))
             self.reachability.asked(question.asked)
 
-    def probe(self, probe: int, random_id: bytes) -> None:
+    def probe(self, probe: int) -> None:
         """Ask for a goal that nobody knows: each live server answers once, with status 0."""
-        self.reachability.asked(self._ask_result(random_id, probe))
+        self.reachability.asked(self._ask_result(nobodys(probe), probe))
 
     def _ask_result(self, goal_id: bytes, about: bytes | int) -> float:
         request = self._impl.GetResultService.Request()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 import time
-import uuid
 
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.ros.log import log
@@ -64,10 +63,6 @@ class RosHost:
     def new_goal_id(self) -> bytes:
         """Return 16 bytes that no goal has had."""
         return new_goal_id()
-
-    def random_id(self) -> bytes:
-        """Return 16 bytes that no server knows."""
-        return uuid.uuid4().bytes
 
     def appears(self) -> None:
         """Take note that this process begins to see others now; the caller holds the lock."""

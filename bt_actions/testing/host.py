@@ -49,10 +49,6 @@ class VirtualHost:
         """Return the next 16 bytes of the seed."""
         return self.randomness.randbytes(16)
 
-    def random_id(self) -> bytes:
-        """Return the next 16 bytes of the seed."""
-        return self.randomness.randbytes(16)
-
     # The alarm
 
     def _wake(self) -> None:

@@ -15,7 +15,7 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.servers.presence import GID
 from bt_actions.servers.reachability import Reachability
 from bt_actions.testing.medium import Medium, Served, VirtualRequest
-from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, Seeker
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, Seeker, nobodys
 from bt_actions.utilities.suggest import did_you_mean
 
 LONG_AGO = float("-inf")
@@ -68,9 +68,9 @@ class VirtualTransport:
         """Ask to cancel this goal."""
         self._ask(_Question("cancel", goal_id, self._now), goal_id)
 
-    def probe(self, probe: int, random_id: bytes) -> None:
+    def probe(self, probe: int) -> None:
         """Ask for a goal that nobody knows."""
-        self._ask(_Question("result", probe, self._now), random_id)
+        self._ask(_Question("result", probe, self._now), nobodys(probe))
 
     def forget(self, goal: bytes | int) -> None:
         """Tell no more answers, but for further acceptances of the newest goals."""

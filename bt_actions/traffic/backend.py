@@ -67,9 +67,8 @@ class Service(Protocol):
 class Subscription(Protocol):
     """One topic, listened to."""
 
-    @property
-    def topic(self) -> str:
-        """The topic's full name."""
+    topic: str
+    """The topic's full name."""
 
     def first_may_come(self) -> float:
         """Seconds for which a first message may be on its way; 0 afterwards."""
@@ -84,9 +83,8 @@ class Subscription(Protocol):
 class Publisher(Protocol):
     """One topic, spoken on."""
 
-    @property
-    def topic(self) -> str:
-        """The topic's full name."""
+    topic: str
+    """The topic's full name."""
 
     @property
     def listeners(self) -> int:
@@ -109,17 +107,15 @@ class Publisher(Protocol):
 class Backend(Protocol):
     """The world as one node sees it. Relative names are in the node's namespace."""
 
-    @property
-    def traffic(self) -> Traffic:
-        """The goals of this node."""
+    traffic: Traffic
+    """The goals of this node."""
 
     @property
     def clock(self) -> Clock:
         """Time."""
 
-    @property
-    def randomness(self) -> random.Random:
-        """What varies the pauses before retries."""
+    randomness: random.Random
+    """What varies the pauses before retries."""
 
     def service(self, service_type: type, name: str) -> Service:
         """Become a client of a service."""

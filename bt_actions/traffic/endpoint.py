@@ -254,7 +254,7 @@ class ActionEndpoint:
         self.watch.probe_sent(self._host.steady(), probe)
         self.transport.forget(probe - PROBES_KEPT)
         with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
-            self.transport.probe(probe, self._host.random_id())
+            self.transport.probe(probe)
 
     def deliver_arrived(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""

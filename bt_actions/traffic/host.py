@@ -112,29 +112,23 @@ class Host(Protocol):
     def log(self) -> Log:
         """Where lines go."""
 
-    @property
-    def record(self) -> Record:
-        """Where a goal is put before it is sent."""
+    record: Record
+    """Where a goal is put before it is sent."""
 
-    @property
-    def stalls(self) -> Stalls:
-        """When this process stood still, and what it may not conclude yet."""
+    stalls: Stalls
+    """When this process stood still, and what it may not conclude yet."""
 
-    @property
-    def scheduler(self) -> Scheduler:
-        """The endpoints with open goals."""
+    scheduler: Scheduler
+    """The endpoints with open goals."""
 
-    @property
-    def trace(self) -> Trace:
-        """Who watches the goals' steps."""
+    trace: Trace
+    """Who watches the goals' steps."""
 
-    @property
-    def forks(self) -> int:
-        """Forks between the first process and this one: what an older one made is not ours."""
+    forks: int
+    """Forks between the first process and this one: what an older one made is not ours."""
 
-    @property
-    def closing(self) -> bool:
-        """Whether the process ends: a tree that ticks on begins nothing any more."""
+    closing: bool
+    """Whether the process ends: a tree that ticks on begins nothing any more."""
 
     def domain(self, number: int) -> Domain:
         """Return what is shared in the ROS domain of this number."""
@@ -144,6 +138,3 @@ class Host(Protocol):
 
     def new_goal_id(self) -> bytes:
         """Return 16 bytes that no goal has had."""
-
-    def random_id(self) -> bytes:
-        """Return 16 bytes that no server knows."""

@@ -148,7 +148,7 @@ class Route:
         if not transport.reachability.heard:
             if transport.reachability.take_question(now):
                 with contextlib.suppress(Exception):
-                    transport.probe(ON_TRIAL, self._host.random_id())
+                    transport.probe(ON_TRIAL)
             return False
         if self._last_question_at == NEVER:
             self._last_question_at = now

@@ -20,6 +20,11 @@ Request = Literal["goal", "cancel", "result"]
 """What a server can be asked of a goal: to take it, to cancel it, and for its result."""
 
 
+def nobodys(probe: int) -> bytes:
+    """Return the goal id that a probe asks for, which no goal has."""
+    return b"bt_probe" + probe.to_bytes(8, "big")
+
+
 class Listener(Protocol):
     """Who is told what the servers say: under the host's lock, from whichever thread delivers."""
 
@@ -56,13 +61,11 @@ class ActionTransport(Protocol):
     on_trial: bool
     """The listener has another transport; of this one it wants to hear of statuses alone."""
 
-    @property
-    def seen_since(self) -> float:
-        """Since when its participant sees others (seconds, steady clock)."""
+    seen_since: float
+    """Since when its participant sees others (seconds, steady clock)."""
 
-    @property
-    def reachability(self) -> Reachability:
-        """What is known of whether a server hears these requests; told of each, and of answers."""
+    reachability: Reachability
+    """What is known of whether a server hears these requests; told of each, and of answers."""
 
     def send(self, goal_id: bytes, goal: Any) -> None:
         """Send the goal request."""
@@ -73,7 +76,7 @@ class ActionTransport(Protocol):
     def cancel(self, goal_id: bytes) -> None:
         """Ask to cancel this goal, and no other."""
 
-    def probe(self, probe: int, random_id: bytes) -> None:
+    def probe(self, probe: int) -> None:
         """Ask for a goal that nobody knows: each live server answers once, with status 0."""
 
     def forget(self, goal: bytes | int) -> None:
@@ -139,28 +142,23 @@ class Opener(Protocol):
 class Participant(Opener, Protocol):
     """A participant of the ROS network: what it sees and hears, the goals of its node do."""
 
-    @property
-    def domain(self) -> int:
-        """The ROS domain id."""
+    domain: int
+    """The ROS domain id."""
 
-    @property
-    def name(self) -> str:
-        """The name of the node."""
+    name: str
+    """The name of the node."""
 
-    @property
-    def namespace(self) -> str:
-        """The namespace of the node: "/" or "/r1"."""
+    namespace: str
+    """The namespace of the node: "/" or "/r1"."""
 
-    @property
-    def seen_since(self) -> float:
-        """Since when it sees others (seconds, steady clock).
+    seen_since: float
+    """Since when it sees others (seconds, steady clock).
 
-        A new one has dropped no server yet: what it does not see it may still discover.
-        """
+    A new one has dropped no server yet: what it does not see it may still discover.
+    """
 
-    @property
-    def long_stalls(self) -> int:
-        """How often the process had stood still for long by `seen_since` (Stalls.long_times)."""
+    long_stalls: int
+    """How often the process had stood still for long by `seen_since` (Stalls.long_times)."""
 
     def now(self) -> Now:
         """Return this moment, by the steady clock and by its own."""

@@ -75,8 +75,8 @@ class ModelTransport:
     def ask_result(self, goal_id: bytes) -> None:
         self._ask("result", goal_id, goal_id)
 
-    def probe(self, probe: int, random_id: bytes) -> None:
-        self._ask("probe", probe, random_id)
+    def probe(self, probe: int) -> None:
+        self._ask("probe", probe, b"")
 
     def _ask(self, kind: str, about: Any, goal_id: bytes) -> int:
         if self.closed:
@@ -230,9 +230,6 @@ class ModelHost:
 
     def new_goal_id(self) -> bytes:
         return b"%d" % len(self.caller.seen)
-
-    def random_id(self) -> bytes:
-        return b""
 
     def notify_all(self) -> None: ...
 

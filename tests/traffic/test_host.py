@@ -89,7 +89,7 @@ def test_who_holds_the_lock_may_take_it_again_and_wait_for_a_change(world: Any) 
 
 def test_ids_are_of_sixteen_bytes_and_none_comes_twice(world: Any) -> None:
     host, _ = world
-    ids = [make() for _ in range(100) for make in (host.new_goal_id, host.random_id)]
+    ids = [host.new_goal_id() for _ in range(100)]
     assert {len(each) for each in ids} == {16}
     assert len(set(ids)) == len(ids)
 

@@ -216,7 +216,7 @@ def test_an_answer_to_a_cancel_says_what_was_meant(side: Side, fault: str, code:
 def test_each_of_two_servers_answers_and_the_answers_add_up(side: Side) -> None:
     side.serve()
     side.serve()
-    side.transport.probe(7, uuid.uuid4().bytes)
+    side.transport.probe(7)
     side.until_told(("probe", 7), ("probe", 7))
     side.heard.told.clear()
     goal_id = side.send()
@@ -226,7 +226,7 @@ def test_each_of_two_servers_answers_and_the_answers_add_up(side: Side) -> None:
 def test_of_what_is_forgotten_only_a_further_acceptance_is_told(side: Side) -> None:
     side.serve("1:delay_accept=0.3")
     goal_id = side.send()
-    side.transport.probe(7, goal_id)
+    side.transport.probe(7)
     side.transport.cancel(goal_id)
     side.transport.forget(goal_id)
     side.transport.forget(7)
@@ -263,6 +263,6 @@ def test_what_is_closed_tells_nothing(side: Side) -> None:
     closed.close()
     closed.close()
     assert closed.closed
-    side.transport.probe(1, uuid.uuid4().bytes)
+    side.transport.probe(1)
     side.until_told(("probe", 1))
     assert heard.told == []
