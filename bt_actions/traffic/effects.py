@@ -11,11 +11,11 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import Any
 
-from bt_actions.goals.policy import Busy, End, Outcome
+from bt_actions.goals.policy import Busy
 from bt_actions.goals.terms import Command, State
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.handle import GoalHandle, Standing
 
 
 class Do(Enum):
@@ -41,38 +41,10 @@ class Effect:
     """The goal to be sent."""
 
 
-class Before(NamedTuple):
-    """What of a goal matters for what follows from a step, before it."""
-
-    shown: tuple[str, Outcome | None, End]
-    in_the_way: tuple[bool, ...]
-    """What others may wait for: room at its server, or its end."""
-    accepted: bool
-    lost: bool
-    answered: bool
-    done: bool
-
-    @classmethod
-    def of(cls, handle: GoalHandle) -> Before:
-        """Return it as it is now."""
-        goal = handle.goal
-        in_the_way = (
-            goal.in_flight,
-            goal.request_pending,
-            goal.outstanding,
-            goal.lost,
-            goal.claims_resources,
-        )
-        shown = goal.state.shown, goal.outcome, goal.end
-        done = goal.state is State.DONE
-        return cls(shown, in_the_way, goal.accepted, goal.lost, _is_answered(handle), done)
-
-
-def what_follows(
-    handle: GoalHandle, before: Before, commands: Iterable[Command]
-) -> Iterator[Do | Command]:
+def what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Do | Command]:
     """Return what is to be done after a step of a goal, in order."""
-    goal, now = handle.goal, Before.of(handle)
+    goal, before, now = handle.goal, handle.standing, Standing.of(handle)
+    handle.standing = now
     if now.shown != before.shown:
         yield Do.NOTE
     if now.in_the_way != before.in_the_way:
@@ -87,17 +59,6 @@ def what_follows(
     newly = now.accepted and not before.accepted and goal.state is State.EXECUTING
     if newly and goal.busy is Busy.REPLACE:
         yield Do.REPLACE
-
-
-def _is_answered(handle: GoalHandle) -> bool:
-    """Whether it need not be on record any more: whoever got it shows it, or will not run it.
-
-    One that two servers got is accepted by one of them first. And a server that has gone may only
-    stand still, for longer than this process is there.
-    """
-    goal = handle.goal
-    shown = goal.accepted and len(handle.replies.sent_to) <= 1
-    return shown or (handle.accounted_for and goal.end is not End.SERVER_GONE)
 
 
 class Effects:

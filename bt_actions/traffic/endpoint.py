@@ -25,7 +25,7 @@ from bt_actions.servers.replies import DENIALS, Told
 from bt_actions.traffic.begun import wake
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.effect_runner import EffectRunner
-from bt_actions.traffic.effects import Before, Effect, what_follows
+from bt_actions.traffic.effects import Effect, what_follows
 from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.handle import GoalHandle, NodeTraffic
 from bt_actions.traffic.host import Host
@@ -235,14 +235,13 @@ class ActionEndpoint:
         self, handle: GoalHandle, event: Event, now: Now, detail: Any = None, message: Any = None
     ) -> None:
         goal, trace = handle.goal, self._host.trace
-        before = Before.of(handle)
         waited = goal.state in (State.QUEUED, State.WAITING_FOR_SERVER)
         trace.tells(handle, event)
         commands = goal.on(event, now, detail)
         trace.told(handle, event, detail, commands)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
             goal.reason += self._traffic.why_not(handle)
-        for do in what_follows(handle, before, commands):
+        for do in what_follows(handle, commands):
             self.domain.effects.put(self._effect_runner.carry_out, Effect(do, handle, message))
         if (due := goal.due_in(now)) is not None:
             self._host.scheduler.wake_by(now.steady + due)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
@@ -130,8 +130,12 @@ class GoalHandle:
     stopped, and is shown again within LEASE, or not be discovered by a new node, which takes
     TOO_NEW (handover.adopt, Route.move_to)."""
 
+    standing: Standing = field(init=False)
+    """How the goal stood after its last step."""
+
     def __post_init__(self) -> None:
         self.replies = Replies(self.goal)
+        self.standing = Standing.of(self)
 
     @property
     def accounted_for(self) -> bool:
@@ -152,6 +156,35 @@ class GoalHandle:
     def looked_out_for(self) -> bool:
         """Whether a server is looked out for that went away with it, and has not told its end."""
         return self.goal.lost and Event.LOOK_OUT_DUE in self.goal.deadlines
+
+
+class Standing(NamedTuple):
+    """What of a goal matters for what follows from a step."""
+
+    shown: tuple[str, Outcome | None, End]
+    in_the_way: tuple[bool, ...]
+    """What others may wait for: room at its server, or its end."""
+    accepted: bool
+    lost: bool
+    answered: bool
+    """Whether it need not be on record any more: whoever got it shows it, or will not run it.
+
+    One that two servers got is accepted by one of them first. And a server that has gone may only
+    stand still, for longer than this process is there."""
+    done: bool
+
+    @classmethod
+    def of(cls, handle: GoalHandle) -> Standing:
+        """Return it as it is now."""
+        goal = handle.goal
+        state, accepted, lost = goal.state, goal.accepted, goal.lost
+        pending = goal.in_flight, goal.request_pending
+        in_the_way = *pending, goal.outstanding, lost, goal.claims_resources
+        answered = (accepted and len(handle.replies.sent_to) <= 1) or (
+            handle.accounted_for and goal.end is not End.SERVER_GONE
+        )
+        shown = state.shown, goal.outcome, goal.end
+        return cls(shown, in_the_way, accepted, lost, answered, state is State.DONE)
 
 
 @dataclass(frozen=True, slots=True)
