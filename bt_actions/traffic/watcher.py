@@ -40,6 +40,7 @@ class Watcher:
     def __init__(self, endpoint: Endpoint, host: Host, domain: Domain, route: Route) -> None:
         self._endpoint, self._host, self._domain, self._route = endpoint, host, domain, route
         self._look_at = 0.0
+        self._looked_at = NEVER  # and told
         self._counted = 0  # at the last look
         self._looked_like = Server.ABSENT
         self._was_away = False  # seen between two looks
@@ -55,9 +56,7 @@ class Watcher:
             if unclear or endpoint.has_unsent:
                 self._look_at = now + LOOK_WHILE_WAITING
             elif any(not handle.is_over for handle in endpoint.goals.values()):
-                alone = self._looked_like is Server.READY and not endpoint.watch.is_crowded
-                rests = alone and not any(self._held_back)
-                self._look_at = now + (LOOK_AT_REST if rests else LOOK_WHILE_RUNNING)
+                self._look_at = now + (LOOK_AT_REST if self._rests else LOOK_WHILE_RUNNING)
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
@@ -74,6 +73,22 @@ class Watcher:
         handover.bound_the_lost(endpoint, self._host)
         return max(wait, 0.001)
 
+    @property
+    def _rests(self) -> bool:
+        """Whether one server was there at the last look, ready, and for long."""
+        alone = self._looked_like is Server.READY and not self._endpoint.watch.is_crowded
+        return alone and not any(self._held_back)
+
+    def state_before_send(self, now: float) -> Server:
+        """Return the server's state; look, unless that was done just now, and the count is as then.
+
+        Who has taken another's place since is seen right after the send.
+        """
+        is_new = now - self._looked_at < LOOK_AT_REST and self._rests
+        if is_new and self._endpoint.participant.alive() and not self._counts_others():
+            return Server.READY
+        return self.observe_and_tell(now)
+
     def _counts_others(self) -> bool:
         """Whether a server has come or gone since the last look, or our node was destroyed."""
         try:
@@ -88,7 +103,7 @@ class Watcher:
     def begin_anew(self) -> None:
         """Nothing of what was seen counts any more."""
         self._looked_like = Server.ABSENT
-        self._look_at = 0.0
+        self._look_at, self._looked_at = 0.0, NEVER
 
     def observe_and_tell(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
@@ -126,6 +141,7 @@ class Watcher:
                     endpoint.deliver_arrived()  # its last words
                 endpoint.pass_on(handle, handle.replies.looked(watch, now))
         state = self._looked_like = watch.state(now)
+        self._looked_at = now
         if before is Server.ABSENT or self._was_away:
             endpoint.in_sight_since = now
         self._was_away = False
@@ -151,8 +167,10 @@ class Watcher:
     def observe(self) -> None:
         """Observe who is in sight; what follows is for `observe_and_tell` to say."""
         with contextlib.suppress(Exception):
-            now = self._host.steady()
+            now, before = self._host.steady(), self._endpoint.watch.gids
             self._ask_discovery(now, concludes=False)
+            if self._endpoint.watch.gids != before:
+                self._looked_at = NEVER
             self._was_away |= self._endpoint.watch.state(now) is Server.ABSENT
 
     def _ask_discovery(self, now: float, *, concludes: bool = True) -> None:
