@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -83,20 +83,13 @@ class Leaf(Timed):
             return Status.FAILURE
 
 
-class Thing(Protocol):
-    """What a leaf has on a node."""
-
-    def close(self) -> None:
-        """Let go of it."""
-
-
-T = TypeVar("T", bound=Thing)
+T = TypeVar("T")
 
 
 class Connected(Leaf, Generic[T]):
     """A leaf that cannot do without a node, and has one thing of its own there."""
 
-    _own: T | None = None
+    _own: Any = None
     _timeout: float | None = None
 
     def initialise(self) -> None:

@@ -108,7 +108,7 @@ class CallService(Connected[Service]):
         else:
             self.feedback_message = f"waiting for the service {client.name}"
             if self.left() <= 0.0:
-                why = client.why_absent()
+                why = client.why_nobody()
                 raise ValueError(f"no service {client.name} within {self._timeout:g} s{why}")
         return Status.RUNNING
 

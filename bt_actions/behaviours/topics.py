@@ -87,11 +87,11 @@ class TopicValue:
         latest = self._latest
         if latest is None:
             raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
-        topic = latest.subscription.topic
+        topic = latest.subscription.name
         if latest.newest is None:
             now = latest.backend.clock.now().steady
             if now >= self._look_again_at:  # a tree may ask at each tick
-                self._said, self._look_again_at = latest.subscription.why_silent(), now + 1.0
+                self._said, self._look_again_at = latest.subscription.why_nobody(), now + 1.0
             raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._said}")
         message, since = latest.newest
         age = since.passed()
@@ -102,7 +102,7 @@ class TopicValue:
     def first_may_come(self) -> float:
         """Seconds for which the first message may be on its way; 0 afterwards."""
         latest = self._latest
-        return 0.0 if latest is None or latest.came else latest.subscription.first_may_come()
+        return 0.0 if latest is None or latest.came else latest.subscription.may_come()
 
 
 def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
@@ -179,7 +179,7 @@ class WaitForMessage(Connected[Latest]):
 
     def do(self) -> Status:
         _, latest = self._there()
-        topic = latest.subscription.topic
+        topic = latest.subscription.name
         self.feedback_message = f"waiting for a message on {topic}"
         for _ in range(len(latest.kept)):  # not what comes meanwhile: a tick must end
             message = latest.kept.popleft()
@@ -194,7 +194,7 @@ class WaitForMessage(Connected[Latest]):
                 self.feedback_message = str(error)
         if self.left() > 0.0:
             return Status.RUNNING
-        why = "" if latest.came else latest.subscription.why_silent()
+        why = "" if latest.came else latest.subscription.why_nobody()
         if self._came_before:
             why = f"; {self._came_before} came before it began"
         raise ValueError(f"no such message on {topic} within {self._timeout:g} s{why}")
@@ -251,21 +251,21 @@ class Publish(Connected[Publisher]):
 
     def do(self) -> Status:
         backend, publisher = self._there()
-        topic, listeners = publisher.topic, publisher.listeners
-        some_may_come = publisher.listener_may_come() > 0.0
+        topic, listeners = publisher.name, publisher.listeners
+        some_may_come = publisher.may_come() > 0.0
         self.warning = ""
         if listeners < (self._subscribers or some_may_come):
             if self._subscribers and not some_may_come and self.left() <= 0.0:
                 raise ValueError(
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
-                    f" {self._timeout:g} s{publisher.why_unheard()}"
+                    f" {self._timeout:g} s{publisher.why_nobody()}"
                 )
             self.feedback_message = f"waiting for who listens on {topic}"
             return Status.RUNNING
         message: Any = fill(self._type, self._data(), now=backend.clock.stamp)
         publisher.publish(message)
         if not listeners:
-            self.warning = f"nobody listens on {topic}{publisher.why_unheard()}"
+            self.warning = f"nobody listens on {topic}{publisher.why_nobody()}"
         self.feedback_message = self.warning
         return Status.SUCCESS
 

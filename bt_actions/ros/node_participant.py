@@ -21,6 +21,7 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
+from bt_actions.ros.connections import Publisher, Service, Subscription
 from bt_actions.ros.environment import sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
 from bt_actions.ros.graph import enclave
@@ -28,8 +29,6 @@ from bt_actions.ros.host import host
 from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.log import log
 from bt_actions.ros.rediscovery import look_for
-from bt_actions.ros.service_client import ServiceClient
-from bt_actions.ros.topics import Publisher, Subscription
 from bt_actions.ros.workarounds.one_waitable import OneWaitable
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import Listener, Seeker
@@ -92,9 +91,9 @@ class NodeParticipant:
 
     # What leaves ask for
 
-    def service(self, service_type: type, name: str) -> ServiceClient:
+    def service(self, service_type: type, name: str) -> Service:
         """Become a client of a service."""
-        return ServiceClient(self.node, service_type, name)
+        return Service(self.node, service_type, name)
 
     def subscription(
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]

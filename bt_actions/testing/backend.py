@@ -69,22 +69,36 @@ class VirtualClock:
         return int(self._network.now() * 1e9)
 
 
-class VirtualService:
+class _Connection:
+    """What all have in common: whoever is there was discovered long ago."""
+
+    def __init__(self, network: VirtualNetwork, name: str) -> None:
+        self.name = network.expand(name)
+        self._network = network
+
+    def may_come(self) -> float:
+        """Say that nobody else may."""
+        return 0.0
+
+    def why_nobody(self) -> str:
+        """Say nothing more."""
+        return ""
+
+    def close(self) -> None:
+        """Have nothing to let go of."""
+
+
+class VirtualService(_Connection):
     """A client of one service."""
 
     def __init__(self, network: VirtualNetwork, service_type: type, name: str) -> None:
-        self.name = network.expand(name)
-        self._network = network
+        super().__init__(network, name)
         self._type = service_type
 
     @property
     def ready(self) -> bool:
         """Whether the service is there."""
         return self._network.service(self._type, self.name) is not None
-
-    def why_absent(self) -> str:
-        """Say nothing more."""
-        return ""
 
     def call(self, request: Any) -> Future[Any]:
         """Begin a call."""
@@ -104,11 +118,8 @@ class VirtualService:
             self._network.soon(reply)
         return call
 
-    def close(self) -> None:
-        """Have nothing to let go of."""
 
-
-class VirtualSubscription:
+class VirtualSubscription(_Connection):
     """One topic, listened to."""
 
     def __init__(
@@ -119,19 +130,11 @@ class VirtualSubscription:
         qos: str,
         take: Callable[[Any], None],
     ) -> None:
-        self.topic = network.expand(topic)
+        super().__init__(network, topic)
         self._topic = network.topic(topic)
         self._mine = network.subscribe(message_type, topic, take)
         if qos == "latched" and isinstance(self._topic.latched, message_type):
             network.soon(self._topic.bring, self._mine, self._topic.latched)
-
-    def first_may_come(self) -> float:
-        """Say that whoever publishes was discovered long ago."""
-        return 0.0
-
-    def why_silent(self) -> str:
-        """Say nothing more."""
-        return ""
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -139,30 +142,18 @@ class VirtualSubscription:
             self._topic.subscriptions.remove(self._mine)
 
 
-class VirtualSpeaker:
+class VirtualSpeaker(_Connection):
     """One topic, spoken on by a leaf."""
 
     def __init__(self, network: VirtualNetwork, topic: str, qos: str) -> None:
-        self.topic = network.expand(topic)
-        self._network = network
+        super().__init__(network, topic)
         self._latched = qos == "latched"
 
     @property
     def listeners(self) -> int:
         """How many subscriptions there are."""
-        return len(self._network.topic(self.topic).subscriptions)
-
-    def listener_may_come(self) -> float:
-        """Say that whoever listens was discovered long ago."""
-        return 0.0
-
-    def why_unheard(self) -> str:
-        """Say nothing more."""
-        return ""
+        return len(self._network.topic(self.name).subscriptions)
 
     def publish(self, message: Any) -> None:
         """Publish."""
-        self._network.publish(self.topic, message, latched=self._latched)
-
-    def close(self) -> None:
-        """Have nothing to let go of."""
+        self._network.publish(self.name, message, latched=self._latched)

@@ -43,64 +43,49 @@ class Call(Protocol):
         """Take no interest in an answer any more."""
 
 
-class Service(Protocol):
-    """A client of one service."""
+class Connection(Protocol):
+    """Our end of a topic or a service."""
 
-    @property
-    def name(self) -> str:
-        """The service's full name."""
+    name: str
+    """The topic's or the service's full name."""
+
+    def why_nobody(self) -> str:
+        """What explains that nobody is at the other end, behind a colon; or an empty text."""
+
+    def close(self) -> None:
+        """Let go of it; where we publish, once all have it, or a second after the last message."""
+
+
+class Service(Connection, Protocol):
+    """A client of one service."""
 
     @property
     def ready(self) -> bool:
         """Whether the service is there."""
 
-    def why_absent(self) -> str:
-        """What is there in place of the service, behind a colon; or an empty text."""
-
     def call(self, request: Any) -> Call:
         """Begin a call, which wakes who has called when it is done."""
 
-    def close(self) -> None:
-        """Let go of the service."""
 
-
-class Subscription(Protocol):
+class Subscription(Connection, Protocol):
     """One topic, listened to."""
 
-    topic: str
-    """The topic's full name."""
-
-    def first_may_come(self) -> float:
+    def may_come(self) -> float:
         """Seconds for which a first message may be on its way; 0 afterwards."""
 
-    def why_silent(self) -> str:
-        """What explains that nothing has come, behind a colon; or an empty text."""
 
-    def close(self) -> None:
-        """Unsubscribe."""
-
-
-class Publisher(Protocol):
+class Publisher(Connection, Protocol):
     """One topic, spoken on."""
-
-    topic: str
-    """The topic's full name."""
 
     @property
     def listeners(self) -> int:
         """How many subscriptions get what is published."""
 
-    def listener_may_come(self) -> float:
-        """Seconds for which one that is there may not be discovered yet; 0 afterwards."""
-
-    def why_unheard(self) -> str:
-        """What explains that nobody listens, behind a colon; or an empty text."""
+    def may_come(self) -> float:
+        """Seconds for which a listener may be there that is not discovered yet; 0 afterwards."""
 
     def publish(self, message: Any) -> None:
         """Publish; returns at once."""
-
-    def close(self) -> None:
-        """Go, once the listeners have all, or a second after the last message."""
 
 
 @runtime_checkable

@@ -92,7 +92,7 @@ class TestExitCode0:
         from rclpy.executors import SingleThreadedExecutor
         from std_msgs.msg import Bool
 
-        from bt_actions.ros.topics import qos_profile
+        from bt_actions.ros.connections import qos_profile
 
         path = tmp_path / "new.yaml"
         heard: list[bool] = []

@@ -125,7 +125,7 @@ def test_who_reads_a_latched_topic_at_once_is_given_its_message(
 ) -> None:
     from std_msgs.msg import Int32
 
-    from bt_actions.ros.topics import qos_profile
+    from bt_actions.ros.connections import qos_profile
 
     if kind == "action":
         serve()
@@ -220,7 +220,7 @@ def test_who_publishes_in_vain_is_told_where_no_message_comes(
 ) -> None:
     import std_msgs.msg
 
-    from bt_actions.ros.topics import qos_profile
+    from bt_actions.ros.connections import qos_profile
 
     cls = getattr(std_msgs.msg, kind)
     publisher = stranger.create_publisher(cls, f"{name}/door", qos_profile(theirs))
@@ -328,10 +328,10 @@ def test_what_was_published_has_a_second_to_arrive_before_its_publisher_goes(
 def test_a_message_that_nobody_listens_to_is_published_with_a_warning_when_the_node_is_not_new(
     load: Load, node: Any, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bt_actions.ros import topics
+    from bt_actions.ros import connections
 
     new = [0.5]
-    monkeypatch.setattr(topics._Topic, "_undiscovered", lambda _topic: new[0])
+    monkeypatch.setattr(connections._Topic, "may_come", lambda _topic: new[0])
     hasty: Any = load(LAMP.format(topic=name, more=", subscribers: 1, timeout: 1 ns"))
     root: Any = load(LAMP.format(topic=name, more=""))
     hasty.setup(node=node)

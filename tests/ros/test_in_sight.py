@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from rclpy.topic_endpoint_info import TopicEndpointInfo as Ends
 
+from bt_actions.ros.connections import qos_profile
 from bt_actions.ros.in_sight import elsewhere, mismatch
-from bt_actions.ros.topics import qos_profile
 
 BOOL = "std_msgs/msg/Bool"
 OURS = Ends(topic_type=BOOL, qos_profile=qos_profile("default"))

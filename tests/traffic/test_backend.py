@@ -147,7 +147,7 @@ def test_who_listens_is_given_each_message_in_order(world: World, name: str) -> 
     came: list[int] = []
     heard = world.backend.subscription(Int32, name, "default", lambda each: came.append(each.data))
     spoken = world.backend.publisher(Int32, name, "default")
-    assert heard.topic == spoken.topic == f"{world.namespace}/{name}"
+    assert heard.name == spoken.name == f"{world.namespace}/{name}"
     world.until(lambda: spoken.listeners == 1)
     for number in range(5):
         spoken.publish(Int32(data=number))
@@ -177,8 +177,8 @@ def test_some_time_after_it_began_nobody_may_be_on_the_way_any_more(
 ) -> None:
     heard = world.backend.subscription(Int32, name, "default", lambda _: None)
     spoken = world.backend.publisher(Int32, name, "default")
-    world.until(lambda: heard.first_may_come() == 0.0)
-    world.until(lambda: spoken.listener_may_come() == 0.0)
+    world.until(lambda: heard.may_come() == 0.0)
+    world.until(lambda: spoken.may_come() == 0.0)
     heard.close()
     spoken.close()
 
@@ -189,7 +189,7 @@ def test_a_service_answers_and_wakes_who_runs_the_tree(
     service = world.backend.service(SetBool, name)
     assert service.name == f"{world.namespace}/{name}"
     assert not service.ready
-    why = service.why_absent()
+    why = service.why_nobody()
     assert not why or why.startswith(": ")
     world.serve(SetBool, name, switched)
     world.until(lambda: service.ready)

@@ -11,9 +11,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from bt_actions.messages.interfaces import interface_name
+from bt_actions.ros.connections import DISCOVERS
 from bt_actions.ros.naming import own_node
 from bt_actions.ros.serving.endpoints import kept
-from bt_actions.ros.topics import DISCOVERS
 from bt_actions.ros.workarounds import participant
 
 PATIENCE = 5.0

@@ -1,6 +1,7 @@
-"""Topics for trees: what leaves listen to and speak on, and qualities of service.
+"""What leaves have on a node: topics that they listen to and speak on, services that they call.
 
-Whoever is called with a message only takes note of it; nothing of the tree runs there.
+Whoever is called with a message or an answer only takes note of it; nothing of the tree runs there.
+Decides nothing, neither how long to wait nor whether to ask again.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ from rclpy.qos import (
 )
 
 from bt_actions.messages.interfaces import interface_name
-from bt_actions.ros.in_sight import without_topic
+from bt_actions.ros.in_sight import without_service, without_topic
 from bt_actions.ros.workarounds.closable import closable
+from bt_actions.traffic.backend import Call
+from bt_actions.traffic.begun import waker
 
 DISCOVERS = 3.5
 """Seconds that a new participant takes, at most, to discover who was there before it.
@@ -55,26 +58,30 @@ def qos_profile(name: str) -> QoSProfile:
 class _Topic:
     """What a subscription and a publisher have in common."""
 
+    listens: bool
+
     def __init__(self, node: Node, seen_since: float, message_type: type, qos: str) -> None:
         self._node = node
         self._discovered_at = seen_since + DISCOVERS
         self._type = message_type
         self._qos = qos_profile(qos)
-        self.topic = ""
+        self.name = ""
         """The topic's full name."""
 
-    def _undiscovered(self) -> float:
+    def may_come(self) -> float:
         """Seconds for which the node may not be shown yet who was there before it."""
         return max(0.0, self._discovered_at - time.monotonic())
 
-    def _why(self, *, publish: bool) -> str:
+    def why_nobody(self) -> str:
         """What the graph shows that explains why nobody publishes, or listens; or ""."""
         kind = interface_name(self._type)
-        return without_topic(self._node, self.topic, kind, self._qos, publish=publish)
+        return without_topic(self._node, self.name, kind, self._qos, publish=self.listens)
 
 
 class Subscription(_Topic):
     """That of a leaf; the Subscription of traffic/backend.py."""
+
+    listens = True
 
     def __init__(
         self,
@@ -87,29 +94,20 @@ class Subscription(_Topic):
     ) -> None:
         super().__init__(node, seen_since, message_type, qos)
         self._made_at = time.monotonic()
+        group = MutuallyExclusiveCallbackGroup()
         self._subscription = closable(
-            node.create_subscription(
-                message_type,
-                topic,
-                take,
-                self._qos,
-                callback_group=MutuallyExclusiveCallbackGroup(),
-            )
+            node.create_subscription(message_type, topic, take, self._qos, callback_group=group)
         )
-        self.topic = self._subscription.topic_name
+        self.name = self._subscription.topic_name
 
-    def first_may_come(self) -> float:
+    def may_come(self) -> float:
         """Seconds for which a first message may be on its way; 0 afterwards.
 
         Its publisher may not be discovered yet, or has only just been.
         """
         matched = self._subscription.get_publisher_count() > 0
         arrives = self._made_at + ARRIVES - time.monotonic() if matched else 0.0
-        return max(self._undiscovered(), arrives)
-
-    def why_silent(self) -> str:
-        """What the graph shows that explains why nothing has come, behind a colon; or ""."""
-        return self._why(publish=True)
+        return max(super().may_come(), arrives)
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -119,26 +117,20 @@ class Subscription(_Topic):
 class Publisher(_Topic):
     """That of a leaf; the Publisher of traffic/backend.py."""
 
+    listens = False
+
     def __init__(
         self, node: Node, seen_since: float, message_type: type, topic: str, qos: str
     ) -> None:
         super().__init__(node, seen_since, message_type, qos)
         self._publisher = closable(node.create_publisher(message_type, topic, self._qos))
         self._has_all_by = 0.0
-        self.topic = self._publisher.topic_name
+        self.name = self._publisher.topic_name
 
     @property
     def listeners(self) -> int:
         """How many subscriptions get what is published."""
         return int(self._publisher.get_subscription_count())
-
-    def listener_may_come(self) -> float:
-        """Seconds for which one that is there may not be discovered yet; 0 afterwards."""
-        return self._undiscovered()
-
-    def why_unheard(self) -> str:
-        """What the graph shows that explains why nobody listens, behind a colon; or ""."""
-        return self._why(publish=False)
 
     def publish(self, message: Any) -> None:
         """Publish; returns at once."""
@@ -156,3 +148,35 @@ class Publisher(_Topic):
                     break
                 time.sleep(0.005)
         self._node.destroy_publisher(self._publisher)
+
+
+class Service:
+    """A client of a leaf; the Service of traffic/backend.py."""
+
+    def __init__(self, node: Node, service_type: type, name: str) -> None:
+        self._node = node
+        self._type = service_type
+        group = MutuallyExclusiveCallbackGroup()
+        self._client = node.create_client(service_type, name, callback_group=group)
+        self.name: str = self._client.service_name
+        """The service's full name."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether the service is there."""
+        return bool(self._client.service_is_ready())
+
+    def why_nobody(self) -> str:
+        """What the graph shows in place of the service, behind a colon."""
+        return without_service(self._node, self.name, interface_name(self._type))
+
+    def call(self, request: Any) -> Call:
+        """Begin a call, which wakes who has called when it is done."""
+        future: Any = self._client.call_async(request)
+        wake = waker()
+        future.add_done_callback(lambda _: wake())
+        return future  # type: ignore[no-any-return]
+
+    def close(self) -> None:
+        """Destroy the client."""
+        self._node.destroy_client(self._client)
