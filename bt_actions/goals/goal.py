@@ -125,7 +125,7 @@ class Goal(Facts):
     @property
     def outstanding(self) -> bool:
         """Whether a server that has it must be rid of it before it gets another goal."""
-        unknown = self.sent and self.end is End.UNKNOWN and not self.claims_resources
+        unknown = not self.claims_resources and self.end is End.UNKNOWN and self.sent
         return unknown and (self.accepted or not self.drain_gave_up)
 
     def blocks(self, other: Goal, *, same_server: bool) -> bool:

@@ -46,17 +46,21 @@ class Admission:
             return False
         if self._may_overtake(handle):
             return False
-        self._cancel_what_is_back(handle)
+        left = self._left_near(handle)
+        if self._cancel_what_is_back(handle, left):
+            left = self._left_near(handle)
         endpoints = self._domain.open_to((endpoint.name, endpoint.action_type))
         in_flight = sum(each.goal.in_flight for one in endpoints for each in one.goals.values())
-        return not self._conflicts(handle) and in_flight < IN_FLIGHT
+        return in_flight < IN_FLIGHT and not any(
+            _conflicts_with(each, handle) or _may_come_back_for(each, handle, now) for each in left
+        )
 
     def why_not(self, handle: GoalHandle) -> str:
         """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
         endpoint = handle.endpoint
         if handle.goal.outcome is Outcome.SERVER_BUSY:
             return self._in_use(handle)
-        if any(_conflicts_with(each, handle) for each in self._domain.open):
+        if any(_conflicts_with(each, handle) for each in self._left_near(handle)):
             return ": what it would use still has a goal that was given up, and would run both"
         if self._may_overtake(handle):
             return ": it has not answered another goal's request, and might run that one last"
@@ -81,17 +85,28 @@ class Admission:
         at = holders.index(handle)
         rivals = holders[:at] if handle.goal.busy is Busy.REPLACE else []
         rivals += [other for other in holders[at + 1 :] if other.goal.busy is Busy.REPLACE]
-        return any(
-            other.goal.request_pending and _same_server(other.endpoint, handle.endpoint)
-            for other in rivals
-        )
+        return any(other.goal.request_pending and _same_server(other, handle) for other in rivals)
 
-    def _cancel_what_is_back(self, handle: GoalHandle) -> None:
+    def _left_near(self, handle: GoalHandle) -> list[GoalHandle]:
+        """Return the goals of this process that were lost, or given up and are not accounted for.
+
+        Those that share a server, or resources, with this one.
+        """
+        return [
+            each
+            for endpoint in self._domain.open
+            for each in endpoint.goals.values()
+            if (each.goal.lost or each.goal.outstanding)
+            and (_same_server(each, handle) or each.goal.resources & handle.goal.resources)
+        ]
+
+    def _cancel_what_is_back(self, handle: GoalHandle, near: list[GoalHandle]) -> bool:
         """Observe each server at which goals were lost that this one might run beside.
 
-        Should it be back, they are canceled. Opens an endpoint where this node has none.
+        Should it be back, they are canceled. Opens an endpoint where this node has none. Returns
+        whether there was anything to observe.
         """
-        to_see = dict.fromkeys(each for each in self._domain.open if _has_lost(each, handle))
+        to_see = dict.fromkeys(each.endpoint for each in near if each.goal.lost)
         left = {(each.name, each.action_type): None for each in to_see}
         if handle.goal.busy in (Busy.WAIT, Busy.FAIL):
             for (name, action_type), lost in list(self._domain.lost.items()):
@@ -106,48 +121,30 @@ class Admission:
         now = self._host.steady()
         for endpoint in to_see:  # all of them first: one may see what another has lost
             endpoint.observe_and_tell(now)
-
-    def _conflicts(self, handle: GoalHandle) -> bool:
-        """Whether a goal that any node of this process gave up must be accounted for first.
-
-        One that was lost holds nothing any more; should its server be back, it is canceled first.
-        """
-        now = self._host.steady()
-        return any(
-            _conflicts_with(each, handle) or _may_come_back_for(each, handle, now)
-            for each in self._domain.open
-        )
+        return bool(to_see)
 
 
-def _same_server(one: Endpoint, other: Endpoint) -> bool:
-    """Whether both, which may belong to two nodes of a domain, mean the same action."""
-    return one.name == other.name and one.action_type is other.action_type
-
-
-def _near(endpoint: Endpoint, handle: GoalHandle) -> list[GoalHandle]:
-    """Return the goals here that this one would share a server, or resources, with."""
-    same, wanted = _same_server(endpoint, handle.endpoint), handle.goal.resources
-    return [each for each in endpoint.goals.values() if same or each.goal.resources & wanted]
-
-
-def _has_lost(endpoint: Endpoint, handle: GoalHandle) -> bool:
-    """Whether goals were lost here that this one might run beside."""
-    return any(other.goal.lost for other in _near(endpoint, handle))
-
-
-def _conflicts_with(endpoint: Endpoint, handle: GoalHandle) -> bool:
-    """Whether a goal that was given up here may still run where this one wants to."""
-    same = _same_server(endpoint, handle.endpoint)
-    return any(
-        other.goal.blocks(handle.goal, same_server=same) for other in _near(endpoint, handle)
+def _same_server(one: GoalHandle, other: GoalHandle) -> bool:
+    """Whether both, which may belong to two nodes of a domain, are of the same action."""
+    return (
+        one.endpoint.name == other.endpoint.name
+        and one.endpoint.action_type is other.endpoint.action_type
     )
 
 
-def _may_come_back_for(endpoint: Endpoint, handle: GoalHandle, now: float) -> bool:
-    """Whether a goal was lost here whose server may only be shown later than that of this one.
+def _conflicts_with(given_up: GoalHandle, handle: GoalHandle) -> bool:
+    """Whether it may still run where this one wants to.
+
+    One that was lost holds nothing any more; should its server be back, it is canceled first.
+    """
+    return given_up.goal.blocks(handle.goal, same_server=_same_server(given_up, handle))
+
+
+def _may_come_back_for(lost: GoalHandle, handle: GoalHandle, now: float) -> bool:
+    """Whether it was lost, and its server may only be shown later than that of this one.
 
     It shares a resource with this one, and is canceled first where its server is seen in time.
     """
-    if handle.goal.busy not in (Busy.WAIT, Busy.FAIL) or _same_server(endpoint, handle.endpoint):
+    if not lost.goal.lost or handle.goal.busy not in (Busy.WAIT, Busy.FAIL):
         return False
-    return _has_lost(endpoint, handle) and now - handle.endpoint.in_sight_since < BESIDE
+    return not _same_server(lost, handle) and now - handle.endpoint.in_sight_since < BESIDE

@@ -23,7 +23,7 @@ from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import MAY_STILL_BE_ACCEPTED, Command, Event, State
 from bt_actions.servers import replies
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic import admission, handover
+from bt_actions.traffic import handover
 from bt_actions.traffic.admission import Admission
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.ended import EndedGoals
@@ -206,16 +206,17 @@ def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
 
 @mutation
 def looks_only_at_the_goals_of_its_own_node(patch: Patch) -> None:
-    patch.setattr(
-        Admission,
-        "_conflicts",
-        lambda self, handle: admission._conflicts_with(handle.endpoint, handle),
-    )
+    real = Admission._left_near
+
+    def of_its_own(self: Admission, handle: GoalHandle) -> list[GoalHandle]:
+        return [each for each in real(self, handle) if each.endpoint is handle.endpoint]
+
+    patch.setattr(Admission, "_left_near", of_its_own)
 
 
 @mutation
 def knows_of_nothing_in_the_way(patch: Patch) -> None:
-    patch.setattr(Admission, "_conflicts", lambda self, handle: False)
+    patch.setattr(Admission, "_left_near", lambda self, handle: [])
 
 
 @mutation
