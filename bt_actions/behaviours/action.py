@@ -14,7 +14,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import backend_in
-from bt_actions.behaviours.progress import DEADLINES, Progress
+from bt_actions.behaviours.progress import Progress
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import register, resolve, variables_in
 from bt_actions.goals.attempts import AttemptRecord, Attempts
@@ -147,7 +147,8 @@ class ActionBehaviour(Behaviour):
             left = self._attempts.pause_left(now, look_only=True)
             return Progress("BACKOFF", self.attempt, attempts, None, left, "backoff")
         goal, deadline = handle.goal, backend.traffic.deadline(handle, now)
-        what, due = ("", None) if deadline is None else (DEADLINES[deadline[0]], deadline[1])
+        event, due = deadline or (None, None)
+        what = event.name.removesuffix("_DUE").lower() if event is not None else ""
         return Progress(goal.state.shown, self.attempt, attempts, goal.feedback, due, what)
 
     @property

@@ -47,13 +47,11 @@ class Parallel(PyTreesParallel):
         needed = len(self.children) if self.at_least is None else self.at_least
         done = [child for child in self.children if child.status is Status.SUCCESS]
         failed = [child for child in self.children if child.status is Status.FAILURE]
-        open_ones = len(self.children) - len(done) - len(failed)
         self.feedback_message = f"{len(done)} of {needed} succeeded, {len(failed)} failed"
+        status, those = Status.RUNNING, self.children
         if len(done) >= needed:
-            self.current_child = done[-1] if done else None
-            return Status.SUCCESS
-        if len(done) + open_ones < needed:
-            self.current_child = failed[-1]
-            return Status.FAILURE
-        self.current_child = self.children[-1]
-        return Status.RUNNING
+            status, those = Status.SUCCESS, done
+        elif len(self.children) - len(failed) < needed:
+            status, those = Status.FAILURE, failed
+        self.current_child = those[-1] if those else None
+        return status

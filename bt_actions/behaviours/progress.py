@@ -5,17 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from bt_actions.goals.terms import Event
-
-DEADLINES = {
-    Event.QUEUE_DUE: "queue",
-    Event.SERVER_DUE: "server",
-    Event.ACCEPT_DUE: "accept",
-    Event.RESULT_DUE: "result",
-    Event.FEEDBACK_DUE: "feedback",
-    Event.CANCEL_DUE: "cancel",
-}
-
 
 @dataclass(frozen=True, slots=True)
 class Progress:

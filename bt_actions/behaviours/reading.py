@@ -81,11 +81,11 @@ class Reading:
         for what, text in (("expect", expect), ("retry.when", when), *saved):
             tree = Expression(text, roots=self._names(None)).tree if isinstance(text, str) else None
             for node in ast.walk(tree) if tree is not None else ():
-                if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-                    known = node.attr in fields or hasattr(result_type, node.attr)  # a constant
-                    if node.value.id == "result" and not known:
-                        hint = did_you_mean(node.attr, fields)
-                        return f"{what}: result has no field {node.attr!r}{hint}"
+                match node:
+                    case ast.Attribute(value=ast.Name(id="result"), attr=name):
+                        if name not in fields and not hasattr(result_type, name):  # a constant
+                            hint = did_you_mean(name, fields)
+                            return f"{what}: result has no field {name!r}{hint}"
         return ""
 
     def read(self, result: Any) -> str:

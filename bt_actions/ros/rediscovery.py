@@ -179,52 +179,39 @@ class Rediscovery:
         return bool(self._missing)
 
     def _look(self) -> bool:
-        """Make a participant, and wait until clients in it are ready that ours are missing."""
+        """Look in a new participant; move all there for whom what they miss is ready."""
         second = SecondParticipant(*self._where)
         self._participants.append(second)
         tried: dict[Seeker, ActionTransport] = {}
         ready_since: dict[Seeker, float] = {}
         until = time.monotonic() + LASTS
         try:
-            while time.monotonic() < until and self._goes_on(second, tried, ready_since):
+            while (now := time.monotonic()) < until:
+                with host.lock:
+                    if _closing or not self._still_missing():
+                        break
+                    for seeker, action in self._missing.items():
+                        if seeker not in tried and servers(second.node, action):
+                            tried[seeker] = seeker.try_in(second)
+                        if seeker in tried and tried[seeker].ready():
+                            ready_since.setdefault(seeker, now)
+                    ready = [
+                        seeker
+                        for seeker in self._missing
+                        if seeker in ready_since and seeker.try_and_compare(tried[seeker])
+                    ]
+                    # Together: what one of them has lost may conflict with another's next goal.
+                    if any(now - ready_since[seeker] >= AHEAD for seeker in ready):
+                        for seeker in ready:
+                            transport = tried.pop(seeker)
+                            second.users.add(transport)
+                            seeker.move_to(transport)
                 time.sleep(GLANCE)
         finally:
             with host.lock:
                 for transport in tried.values():  # which nobody took
                     transport.close()
         return bool(second.users)
-
-    def _goes_on(
-        self,
-        second: SecondParticipant,
-        tried: dict[Seeker, ActionTransport],
-        ready_since: dict[Seeker, float],
-    ) -> bool:
-        """Try where a server is shown; move all for whom that is ready, together.
-
-        Together, because what one of them has lost may conflict with another's next goal. Whether
-        anything is still missed.
-        """
-        with host.lock:
-            if _closing or not self._still_missing():
-                return False
-            now = time.monotonic()
-            for seeker, action in self._missing.items():
-                if seeker not in tried and servers(second.node, action):
-                    tried[seeker] = seeker.try_in(second)
-                if seeker in tried and tried[seeker].ready():
-                    ready_since.setdefault(seeker, now)
-            ready = [
-                seeker
-                for seeker in self._missing
-                if seeker in ready_since and seeker.try_and_compare(tried[seeker])
-            ]
-            if any(now - ready_since[seeker] >= AHEAD for seeker in ready):
-                for seeker in ready:
-                    transport = tried.pop(seeker)
-                    second.users.add(transport)
-                    seeker.move_to(transport)
-            return True
 
 
 @atexit.register

@@ -52,30 +52,22 @@ def heard(message_type: type, depth: int) -> Generator[Any]:
 def answers(service_type: Any, namespace: str) -> dict[str, Any]:
     """Ask every service of a type below a namespace; by its name, None where it does not answer."""
     below = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
+    clients: dict[str, Any] = {}
     futures: dict[str, Any] = {}
+    answered: dict[str, Any] = {}
     begun = time.monotonic()
     with _asking() as (node, spin):
-
-        def look() -> None:
-            for service, types in node.get_service_names_and_types():
-                fits = interface_name(service_type) in types and service.startswith(below)
-                if fits and service not in futures:
-                    futures[service] = node.create_client(service_type, service), None
-
-        def ask() -> bool:
-            """Whether all have answered."""
-            for service, (client, future) in futures.items():
-                if future is None and client.service_is_ready():
-                    futures[service] = client, client.call_async(service_type.Request())
-            return all(future is not None and future.done() for _, future in futures.values())
-
-        while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if futures else 0.0):
-            if now < DISCOVERS or not futures:
-                look()
-            if ask() and futures and now >= DISCOVERS:
+        while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if clients else 0.0):
+            if now < DISCOVERS or not clients:
+                for name, types in node.get_service_names_and_types():
+                    fits = interface_name(service_type) in types and name.startswith(below)
+                    if fits and name not in clients:
+                        clients[name] = node.create_client(service_type, name)
+            for name, client in clients.items():
+                if name not in futures and client.service_is_ready():
+                    futures[name] = client.call_async(service_type.Request())
+            answered = {name: each.result() for name, each in futures.items() if each.done()}
+            if clients and len(answered) == len(clients) and now >= DISCOVERS:
                 break
             spin()
-    return {
-        service: future.result() if future is not None and future.done() else None
-        for service, (_, future) in sorted(futures.items())
-    }
+    return {name: answered.get(name) for name in sorted(clients)}

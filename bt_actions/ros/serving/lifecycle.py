@@ -36,26 +36,13 @@ class Lifecycle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
         self._events = endpoints.publisher(TransitionEvent, "~/transition_event", 10)
         endpoints.service(ChangeState, "~/change_state", self._on_change)
-        machine, transitions = self._machine, (GetAvailableTransitions, "available_transitions")
-        for name, (kind, field), read in (
-            ("get_state", (GetState, "current_state"), lambda: _state(*machine.current_state)),
-            (
-                "get_available_states",
-                (GetAvailableStates, "available_states"),
-                lambda: [_state(*each) for each in machine.available_states],
-            ),
-            (
-                "get_available_transitions",
-                transitions,
-                lambda: [_described(*each) for each in machine.available_transitions],
-            ),
-            (
-                "get_transition_graph",
-                transitions,
-                lambda: [_described(*each) for each in machine.transition_graph],
-            ),
+        for name, kind, field in (
+            ("get_state", GetState, "current_state"),
+            ("get_available_states", GetAvailableStates, "available_states"),
+            ("get_available_transitions", GetAvailableTransitions, "available_transitions"),
+            ("get_transition_graph", GetAvailableTransitions, "transition_graph"),
         ):
-            endpoints.service(kind, f"~/{name}", functools.partial(_answer, field, read))
+            endpoints.service(kind, f"~/{name}", functools.partial(self._tell, field))
 
     @property
     def state(self) -> str:
@@ -107,6 +94,23 @@ class Lifecycle:
             )
         )
 
+    def _tell(self, what: str, _request: Any, response: Any) -> Any:
+        found = getattr(self._machine, what)
+        if what == "current_state":
+            response.current_state = _state(*found)
+        elif what == "available_states":
+            response.available_states = [_state(*each) for each in found]
+        else:
+            response.available_transitions = [
+                TransitionDescription(
+                    transition=Transition(id=number, label=label),
+                    start_state=_state(*ends[:2]),
+                    goal_state=_state(*ends[2:]),
+                )
+                for number, label, *ends in found
+            ]
+        return response
+
     async def _on_change(
         self, request: ChangeState.Request, response: ChangeState.Response
     ) -> ChangeState.Response:
@@ -118,20 +122,5 @@ class Lifecycle:
         return response
 
 
-def _answer(field: str, read: Callable[[], Any], _request: Any, response: Any) -> Any:
-    setattr(response, field, read())
-    return response
-
-
 def _state(number: int, label: str) -> State:
     return State(id=number, label=label)
-
-
-def _described(
-    number: int, label: str, start: int, start_label: str, goal: int, goal_label: str
-) -> TransitionDescription:
-    return TransitionDescription(
-        transition=Transition(id=number, label=label),
-        start_state=_state(start, start_label),
-        goal_state=_state(goal, goal_label),
-    )
