@@ -55,8 +55,8 @@ Each row has a yardstick that is measured in the same run, in turns with ours, i
 own. The value of a row is the median of {rounds} rounds, each of which compares what was measured
 one after the other; in brackets are its lowest and its highest. Compare values, not times: these
 belong to the machine ({machine}; load {load} at the beginning).
-Every goal of rows 1 to 5, 7, 9 and 10 went to a server in another process, whose journal showed
-that each ran once and in its order.
+Every goal of rows 1 to 5, 7 (but with `--sim`), 9 and 10 went to a server in another process, whose
+journal showed that each ran once and in its order.
 
 {table}
 

@@ -76,13 +76,14 @@ class Measured:
         """Return it as a row of the table."""
         row, values = self.row, [*map(self.row.value, self.rounds)]
         sign, unit = ("+ " if row.is_difference else ""), (" ×" if row.is_ratio else f" {row.unit}")
+        value = f"{sign if self.value >= 0.0 else ''}{self.value:.3g}"
         return [
             row.number,
             row.work,
             row.yardstick,
             f"{self._median(row.ours)} {row.unit}",
             f"{self._median(row.theirs)} {row.unit}" if row.theirs else "",
-            f"{sign}{self.value:.3g}{unit} ({min(values):.3g} to {max(values):.3g})",
+            f"{value}{unit} ({min(values):.3g} to {max(values):.3g})",
             f"≤ {sign}{row.at_most:g}{unit}",
             "holds" if self.holds() else "**missed**",
         ]

@@ -16,6 +16,7 @@ from bt_actions.goals.terms import NEVER, Event, State
 from bt_actions.servers.presence import Server, ServerWatch
 from bt_actions.servers.replies import Replies, Told
 from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic.scheduler import Scheduled
 from bt_actions.traffic.transport import ActionTransport, Listener, Participant
 
 FEEDBACK_KEPT = 100
@@ -32,7 +33,7 @@ class NodeTraffic(Protocol):
         """Close an endpoint that has no user and no open goal."""
 
 
-class Endpoint(Listener, Protocol):
+class Endpoint(Listener, Scheduled, Protocol):
     """One action as one node sees it (ActionEndpoint), as its parts and its neighbors know it."""
 
     participant: Participant

@@ -63,6 +63,7 @@ class Traffic:
                     f"{action_type.__name__}"
                 )
             endpoint.users += 1
+            endpoint.watcher.look_early(self.host.steady())
             return endpoint
 
     def _open_to(self, action_type: Any, name: str) -> ActionEndpoint:

@@ -15,7 +15,7 @@ from bt_actions.traffic.begun import wake
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
-from bt_actions.traffic.route import Route
+from bt_actions.traffic.route import TOO_NEW, Route
 
 LOOK_WHILE_WAITING = 0.05
 LOOK_WHILE_RUNNING = 0.2
@@ -50,6 +50,8 @@ class Watcher:
     def run_due(self, now: float) -> float:
         """Look, send and apply deadlines as far as due; return the seconds until there is more."""
         endpoint = self._endpoint
+        if not endpoint.goals:
+            return self.look_early(now)
         if now >= self._look_at or self._counts_others():
             self.observe_and_tell(now)
             unclear = endpoint.watch.state(now) is Server.UNCLEAR
@@ -88,6 +90,23 @@ class Watcher:
         if is_new and self._endpoint.participant.alive() and not self._counts_others():
             return Server.READY
         return self.observe_and_tell(now)
+
+    def look_early(self, now: float) -> float:
+        """Look for a server that no goal wants yet; return the seconds until the next look.
+
+        A first goal is held from the first sight of its server on. So the hold is one for all
+        servers of a tree, and runs while the rest of it is set up.
+        """
+        endpoint, scheduler = self._endpoint, self._host.scheduler
+        is_new = now - endpoint.transport.seen_since < TOO_NEW and not endpoint.transport.closed
+        if is_new and (self._counts_others() or self._counted):
+            self.observe_and_tell(now)
+        if is_new and self._looked_like is Server.ABSENT:
+            scheduler.add(endpoint)
+            scheduler.wake_by(now + LOOK_WHILE_WAITING)
+        elif not endpoint.goals:
+            scheduler.remove(endpoint)
+        return LOOK_WHILE_WAITING
 
     def _counts_others(self) -> bool:
         """Whether a server has come or gone since the last look, or our node was destroyed."""

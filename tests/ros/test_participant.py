@@ -1,4 +1,4 @@
-"""How a participant of our own is taken away."""
+"""What a participant of our own looks for, and how it is taken away."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from rclpy.action import ActionServer
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
+from test_msgs.action import Fibonacci
 
 from bt_actions import TreeRunner
 from bt_actions.recovery.sweep import cleanup
+from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.parameters import parameters_in
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.ros.workarounds import participant
@@ -51,6 +54,15 @@ def test_a_node_that_is_gone_need_not_fall_silent(domain: int) -> None:
     participant.close(node, context)
     assert not context.ok()
     assert not participant.fall_silent(node)
+
+
+def test_a_new_one_looks_for_servers_before_a_goal_wants_them(
+    ours: Node, node: Any, name: str
+) -> None:
+    endpoint = traffic_of(ours).endpoint(Fibonacci, name)
+    server = ActionServer(node, Fibonacci, name, lambda handle: Fibonacci.Result())
+    until(lambda: endpoint.watch.gids)
+    server.destroy()
 
 
 def of_a_runner(_: int) -> None:
