@@ -26,6 +26,8 @@ class Domain:
         self.effects = Effects()
         self.open: dict[Endpoint, None] = {}
         """The endpoints with goals, of all nodes, in the order in which they came."""
+        self.unsent: dict[GoalHandle, None] = {}
+        """Goals that are to be sent, and some that were since (EffectRunner drops them)."""
         self.ever_lost_sight = False
         """A server went out of sight once: what else its process serves may have, too."""
         self.known: set[Action] = set()

@@ -109,5 +109,7 @@ class EffectRunner:
 
     def _wake_waiting(self, _: GoalHandle) -> None:
         """Wake those of all nodes whose goals wait: there may be room, or no conflict any more."""
-        handles = (handle for each in self._domain.open for handle in each.goals.values())
-        wake(handle for handle in handles if not handle.goal.sent)
+        unsent = self._domain.unsent
+        for handle in [each for each in unsent if each.goal.sent or each.goal.state is State.DONE]:
+            del unsent[handle]
+        wake(unsent)

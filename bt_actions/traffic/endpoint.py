@@ -280,6 +280,8 @@ class ActionEndpoint:
             handle.replies.taken_over()
         self.goals[handle.goal.id] = handle
         self.domain.open[self] = None
+        if not handle.goal.sent:
+            self.domain.unsent[handle] = None
         self._host.scheduler.add(self)
 
     def retire(self, handle: GoalHandle) -> None:
