@@ -11,8 +11,7 @@ from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.decorators import Subtree
-from bt_actions.behaviours.loops import ForEach, Repeat, RetryChild
+from bt_actions.behaviours.decorators import ForEach, Repeat, RetryChild, Subtree
 from bt_actions.behaviours.parallel import Parallel
 
 RARELY = 20.0

@@ -15,9 +15,8 @@ from py_trees.common import OneShotPolicy
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import FailureIsSuccess, Inverter, OneShot, SuccessIsFailure
 
-from bt_actions.behaviours.decorators import Deadline, Subtree, While
+from bt_actions.behaviours.decorators import Deadline, ForEach, Repeat, RetryChild, Subtree, While
 from bt_actions.behaviours.leaves import WaitUntil
-from bt_actions.behaviours.loops import ForEach, Repeat, RetryChild
 from bt_actions.behaviours.parallel import Parallel
 from bt_actions.behaviours.topics import TopicValue, patient
 from bt_actions.document.building.context import Context, plain_name, table_of, written_text
