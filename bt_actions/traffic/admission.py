@@ -49,8 +49,10 @@ class Admission:
         left = self._left_near(handle)
         if self._cancel_what_is_back(handle, left):
             left = self._left_near(handle)
-        endpoints = self._domain.open_to((endpoint.name, endpoint.action_type))
-        in_flight = sum(each.goal.in_flight for one in endpoints for each in one.goals.values())
+        in_flight = sum(
+            each.goal.in_flight and each.endpoint.action == endpoint.action
+            for each in self._domain.handles()
+        )
         return in_flight < IN_FLIGHT and not any(
             _conflicts_with(each, handle) or _may_come_back_for(each, handle, now) for each in left
         )
@@ -69,7 +71,7 @@ class Admission:
     def _in_use(self, handle: GoalHandle) -> str:
         """Say who has what the goal waited for, where that is not a goal that just runs."""
         for other in self._domain.resources.holders(handle.goal.resources):
-            if other.paused_at is not None and not other.goal.sent:
+            if other.paused:
                 return f": it is the turn of {other.name}, whose tree is paused"
             if other.goal.outcome is not None and not other.accounted_for:
                 told = other.goal.cancel_said
@@ -85,19 +87,22 @@ class Admission:
         at = holders.index(handle)
         rivals = holders[:at] if handle.goal.busy is Busy.REPLACE else []
         rivals += [other for other in holders[at + 1 :] if other.goal.busy is Busy.REPLACE]
-        return any(other.goal.request_pending and _same_server(other, handle) for other in rivals)
+        action = handle.endpoint.action
+        return any(
+            other.goal.request_pending and other.endpoint.action == action for other in rivals
+        )
 
     def _left_near(self, handle: GoalHandle) -> list[GoalHandle]:
         """Return the goals of this process that were lost, or given up and are not accounted for.
 
         Those that share a server, or resources, with this one.
         """
+        action = handle.endpoint.action
         return [
             each
-            for endpoint in self._domain.open
-            for each in endpoint.goals.values()
+            for each in self._domain.handles()
             if (each.goal.lost or each.goal.outstanding)
-            and (_same_server(each, handle) or each.goal.resources & handle.goal.resources)
+            and (each.endpoint.action == action or each.goal.resources & handle.goal.resources)
         ]
 
     def _cancel_what_is_back(self, handle: GoalHandle, near: list[GoalHandle]) -> bool:
@@ -107,7 +112,7 @@ class Admission:
         whether there was anything to observe.
         """
         to_see = dict.fromkeys(each.endpoint for each in near if each.goal.lost)
-        left = {(each.name, each.action_type): None for each in to_see}
+        left = {each.action: None for each in to_see}
         if handle.goal.busy in (Busy.WAIT, Busy.FAIL):
             for (name, action_type), lost in list(self._domain.lost.items()):
                 if any(each.goal.resources & handle.goal.resources for each in lost):
@@ -116,7 +121,7 @@ class Admission:
                         self._open_to(action_type, name)
         for name, action_type in left:
             ours = self._endpoints.get(name)
-            if ours is not None and ours.action_type is action_type:
+            if ours is not None and ours.action == (name, action_type):
                 to_see[ours] = None
         now = self._host.steady()
         for endpoint in to_see:  # all of them first: one may see what another has lost
@@ -124,20 +129,14 @@ class Admission:
         return bool(to_see)
 
 
-def _same_server(one: GoalHandle, other: GoalHandle) -> bool:
-    """Whether both, which may belong to two nodes of a domain, are of the same action."""
-    return (
-        one.endpoint.name == other.endpoint.name
-        and one.endpoint.action_type is other.endpoint.action_type
-    )
-
-
 def _conflicts_with(given_up: GoalHandle, handle: GoalHandle) -> bool:
     """Whether it may still run where this one wants to.
 
     One that was lost holds nothing any more; should its server be back, it is canceled first.
     """
-    return given_up.goal.blocks(handle.goal, same_server=_same_server(given_up, handle))
+    return given_up.goal.blocks(
+        handle.goal, same_server=given_up.endpoint.action == handle.endpoint.action
+    )
 
 
 def _may_come_back_for(lost: GoalHandle, handle: GoalHandle, now: float) -> bool:
@@ -147,4 +146,7 @@ def _may_come_back_for(lost: GoalHandle, handle: GoalHandle, now: float) -> bool
     """
     if not lost.goal.lost or handle.goal.busy not in (Busy.WAIT, Busy.FAIL):
         return False
-    return not _same_server(lost, handle) and now - handle.endpoint.in_sight_since < BESIDE
+    return (
+        lost.endpoint.action != handle.endpoint.action
+        and now - handle.endpoint.in_sight_since < BESIDE
+    )

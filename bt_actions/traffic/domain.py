@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterator
 
 from bt_actions.goals.resources import Resources
 from bt_actions.traffic.cancel_queue import Cancels
 from bt_actions.traffic.effects import Effects
-from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.handle import Action, Endpoint, GoalHandle
 
 LOST_KEPT = 100
 """Goals of one action remembered in case their server, or their request, turns up: the newest."""
-Action = tuple[str, Any]
-"""Name and type."""
 
 
 class Domain:
@@ -37,9 +34,10 @@ class Domain:
         self.cancels: dict[Action, Cancels] = defaultdict(Cancels)
         """The cancel requests of this process."""
 
-    def open_to(self, action: Action) -> list[Endpoint]:
-        """Return the endpoints with goals to this action."""
-        return [each for each in self.open if (each.name, each.action_type) == action]
+    def handles(self) -> Iterator[GoalHandle]:
+        """Yield the goals of all open endpoints."""
+        for endpoint in self.open:
+            yield from endpoint.goals.values()
 
     def keep_lost(
         self, action: Action, handle: GoalHandle, forget: Callable[[bytes], None]

@@ -58,11 +58,12 @@ class ActionEndpoint:
         self.participant, self.domain, self._traffic = participant, domain, traffic
         self.action_type = action_type
         self.name = name
+        self.action = name, action_type
         self.users = 0
         self._forks = host.forks
         self.goals: dict[bytes, GoalHandle] = {}
         self.watch = ServerWatch()
-        self.cancels = domain.cancels[name, action_type]
+        self.cancels = domain.cancels[self.action]
         self.orphaned = False
         self.in_sight_since = self.heard_at = host.steady()
         self._probes = itertools.count(1)
@@ -184,10 +185,7 @@ class ActionEndpoint:
         with self._host.lock:
             if self.is_parents:
                 return
-            now = self.participant.now()
-            if event is Event.GRANTED and handle.paused_at is not None:
-                handle.paused_at = now.steady  # its next deadline begins in the pause
-            self._apply(handle, event, now, detail, message)
+            self._apply(handle, event, self.participant.now(), detail, message)
 
     def apply_deadlines(self, handle: GoalHandle) -> None:
         """Let the goal's deadlines take effect, unless its tree is paused before sending.
@@ -202,10 +200,9 @@ class ActionEndpoint:
                 goal, now = handle.goal, self.participant.now()
                 if self.is_parents:
                     return
-                if handle.paused_at is not None and not goal.sent:
-                    handle.held_back_since = None
-                    return
                 self._give_back_time(handle, now.steady)
+                if handle.paused:
+                    return
                 if goal.due_in(now) == 0.0:
                     self.deliver_arrived()
                     now = self.participant.now()
@@ -218,10 +215,11 @@ class ActionEndpoint:
 
     def _give_back_time(self, handle: GoalHandle, now: float) -> None:
         """See to it that no deadline counts the time in which a goal is not sent on our account."""
-        waits = handle.goal.state is State.WAITING_FOR_SERVER
-        if waits and handle.held_back_since is not None:
+        if handle.held_back_since is not None:
             handle.goal.postpone(now - handle.held_back_since)
-        handle.held_back_since = now if waits and self.holds_back(now) else None
+        waits = handle.goal.state is State.WAITING_FOR_SERVER
+        held_back = handle.paused or (waits and self.holds_back(now))
+        handle.held_back_since = now if held_back else None
 
     def _suspend_after_stall(self, goal: Goal, now: Now) -> None:
         """Suspend deadlines that have passed while a stall may be why nothing has come in."""

@@ -22,6 +22,9 @@ from bt_actions.traffic.transport import ActionTransport, Listener, Participant
 FEEDBACK_KEPT = 100
 """Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
 
+Action = tuple[str, Any]
+"""Name and type."""
+
 
 class NodeTraffic(Protocol):
     """What an endpoint asks of its node (Traffic)."""
@@ -39,6 +42,8 @@ class Endpoint(Listener, Scheduled, Protocol):
     participant: Participant
     name: str
     action_type: Any
+    action: Action
+    """The last two together."""
     users: int
     goals: dict[bytes, GoalHandle]
     watch: ServerWatch
@@ -124,9 +129,11 @@ class GoalHandle:
     told_unknown: bool = False
     """The log says that it is not accounted for; and later, on whatever node, that it is."""
     told_gone: bool = False
+    paused: bool = False
+    """Its tree is, and it was not sent."""
     held_back_since: float | None = None
-    """Since when (steady clock) it is not sent though a server is in sight (Route.holds_back)."""
-    paused_at: float | None = None
+    """Since when (steady clock) its deadlines stand still, as it is paused, or not sent though a
+    server is in sight (Route.holds_back)."""
     begun_at: float = NEVER
     """Seconds, steady clock."""
     not_gone_before: float = NEVER

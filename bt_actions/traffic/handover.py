@@ -18,14 +18,13 @@ from bt_actions.traffic.route import TOO_NEW
 
 def take_over(endpoint: Endpoint, domain: Domain, now: float) -> None:
     """Take lost goals of other nodes whose server is in sight here: it is to cancel them first."""
-    for other in domain.open_to((endpoint.name, endpoint.action_type)):
-        if other is endpoint:
+    for handle in list(domain.handles()):
+        other = handle.endpoint
+        if not handle.goal.lost or other is endpoint or other.action != endpoint.action:
             continue
-        for handle in list(other.goals.values()):
-            servers = handle.replies.sent_to
-            if handle.goal.lost and _sees_more(endpoint, other, servers, now):
-                endpoint.take_in(handle)
-                other.retire(handle)
+        if _sees_more(endpoint, other, handle.replies.sent_to, now):
+            endpoint.take_in(handle)
+            other.retire(handle)
 
 
 def _sees_more(endpoint: Endpoint, other: Endpoint, servers: frozenset[bytes], now: float) -> bool:
@@ -43,7 +42,7 @@ def _sees_more(endpoint: Endpoint, other: Endpoint, servers: frozenset[bytes], n
 
 def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
     """Take over what was lost, or left, at this action before, to cancel it first."""
-    for handle in domain.lost.pop((endpoint.name, endpoint.action_type), []):
+    for handle in domain.lost.pop(endpoint.action, []):
         saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at
         if handle.endpoint.participant is not endpoint.participant and not saw_it:
             first = handle.not_gone_before == NEVER  # a later node need only have discovered
@@ -60,7 +59,7 @@ def park(endpoint: Endpoint, host: Host, domain: Domain, *, all_of_them: bool = 
             endpoint.tell(handle, Event.PARKED)
         if goal.lost:
             goal.deadlines.clear()  # nobody looks out for its server from now on
-            domain.keep_lost((endpoint.name, endpoint.action_type), handle, host.record.strike)
+            domain.keep_lost(endpoint.action, handle, host.record.strike)
             endpoint.retire(handle)
 
 

@@ -97,8 +97,7 @@ class Route:
             return False
         if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.goals.values()):
             return False  # nobody here wants it; it is remembered, as what is parked is
-        action = endpoint.name, endpoint.action_type
-        known = self._domain.ever_lost_sight or action in self._domain.known
+        known = self._domain.ever_lost_sight or endpoint.action in self._domain.known
         running = (State.SENDING, State.EXECUTING, State.REPLACED)
         still = all(handle.goal.state not in running for handle in endpoint.goals.values())
         return (known and self._is_absent(now) and still) or self._is_unresponsive(now)

@@ -188,16 +188,15 @@ class Traffic:
         """Stop the deadlines of goals that were not sent yet."""
         with self.host.lock:
             for handle in handles:
-                if not handle.goal.sent and handle.paused_at is None:
-                    handle.paused_at = self.host.steady()
+                handle.paused = not handle.goal.sent
+                handle.endpoint.apply_deadlines(handle)
 
     def resume(self, handles: Iterable[GoalHandle]) -> None:
         """Let the deadlines run on, with what remained of them."""
         with self.host.lock:
             for handle in handles:
-                if handle.paused_at is not None:
-                    handle.goal.postpone(self.host.steady() - handle.paused_at)
-                    handle.paused_at = None
+                handle.paused = False
+                handle.endpoint.apply_deadlines(handle)
 
     def drain(
         self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False

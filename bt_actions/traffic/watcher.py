@@ -45,7 +45,6 @@ class Watcher:
         self._looked_like = Server.ABSENT
         self._was_away = False  # seen between two looks
         self._held_back = (True, True)  # as a server has just come; by `Route.holds_back`
-        self._warned_crowd = False
 
     def run_due(self, now: float) -> float:
         """Look, send and apply deadlines as far as due; return the seconds until there is more."""
@@ -70,7 +69,7 @@ class Watcher:
         for handle in list(endpoint.goals.values()):
             endpoint.apply_deadlines(handle)
             due = handle.goal.due_in(endpoint.participant.now())
-            if due is not None and handle.paused_at is None:
+            if due is not None and not handle.paused:
                 wait = min(wait, due)
         handover.bound_the_lost(endpoint, self._host)
         return max(wait, 0.001)
@@ -165,22 +164,18 @@ class Watcher:
             endpoint.in_sight_since = now
         self._was_away = False
         held_back = (now - endpoint.in_sight_since < BESIDE, self._route.holds_back(now))
-        if any(was and not still for was, still in zip(self._held_back, held_back, strict=True)):
-            wake(endpoint.goals.values())  # what was held back for it may be sent
+        if (state, held_back) != (before, self._held_back):
+            wake(endpoint.goals.values())  # what waits for it, or was held back, may be sent
         self._held_back = held_back
         if state is not before:
-            wake(endpoint.goals.values())
             self._domain.ever_lost_sight |= state is Server.ABSENT
-            self._domain.known.add((endpoint.name, endpoint.action_type))
+            self._domain.known.add(endpoint.action)
+            if state is Server.AMBIGUOUS:
+                name = endpoint.name
+                self._host.log.warning(
+                    f"{name}: two action servers answer to this name; no more is sent"
+                )
         self._route.seek(now)
-        if state is Server.AMBIGUOUS and not self._warned_crowd:
-            self._warned_crowd = True
-            name = endpoint.name
-            self._host.log.warning(
-                f"{name}: two action servers answer to this name; no more is sent"
-            )
-        elif state is Server.READY:
-            self._warned_crowd = False
         return state
 
     def observe(self) -> None:

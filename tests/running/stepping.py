@@ -22,7 +22,7 @@ class Stepped:
         self.now = 0.0
         self.slept: list[float] = []
         self.told: list[Event] = []
-        self.backend = MagicMock(spec=Backend)
+        self.backend = MagicMock(spec=Backend, traffic=MagicMock())
         self.traffic = self.backend.traffic
         self.traffic.host.steady = lambda: self.now
         self.loop = TickLoop(
