@@ -155,7 +155,7 @@ class _Filler:
         if isinstance(value, cls):
             return value
         value = self._convenience(cls, value, path)
-        if not isinstance(value, Mapping):
+        if not isinstance(value, (dict, Mapping)):
             raise ValueError(f"the fields of a {short_name(cls)} are needed, not {show(value)}")
         known = describe(cls)
         message: Any = cls() if self._hole is None else None

@@ -278,19 +278,19 @@ class Checker:
         """The type of an expression; worked out once for all of its form and with such types."""
         variable = self.types_at(reader)
         key = (expression.form, *roots.items(), *map(variable, expression.variables))
-        if key not in self._inferred:
-            wrong: list[tuple[str, str, int, int]] = []
+        if (known := self._inferred.get(key, BAD)) is not BAD:
+            return known  # type: ignore[return-value]  # BAD is no type
+        wrong: list[tuple[str, str, int, int]] = []
 
-            def note(*what: Any) -> None:
-                wrong.append(what)
+        def note(*what: Any) -> None:
+            wrong.append(what)
 
-            kind = infer(expression, roots, variable, note, types=self.types)
-            for what in wrong:
-                report(*what)
-            if wrong:
-                return kind
+        kind = infer(expression, roots, variable, note, types=self.types)
+        for what in wrong:
+            report(*what)
+        if not wrong:
             self._inferred[key] = kind
-        return self._inferred[key]
+        return kind
 
     def _unknown(self, computed: Computed) -> None:
         """Report the variables that an expression reads and nobody declares or writes."""

@@ -40,6 +40,9 @@ class _Written(NamedTuple):
     failed: Set[str]
 
 
+_SILENT = _Written(_NOTHING, _NOTHING)
+
+
 def find_early_reads(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
     """Report the reads that no write can come before."""
     _Order(checker, doubts, root).visit(root, _NOTHING, _NOTHING)
@@ -74,9 +77,10 @@ class _Order:
         kind = node.kind.name if node.kind is not None else ""
         own = self._own(node)
         self._reads(node, own, around)
-        self._passed |= own
+        if own:
+            self._passed |= own
         if not node.children:
-            return _Written(own, own if kind == "subtree" else _NOTHING)
+            return _Written(own, own if kind == "subtree" else _NOTHING) if own else _SILENT
         if kind == "repeat":  # a read in its first round has nothing yet
             later |= self._below(node)
         elif kind in _LOOPS or node.values.get("memory") is False:
@@ -115,7 +119,7 @@ class _Order:
 
     def _own(self, node: TreeNode) -> frozenset[str]:
         writes = self._checker.writes.get(id(node))
-        return frozenset(write.name for write in writes) if writes else _NOTHING
+        return frozenset([write.name for write in writes]) if writes else _NOTHING
 
     def _below(self, node: TreeNode) -> frozenset[str]:
         return frozenset(name for inner in node.walk() for name in self._own(inner))
@@ -124,18 +128,18 @@ class _Order:
         checker = self._checker
         for read in checker.reads.get(id(node), ()):
             for at, name in enumerate(read.expression.variables):
-                if not self._may_be_written(name, own, around):
+                if name not in self._known and not self._may_be_written(name, own, around):
                     span = read.span(checker.source, *read.expression.variable_spans[at][1])
                     self._report(name, span, f"nothing has written ${name} when this is read")
         for read in self._shared.get(node.alias, ()):
             for name in read.expression.variables:
-                if not self._may_be_written(name, own, around):
+                if name not in self._known and not self._may_be_written(name, own, around):
                     text = f"nothing has written ${name} when {node.alias!r} reads it here"
                     self._report(name, span_of(node.key), text)
 
     def _may_be_written(self, name: str, own: frozenset[str], around: frozenset[str]) -> bool:
         doubts = self._doubts
-        if name in self._known or name not in self._checker.variables:
+        if name not in self._checker.variables:
             return True
         if name in around and (name not in own or self._writers[name] > 1):
             return True

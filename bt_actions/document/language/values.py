@@ -317,11 +317,8 @@ def computed_in(value: object) -> Iterator[Computed]:
         for part in value.parts:
             if isinstance(part, Computed):
                 yield part
-    elif isinstance(value, MappingType):
-        for item in value.values():
-            yield from computed_in(item)
-    elif isinstance(value, list):
-        for item in value:
+    elif isinstance(value, (dict, list)):
+        for item in value.values() if isinstance(value, dict) else value:
             yield from computed_in(item)
 
 

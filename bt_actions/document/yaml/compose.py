@@ -112,11 +112,9 @@ class _Composer:
         self._report(code, event, message)
         raise _GaveUp
 
-    def _count(self, event: Any) -> None:
-        self._size += 1
-        if self._size > MAX_NODES:
-            text = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
-            self._give_up("BT105", event, text)
+    def _too_large(self, event: Any) -> NoReturn:
+        text = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
+        self._give_up("BT105", event, text)
 
     def _scalar(self, event: Any) -> Scalar:
         node = Scalar()
@@ -133,7 +131,9 @@ class _Composer:
             self._source.anchored = True
             self.anchored[id(node)] = event.anchor
             self._anchors[event.anchor] = (node, 1, 0)
-        self._count(event)
+        self._size += 1
+        if self._size > MAX_NODES:
+            self._too_large(event)
         return node
 
     def _listing(self, event: Any) -> Listing:
@@ -215,7 +215,9 @@ class _Composer:
             node.end = event.end_mark
         elif last is not None and last.end.index > node.begin.index:
             node.end = last.end
-        self._count(event)
+        self._size += 1
+        if self._size > MAX_NODES:
+            self._too_large(event)
 
     def _close(self, anchor: str, node: Node) -> None:
         before, deepest = self._named.pop()
@@ -228,18 +230,17 @@ class _Composer:
         found = self._anchors[event.anchor]
         if found is None:
             self._give_up("BT105", event, f"*{event.anchor} holds itself")
-        if not self._unfold:
-            alias = Alias()
-            alias.name = event.anchor
-            alias.begin, alias.end = event.start_mark, event.end_mark
-            self._count(event)
-            return alias
         node, size, height = found
+        if not self._unfold:
+            node, size, height = Alias(), 1, 0
+            node.name = event.anchor
+            node.begin, node.end = event.start_mark, event.end_mark
         if self._level + height > MAX_DEPTH:
             self._give_up("BT105", event, _TOO_DEEP)
         self._deepest = max(self._deepest, self._level + height)
-        self._size += size - 1
-        self._count(event)
+        self._size += size
+        if self._size > MAX_NODES:
+            self._too_large(event)
         return node
 
     def _merge(self, node: Mapping) -> None:
