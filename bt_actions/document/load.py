@@ -113,35 +113,18 @@ class Tree:
         """Raise InputError where `build` would."""
         check_inputs(self._document, inputs, types=self._types)
 
-    @_no_collecting()
     def build(self, inputs: Mapping[str, object] | None = None) -> Behaviour:
         """New behaviours, with variables of their own; needs no node and no server.
 
         Raises InputError for inputs that do not fit, DocumentError for a class of a ``python:``
         node that fails when it is made.
         """
-        from bt_actions.document.building.build import build
-        from bt_actions.document.building.scope import Scope
-
-        values = check_inputs(self._document, inputs or {}, types=self._types)
-        scope = Scope.of_load(self._document.name)
-        scope.write_all(values)
-        with self._building, self._workspace.as_it_was():
-            try:
-                root = build(self._document, scope, types=self._types, python=self._python)
-            except TooManyErrors:
-                raise DocumentError(_errors(self._workspace)) from None
-            _refuse(self._workspace)  # a class of one's own may fail when it is made
-        setattr(root, LOADED, Loaded(self._document, scope))
-        return root
-
-    def release(self) -> None:
-        """Let go of what only `build` needs, which is not called again."""
-        for document in self._workspace.documents:
-            document.release()
+        with self._building:
+            return _built(
+                self._workspace, self._document, inputs, types=self._types, python=self._python
+            )
 
 
-@_no_collecting()
 def open_tree(
     path: PathLike,
     *,
@@ -178,9 +161,32 @@ def load_tree(
     Raises DocumentError with everything that is wrong with the tree, InputError for inputs that do
     not fit; both are ValueErrors.
     """
-    tree = open_tree(path, types=types, python=python)
-    root = tree.build(inputs)
-    tree.release()
+    workspace, document = _open(path, types=types, python=python)
+    return _built(workspace, document, inputs, types=types, python=python, once=True)
+
+
+def _built(
+    workspace: Workspace,
+    document: Document,
+    inputs: Mapping[str, object] | None,
+    *,
+    types: bool,
+    python: Python,
+    once: bool = False,
+) -> Behaviour:
+    from bt_actions.document.building.build import build
+    from bt_actions.document.building.scope import Scope
+
+    values = check_inputs(document, inputs or {}, types=types)
+    scope = Scope.of_load(document.name)
+    scope.write_all(values)
+    with _no_collecting(), workspace.as_it_was():
+        try:
+            root = build(document, scope, types=types, python=python, once=once)
+        except TooManyErrors:
+            raise DocumentError(_errors(workspace)) from None
+        _refuse(workspace)  # a class of one's own may fail when it is made
+    setattr(root, LOADED, Loaded(document, scope))
     return root
 
 
@@ -262,6 +268,7 @@ def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> lis
     return workspace.findings
 
 
+@_no_collecting()
 def _open(
     path: PathLike,
     *,

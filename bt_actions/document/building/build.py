@@ -43,16 +43,18 @@ def build(
     namespace: str = "",
     types: bool = True,
     python: Python = True,
+    once: bool = False,
 ) -> Behaviour:
     """The behaviours of a document; each has the place it was written at in `place`.
 
-    What cannot be made is reported to the document's source, as is every ``python:`` node that
-    `python` does not allow. Raises TooManyErrors.
+    With `once` no more will be made of it: its YAML is let go of on the way. What cannot be made is
+    reported to the document's source, as is every ``python:`` node that `python` does not allow.
+    Raises TooManyErrors.
     """
     assert document.root is not None
     inner = join_names(namespace, document.namespace)
     topics = {declared.name: _topic(declared, inner) for declared in document.topics.values()}
-    context = Context(document, scope, inner, types, topics, python)
+    context = Context(document, scope, inner, types, topics, python, once)
     root = _node(document.root, context)
     if topics:
         _connect(root, list(topics.values()))
@@ -100,6 +102,8 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
         if read := [topic for name, topic in context.topics.items() if name in names]:
             patient(behaviour, read)
     setattr(behaviour, PLACE, node.place)
+    if context.once:
+        node.release()
     return behaviour
 
 

@@ -42,6 +42,7 @@ class Context:
     topics: Mapping[str, TopicValue]
     python: Python = True
     """Which ``python:`` nodes may be made."""
+    once: bool = False
 
     def read(self, name: str) -> object:
         """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.

@@ -66,6 +66,11 @@ class TreeNode:
         sends = self.kind is not None and self.kind.name in ("action", "run_tree")
         return self.alias is not None or sends
 
+    def release(self) -> None:
+        """Keep of the YAML only where it stands: nothing more is made from it."""
+        self.node.pairs = []
+        self.written = {}
+
     def walk(self) -> Iterator[TreeNode]:
         """This node and all below it, in the order of the text."""
         stack = [self]
@@ -128,12 +133,6 @@ class Document:
                 seen.add(id(one))
                 yield one
                 waiting.extend(one.imported)
-
-    def release(self) -> None:
-        """Keep of the text of each node only where it stands: nothing more is made from it."""
-        for node in self.nodes():
-            node.node.pairs = []
-            node.written = {}
 
     def nodes(self) -> tuple[TreeNode, ...]:
         """All nodes of the tree, which was read to its end, in the order of the text."""
