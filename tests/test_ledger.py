@@ -22,15 +22,18 @@ from bt_actions.recovery.ledger import (
     Sent,
     left_behind,
 )
+from bt_actions.traffic.host import Entry
 
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
 LEAVES = """
 import os, sys
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery.ledger import Ledger
+from bt_actions.traffic.host import Entry
 ledger, ids = Ledger(print), [new_goal_id() for _ in range(4)]
 for number, goal_id in enumerate(ids):
-    ledger.enter(goal_id, f"/robot_{number}/move", number, [b"a" * 16], accept=60.0)
+    servers = frozenset({b"a" * 16})
+    ledger.enter(goal_id, Entry(f"/robot_{number}/move", number, servers, accept=60.0))
 ledger.strike(ids[1])
 print(*(goal_id.hex() for goal_id in ids), flush=True)
 os._exit(1)
@@ -114,7 +117,7 @@ def test_that_a_server_is_not_in_sight_is_kept() -> None:
 
 
 def test_nothing_is_found_of_who_is_alive(ledger: Ledger, directory: Path) -> None:
-    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
     assert len(on_record(directory)) == 1
     assert found() == []
 
@@ -127,9 +130,9 @@ def test_what_was_read_before_is_passed_over() -> None:
 
 def test_what_more_is_known_of_a_goal_takes_its_place(ledger: Ledger, directory: Path) -> None:
     goal_id = new_goal_id()
-    ledger.enter(goal_id, "/move", 0, SERVERS, lost=True)
+    ledger.enter(goal_id, Entry("/move", 0, SERVERS, lost=True))
     assert goal_id in ledger
-    ledger.enter(goal_id, "/move", 0, [])
+    ledger.enter(goal_id, Entry("/move", 0, frozenset()))
     [entry] = on_record(directory)
     assert (entry["servers"], entry["lost"]) == ([], False)
     ledger.strike(goal_id)
@@ -139,7 +142,7 @@ def test_what_more_is_known_of_a_goal_takes_its_place(ledger: Ledger, directory:
 
 def test_the_child_of_a_fork_leaves_its_parents_file_alone(ledger: Ledger, directory: Path) -> None:
     goal_id = new_goal_id()
-    ledger.enter(goal_id, "/move", 0, SERVERS)
+    ledger.enter(goal_id, Entry("/move", 0, SERVERS))
     child = os.fork()
     if not child:
         ledger.disown()
@@ -156,7 +159,7 @@ def test_without_room_it_complains_once_and_the_goal_goes_on(
 ) -> None:
     monkeypatch.setattr(module.os, "write", lambda *_: 100)
     for _ in range(3):
-        ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+        ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
     (complaint,) = complaints
     assert "No space left on device" in complaint
 
@@ -183,8 +186,8 @@ def test_a_directory_that_others_may_have_made_is_not_used(
         else:
             somebody = os.geteuid() + 1
             monkeypatch.setattr(module.os, "geteuid", lambda: somebody)
-    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
-    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
     assert len(complaints) == 1
     assert found() == []
     assert [trouble.filename for trouble in troubles] == [str(directory)]
@@ -201,7 +204,7 @@ def test_a_directory_that_depends_on_where_one_stands_is_refused(
     ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(module.DIRECTORY, "records")
-    ledger.enter(new_goal_id(), "/move", 0, SERVERS)
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
     assert "no absolute path" in complaints[0]
     assert found() == []
     assert [trouble.filename for trouble in troubles] == ["records"]
@@ -259,7 +262,7 @@ def test_the_next_process_removes_what_nobody_wants(ledger: Ledger, directory: P
     past = time.time() - KEPT_FOR - 1.0
     os.utime(directory / f"{ids[0]}.goal", (past, past))
     ours = new_goal_id()
-    ledger.enter(ours, "/move", 0, SERVERS)
+    ledger.enter(ours, Entry("/move", 0, SERVERS))
     left = {path.stem for path in directory.iterdir()}
     assert left == {ids[2], ids[3], ours.hex()}
 

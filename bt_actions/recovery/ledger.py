@@ -19,12 +19,12 @@ import json
 import os
 import stat
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bt_actions.goals.ids import Author, author_of
-from bt_actions.traffic.host import Record
+from bt_actions.traffic.host import Entry, Record
 
 DIRECTORY = "BT_ACTIONS_LEDGER"
 """The environment variable that names another directory: one that outlives a container, say."""
@@ -37,20 +37,11 @@ KEPT_FOR = 86400.0
 _SUFFIX = ".goal"
 
 
-@dataclass(frozen=True, slots=True)
-class Sent:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sent(Entry):
     """A goal that a process sent, of whose answer that process knew nothing when it ended."""
 
     goal_id: bytes
-    action: str
-    domain: int
-    """ROS domain id."""
-    servers: frozenset[bytes]
-    """GIDs of the servers that were in sight; none where they are not known."""
-    accept: float
-    """Seconds that its server was given to decide; 0: nobody said."""
-    lost: bool
-    """They had gone, as far as was known; but they may only have stood still."""
     author: Author
     """Who is dead, or not `here`."""
     path: Path
@@ -63,7 +54,7 @@ class Sent:
     def mark_lost(self) -> None:
         """Have it on record that its servers are not in sight."""
         with contextlib.suppress(OSError):
-            _write(self.path, self.action, self.domain, self.servers, self.accept, True)
+            _write(self.path, replace(self, lost=True))
 
 
 class Ledger(Record):
@@ -82,32 +73,20 @@ class Ledger(Record):
         """Whether a goal is on record."""
         return goal_id in self._paths
 
-    def enter(
-        self,
-        goal_id: bytes,
-        action: str,
-        domain: int,
-        servers: Collection[bytes],
-        *,
-        accept: float | None = None,
-        lost: bool = False,
-    ) -> None:
-        """Put a goal on record that is about to be sent, or what more is known of it.
-
-        `accept`: the seconds that its server is given to decide.
-        """
-        known = frozenset(servers if len(servers) <= SERVERS_AT_MOST else ())
-        entry = action, domain, known, min(accept or 0.0, KEPT_FOR), lost
+    def enter(self, goal_id: bytes, entry: Entry) -> None:
+        """Put a goal on record that is about to be sent, or what more is known of it."""
+        if len(entry.servers) > SERVERS_AT_MOST:
+            entry = replace(entry, servers=frozenset())
         try:
             if self._home is None:
                 self._home = directory()
                 _tidy(self._home)
             path = self._paths[goal_id] = f"{self._home}/{goal_id.hex()}{_SUFFIX}"
             try:
-                _write(path, *entry, os.O_CREAT)
+                _write(path, entry, os.O_CREAT)
             except FileNotFoundError:  # who logs out may have all of /dev/shm removed
                 directory()
-                _write(path, *entry, os.O_CREAT)
+                _write(path, entry, os.O_CREAT)
         except OSError as error:
             if not self._complained:
                 self._complained = True
@@ -186,18 +165,15 @@ def _gone_author(path: Path) -> Author | None:
     return None if author is None or (author.here and author.alive) else author
 
 
-def _write(
-    path: str | Path,
-    action: str,
-    domain: int,
-    servers: Iterable[bytes],
-    accept: float,
-    lost: bool,
-    how: int = 0,
-) -> None:
-    named = sorted(each.hex() for each in servers)
-    entry = {"action": action, "domain": domain, "servers": named, "accept": accept, "lost": lost}
-    text = json.dumps(entry).encode().ljust(LENGTH)
+def _write(path: str | Path, entry: Entry, how: int = 0) -> None:
+    plain = {
+        "action": entry.action,
+        "domain": entry.domain,
+        "servers": sorted(each.hex() for each in entry.servers),
+        "accept": entry.accept,
+        "lost": entry.lost,
+    }
+    text = json.dumps(plain).encode().ljust(LENGTH)
     file = os.open(path, os.O_WRONLY | os.O_CLOEXEC | how, 0o600)
     try:
         if os.write(file, text) < len(text):
@@ -212,7 +188,7 @@ def _read(path: Path, author: Author) -> Sent:
     try:
         entry = json.loads(text)
         entry["servers"] = frozenset(map(bytes.fromhex, entry["servers"]))
-        return Sent(bytes.fromhex(path.stem), author=author, path=path, **entry)
+        return Sent(goal_id=bytes.fromhex(path.stem), author=author, path=path, **entry)
     except (ValueError, KeyError, TypeError, RecursionError):
         what = "damaged, or of another version (remove it when nothing runs there)"
         raise OSError(errno.EBADMSG, what, str(path)) from None

@@ -13,7 +13,7 @@ from bt_actions.traffic.begun import note, wake
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.effects import Do, Effect
 from bt_actions.traffic.handle import Endpoint, GoalHandle
-from bt_actions.traffic.host import Host
+from bt_actions.traffic.host import Entry, Host
 
 
 class EffectRunner:
@@ -99,9 +99,10 @@ class EffectRunner:
             older.endpoint.tell(older, Event.REPLACED, handle.goal.server)
 
     def _put_on_record(self, handle: GoalHandle) -> None:
-        goal, sent_to = handle.goal, handle.replies.sent_to
-        name, number, accept = self._endpoint.name, self._domain.number, goal.timeouts.accept
-        self._host.record.enter(goal.id, name, number, sent_to, accept=accept, lost=goal.lost)
+        goal, servers = handle.goal, handle.replies.sent_to
+        accept = goal.timeouts.accept or 0.0
+        entry = Entry(self._endpoint.name, self._domain.number, servers, accept, goal.lost)
+        self._host.record.enter(goal.id, entry)
 
     def _record_again(self, handle: GoalHandle) -> None:
         if handle.goal.id in self._host.record:

@@ -6,8 +6,8 @@ goals share beyond their endpoints hangs on it, so that nothing hangs on a modul
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from bt_actions.goals.terms import Command, Event
@@ -34,6 +34,21 @@ class Log(Protocol):
         """Have what was said written, before more is told by other ways; waits a moment at most."""
 
 
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What is on record of a goal."""
+
+    action: str
+    domain: int
+    """ROS domain id."""
+    servers: frozenset[bytes]
+    """GIDs of the servers that were in sight; none where they are not known."""
+    accept: float = 0.0
+    """Seconds that its server is given to decide; 0: nobody said."""
+    lost: bool = False
+    """They have gone, as far as is known; but they may only stand still."""
+
+
 class Record:
     """What was sent and is not answered yet, should the process be killed; this one keeps nothing.
 
@@ -44,16 +59,7 @@ class Record:
         """Whether a goal is on record."""
         return False
 
-    def enter(
-        self,
-        goal_id: bytes,
-        action: str,
-        domain: int,
-        servers: Collection[bytes],
-        *,
-        accept: float | None = None,
-        lost: bool = False,
-    ) -> None:
+    def enter(self, goal_id: bytes, entry: Entry) -> None:
         """Put a goal on record that is about to be sent, or what more is known of it."""
 
     def strike(self, goal_id: bytes) -> None:

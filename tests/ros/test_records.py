@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -13,6 +13,7 @@ from bt_actions.goals.terms import Event
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.host import host as process
 from bt_actions.ros.node_participant import traffic_of
+from bt_actions.traffic.host import Entry
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import state
 from tests.support.waiting import until
@@ -25,19 +26,10 @@ class Recorder:
         self.open: dict[bytes, tuple[str, int, frozenset[bytes], bool]] = {}
         self.entered: list[bytes] = []
 
-    def enter(
-        self,
-        goal_id: bytes,
-        action: str,
-        domain: int,
-        servers: Collection[bytes],
-        *,
-        accept: float | None,
-        lost: bool,
-    ) -> None:
-        assert accept == 5.0, "as the tree says"
+    def enter(self, goal_id: bytes, entry: Entry) -> None:
+        assert entry.accept == 5.0, "as the tree says"
         self.entered.append(goal_id)
-        self.open[goal_id] = action, domain, frozenset(servers), lost
+        self.open[goal_id] = entry.action, entry.domain, entry.servers, entry.lost
 
     def __contains__(self, goal_id: bytes) -> bool:
         return goal_id in self.open

@@ -26,6 +26,7 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery.ledger import Ledger
 from bt_actions.ros.graph import servers
+from bt_actions.traffic.host import Entry
 action, domain, distance, known, lost = sys.argv[1:]
 domain, distance, lost = int(domain), float(distance), lost == "1"
 known = [known.encode()] if known else []
@@ -35,7 +36,7 @@ client = ActionClient(node, MoveRobot, action)
 if distance:
     client.wait_for_server()
     known = servers(node, action)
-Ledger(print).enter(goal_id, action, domain, known, lost=lost)
+Ledger(print).enter(goal_id, Entry(action, domain, frozenset(known), lost=lost))
 if distance:
     goal = MoveRobot.Goal(distance=distance)
     client.send_goal_async(goal, goal_uuid=UUID(uuid=list(goal_id)))
@@ -175,13 +176,14 @@ def test_what_one_of_two_servers_shows_stays_on_record(
     servers: list[bytes], tmp_path: Path
 ) -> None:
     author = Author(here=True, pid=2**22 + 1, started=b"ab")
-    sent = Sent(b"goal", "/move", 0, frozenset(servers), 0.0, False, author, tmp_path / "x")
+    path = tmp_path / "x"
+    sent = Sent("/move", 0, frozenset(servers), goal_id=b"goal", author=author, path=path)
     left = LeftBehind("/move", b"goal", 1, shown=End.CANCELED)
     over = module._Sweep(1.0, 1.0, 1.0, lambda _: None, lambda _: None, lambda: True)
     over._sent[b"goal"], over._left[b"goal"] = sent, left
-    sent.path.touch()
+    path.touch()
     over._keep_record()
-    assert sent.path.exists() is (len(servers) > 1)
+    assert path.exists() is (len(servers) > 1)
     left.nothing_left = "denied for 30 s"
     over._keep_record()
-    assert not sent.path.exists()
+    assert not path.exists()

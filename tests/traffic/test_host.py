@@ -9,7 +9,7 @@ import pytest
 
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
-from bt_actions.traffic.host import Host
+from bt_actions.traffic.host import Entry, Host
 from tests.support.waiting import until as until_real
 
 WORLDS = [pytest.param("virtual", id="virtual"), pytest.param("ros", marks=pytest.mark.ros)]
@@ -103,7 +103,7 @@ def test_a_domain_is_one_however_often_it_is_asked_for(world: Any) -> None:
 def test_a_new_one_is_of_no_fork_and_does_not_close(world: Any) -> None:
     host, _ = world
     assert (host.forks, host.closing) == (0, False)
-    host.record.enter(b"id", "/move", 1, [b"server"])
+    host.record.enter(b"id", Entry("/move", 1, frozenset({b"server"})))
     host.record.strike(b"id")
     assert b"id" not in host.record
     for line in (host.log.info, host.log.warning, host.log.error):
