@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any
 
@@ -95,31 +96,15 @@ class Context:
         message that the root is, where that is known.
         """
         return {
-            name: self._field(place.expression, root, cls, name)
-            or Part(place.expression, root, self, name)
+            name: Part(
+                place.expression,
+                root,
+                self,
+                name,
+                _numbers(place.expression, root, cls, self._declared(name)),
+            )
             for name, place in table_of(written).items()
         }
-
-    def _field(
-        self, expression: Expression, root: Root, cls: type | None, name: str
-    ) -> Callable[[Any], object] | None:
-        """What gets a field of numbers that needs no look: it is of its variable's type."""
-        path, node = list[str](), expression.tree
-        while isinstance(node, ast.Attribute):
-            path.insert(0, node.attr)
-            node = node.value
-        if cls is None or not path or not isinstance(node, ast.Name) or node.id != root:
-            return None
-        kind: fields.FieldType | None = fields.Message(cls)
-        for part in path:
-            inner = fields.describe(kind.cls) if isinstance(kind, fields.Message) else {}
-            kind = inner.get(part)
-        item = kind.item if isinstance(kind, fields.Listing) and kind.size is None else kind
-        if not isinstance(item, fields.Scalar) or item.name not in _NUMBERS:
-            return None
-        declared = self._declared(name)
-        fits = declared is None or parse_type(declared) == kind
-        return attrgetter(".".join(path)) if fits else None
 
     def _declared(self, name: str) -> str | None:
         """The type of a variable, where it is declared."""
@@ -159,6 +144,8 @@ class Part:
     root: Root
     context: Context
     name: str
+    get: Callable[[Any], object] | None
+    """What gets a field of numbers that needs no look."""
 
     @property
     def text(self) -> str:
@@ -167,8 +154,32 @@ class Part:
 
     def __call__(self, given: Any) -> object:
         """The value as its variable wants it; raises ValueError."""
+        if self.get is not None:
+            return self.get(given)
         value = self.expression.evaluate(_roots(self.root, given), self.context.read)
         return self.context.fitting(self.name, value)
+
+
+@lru_cache(maxsize=1024)
+def _numbers(
+    expression: Expression, root: Root, cls: type | None, declared: str | None
+) -> Callable[[Any], object] | None:
+    """What gets a field of numbers that is of its variable's type as it is; None for any other."""
+    path, node = list[str](), expression.tree
+    while isinstance(node, ast.Attribute):
+        path.insert(0, node.attr)
+        node = node.value
+    if cls is None or not path or not isinstance(node, ast.Name) or node.id != root:
+        return None
+    kind: fields.FieldType | None = fields.Message(cls)
+    for part in path:
+        inner = fields.describe(kind.cls) if isinstance(kind, fields.Message) else {}
+        kind = inner.get(part)
+    item = kind.item if isinstance(kind, fields.Listing) and kind.size is None else kind
+    if not isinstance(item, fields.Scalar) or item.name not in _NUMBERS:
+        return None
+    fits = declared is None or parse_type(declared) == kind
+    return attrgetter(".".join(path)) if fits else None
 
 
 def _roots(root: Root, given: Any) -> Mapping[str, object]:
