@@ -108,9 +108,12 @@ class EffectRunner:
         if handle.goal.id in self._host.record:
             self._put_on_record(handle)
 
-    def _wake_waiting(self, _: GoalHandle) -> None:
-        """Wake those of all nodes whose goals wait: there may be room, or no conflict any more."""
-        unsent = self._domain.unsent
-        for handle in [each for each in unsent if each.goal.sent or each.goal.state is State.DONE]:
-            del unsent[handle]
-        wake(unsent)
+    def _wake_waiting(self, handle: GoalHandle) -> None:
+        """Wake those of all nodes whose goals may have waited for this one.
+
+        There may be room at its server, or no conflict any more.
+        """
+        unsent, name, resources = self._domain.unsent, self._endpoint.name, handle.goal.resources
+        for each in [each for each in unsent if each.goal.sent or each.goal.state is State.DONE]:
+            del unsent[each]
+        wake(e for e in unsent if e.endpoint.name == name or e.goal.resources & resources)
