@@ -28,8 +28,14 @@ FLOATS = MappingProxyType({"float32": 3.402823466e38, "float64": float("inf")})
 _NAMES = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
 
 
+class FieldType:
+    """What a value is."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
-class Scalar:
+class Scalar(FieldType):
     """`name` is the ROS name of the type; `limit` bounds the length of a string."""
 
     name: str
@@ -40,7 +46,7 @@ class Scalar:
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class Message(FieldType):
     """A message inside a message."""
 
     cls: type
@@ -50,7 +56,7 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
-class Listing:
+class Listing(FieldType):
     """An array of exactly `size`, a sequence of at most `limit`, or an unbounded one."""
 
     item: FieldType
@@ -61,32 +67,6 @@ class Listing:
         if self.size is not None:
             return f"{self.item}[{self.size}]"
         return f"{self.item}[]" if self.limit is None else f"{self.item}[<={self.limit}]"
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """A mapping that a tree writes out: its keys, with their types where they are known."""
-
-    items: tuple[tuple[str, FieldType | None], ...]
-    sometimes: frozenset[str] = frozenset()
-    """Keys that not every one of several mappings has."""
-
-    def __str__(self) -> str:
-        return "mapping"
-
-
-@dataclass(frozen=True, slots=True)
-class Either:
-    """One of several types: that of an item of a list that a tree writes out."""
-
-    kinds: tuple[FieldType, ...]
-
-    def __str__(self) -> str:
-        return " or ".join(map(str, self.kinds))
-
-
-FieldType = Scalar | Message | Listing | Record | Either
-"""What a value is. The last two are inferred; no field of a message asks for them."""
 
 
 @lru_cache(maxsize=4096)

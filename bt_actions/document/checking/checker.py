@@ -16,7 +16,7 @@ from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
 from bt_actions.document.checking.variables import infer_variables, items_inside, type_of
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
-from bt_actions.document.language.types import TypeNameError, fits, interface_of, misfits
+from bt_actions.document.language.types import Either, TypeNameError, fits, interface_of, misfits
 from bt_actions.document.language.values import (
     BAD,
     Computed,
@@ -35,7 +35,7 @@ from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.messages.conversion import examine
-from bt_actions.messages.fields import Either, FieldType, Message
+from bt_actions.messages.fields import FieldType, Message
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:

@@ -8,17 +8,16 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping, Sequence
 
+from bt_actions.document.language.types import Either, Record
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.values import BINARY, LENGTHS, bounded, number, reason
 from bt_actions.messages.conveniences import UnknownClass
 from bt_actions.messages.fields import (
     FLOATS,
     INTEGERS,
-    Either,
     FieldType,
     Listing,
     Message,
-    Record,
     Scalar,
     constants,
     describe,

@@ -10,13 +10,13 @@ from py_trees.timers import Timer
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.infer import FLOAT, INTEGER, named
 from bt_actions.document.findings import Related
-from bt_actions.document.language.types import TypeNameError, fits, misfits, parse_type
+from bt_actions.document.language.types import Record, TypeNameError, fits, misfits, parse_type
 from bt_actions.document.language.values import Computed, computed_in, constant_of, locate
 from bt_actions.document.reading.settings import when_of
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import Node, span_of
-from bt_actions.messages.fields import FieldType, Listing, Message, Record, Scalar
+from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
 from bt_actions.messages.interfaces import RUN_TREE
 from bt_actions.utilities.suggest import did_you_mean, listing
 

@@ -6,17 +6,16 @@ Needs no ROS for the plain types; a message's type is looked up only where types
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bt_actions.document.findings.elsewhere import type_here
 from bt_actions.messages.fields import (
     FLOATS,
     INTEGERS,
-    Either,
     FieldType,
     Listing,
     Message,
-    Record,
     Scalar,
 )
 from bt_actions.utilities.suggest import did_you_mean
@@ -24,7 +23,8 @@ from bt_actions.utilities.suggest import did_you_mean
 if TYPE_CHECKING:
     from bt_actions.messages.interfaces import Kind
 
-__all__ = ["PLAIN_TYPES", "TypeNameError", "fits", "interface_of", "misfits", "parse_type"]
+__all__ = ["PLAIN_TYPES", "Either", "Record", "TypeNameError", "fits", "interface_of", "misfits",
+           "parse_type"]  # fmt: skip
 
 PLAIN_TYPES = ("bool", *FLOATS, *(name for name in INTEGERS), "string")
 """The types that need no package."""
@@ -35,6 +35,28 @@ _STAND_FOR = {
 """The plain types whose values may be given for a message: seconds, and `500 ms`."""
 _TEXT = Scalar("string")
 _SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{1,9}))?(\])?)?")
+
+
+@dataclass(frozen=True, slots=True)
+class Record(FieldType):
+    """A mapping that a tree writes out: its keys, with their types where they are known."""
+
+    items: tuple[tuple[str, FieldType | None], ...]
+    sometimes: frozenset[str] = frozenset()
+    """Keys that not every one of several mappings has."""
+
+    def __str__(self) -> str:
+        return "mapping"
+
+
+@dataclass(frozen=True, slots=True)
+class Either(FieldType):
+    """One of several types: that of an item of a list that a tree writes out."""
+
+    kinds: tuple[FieldType, ...]
+
+    def __str__(self) -> str:
+        return " or ".join(map(str, self.kinds))
 
 
 class TypeNameError(ValueError):
