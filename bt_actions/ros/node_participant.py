@@ -10,13 +10,12 @@ import functools
 import os
 import random
 import weakref
-from collections.abc import Callable
 from typing import Any
 
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
-from bt_actions.goals.terms import NEVER, Now
+from bt_actions.goals.terms import NEVER
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.alive import is_valid
@@ -66,6 +65,7 @@ class NodeParticipant:
         """The caller holds the lock."""
         self.node = node
         self.clock = Clocks(node)
+        self.now = self.clock.now
         self.domain: int = node.context.get_domain_id()
         self.name: str = node.get_name()
         self.namespace: str = node.get_namespace()
@@ -75,6 +75,9 @@ class NodeParticipant:
             sight = _sights[node.context] = _Sight(sight)
         sight.nodes.add(node)
         self.seen_since, self.long_stalls = sight.since, sight.long_stalls
+        self.service = functools.partial(Service, node)
+        self.subscription = functools.partial(Subscription, node, sight.since)
+        self.publisher = functools.partial(Publisher, node, sight.since)
         self.traffic = Traffic(host, self)
         self._waitable = OneWaitable(node)
         self._warned_of: set[str] = set()
@@ -91,29 +94,11 @@ class NodeParticipant:
 
     # What leaves ask for
 
-    def service(self, service_type: type, name: str) -> Service:
-        """Become a client of a service."""
-        return Service(self.node, service_type, name)
-
-    def subscription(
-        self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
-    ) -> Subscription:
-        """Listen to a topic."""
-        return Subscription(self.node, self.seen_since, message_type, topic, qos, take)
-
-    def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
-        """Become a publisher on a topic."""
-        return Publisher(self.node, self.seen_since, message_type, topic, qos)
-
     def log(self, level: str, text: str) -> None:
         """Write a line to the node's log."""
         log.by(self.node.get_logger(), level, text)
 
     # What traffic asks for
-
-    def now(self) -> Now:
-        """Return this moment, by the steady clock and by the node's own."""
-        return self.clock.now()
 
     def alive(self) -> bool:
         """Whether the node is there, and its context was not shut down."""
