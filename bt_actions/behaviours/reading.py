@@ -7,6 +7,7 @@ variable on the blackboard, and ``result`` what the server gave.
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -22,13 +23,7 @@ Names = Callable[[Any], Mapping[str, object]]
 Given = Callable[[Any], Any] | str
 
 
-def only_result(result: Any) -> Mapping[str, object]:
-    return {"result": result}
-
-
-def function_of(
-    given: Given, what: str, names: Names = only_result, *, condition: bool = False
-) -> Callable[[Any], Any]:
+def function_of(given: Given, what: str, names: Names, *, condition: bool) -> Callable[[Any], Any]:
     """Return what was given as a function of the result.
 
     Raises ValueError for what is none, naming `what` it was given for. A function made from text
@@ -46,13 +41,6 @@ def function_of(
     return lambda result: compute(names(result), read)
 
 
-def condition_of(
-    given: Given | None, what: str, names: Names = only_result
-) -> Callable[[Any], bool] | None:
-    """As `function_of`, for a condition, or None."""
-    return None if given is None else function_of(given, what, names, condition=True)
-
-
 class Reading:
     """The `expect`, `save` and `retry.when` of an action; a result is read first, saved later."""
 
@@ -63,14 +51,16 @@ class Reading:
         expect: Given | None,
         save: Mapping[str, Given],
         when: Given | None,
-        names: Names = only_result,
+        names: Names,
     ) -> None:
         """Raises ValueError for what is neither a function nor an expression."""
         self._names = names
         self._given = expect, when, save
-        self._expect = condition_of(expect, "expect", names)
-        self._save = {key(name): function_of(place, "save", names) for name, place in save.items()}
-        self.when = condition_of(when, "retry.when", names)
+        condition = functools.partial(function_of, names=names, condition=True)
+        place_of = functools.partial(function_of, names=names, condition=False)
+        self._expect = None if expect is None else condition(expect, "expect")
+        self._save = {key(name): place_of(place, "save") for name, place in save.items()}
+        self.when = None if when is None else condition(when, "retry.when")
         self._to_save: list[tuple[str, Any]] = []  # of the last result, by blackboard key
 
     def unknown_field(self, result_type: Any) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected
-from bt_actions.behaviours.reading import condition_of
 from bt_actions.behaviours.topics import LOOKS
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
@@ -30,9 +29,9 @@ class CallService(Connected[Service]):
         request: gives the fields of the request; may raise ValueError, which fails.
         server: seconds to wait for the service to be there; None waits for ever.
         response: seconds to wait for the answer; None waits for ever.
-        retry: how often; its outcomes are not looked at, a service knows only one failure.
-        expect: what the answer must be; raising ExpressionError counts as no.
-        save: called with the answer; raising ValueError fails.
+        retry: how often, with `when` as a callable; its outcomes are not looked at, a service knows
+            only one failure.
+        read: called with the answer; raising ValueError fails.
     """
 
     def __init__(
@@ -45,8 +44,7 @@ class CallService(Connected[Service]):
         server: float | None,
         response: float | None,
         retry: Retry,
-        expect: Callable[[Any], bool] | None,
-        save: Callable[[Any], None] | None,
+        read: Callable[[Any], None],
     ) -> None:
         super().__init__(name)
         self.service_type = service_type
@@ -54,9 +52,7 @@ class CallService(Connected[Service]):
         self._name = service_name
         self._request = request
         self._timeout, self._patience = server, response
-        self._expect = expect
-        self._when = condition_of(retry.when, "retry.when")
-        self._save = save
+        self._read = read
 
     def _make(self, backend: Backend) -> Service:
         self._call: Call | None = None
@@ -85,10 +81,7 @@ class CallService(Connected[Service]):
         call = self._call
         if call is not None and call.done():
             self._call, self._response = None, call.result()
-            if self._expect is not None and not self._expect(self._response):
-                raise ValueError("the answer is not what was expected")
-            if self._save is not None:
-                self._save(self._response)
+            self._read(self._response)
             return Status.SUCCESS
         if call is not None:
             self.feedback_message = f"waiting for an answer of {client.name}"
@@ -135,10 +128,11 @@ class CallService(Connected[Service]):
         return True
 
     def _worth_it(self) -> bool:
-        if self._when is None or self._response is None:
+        when = self.retry.when
+        if not callable(when) or self._response is None:
             return True
         try:
-            return bool(self._when(self._response))
+            return bool(when(self._response))
         except ExpressionError as error:  # counts as no, as in goals/attempts.py
             self.feedback_message += f"; retry.when: {error.message}"
             return False

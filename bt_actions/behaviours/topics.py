@@ -135,17 +135,15 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
 
 
 class WaitForMessage(Connected[Latest]):
-    """Succeeds with the first message, since it started, for which a condition holds.
+    """Succeeds with the first message, since it started, that is the one waited for.
 
     Args:
         name: as in py_trees.
         message_type: the message's class or type name.
         topic: a relative name is expanded with the node's namespace.
         qos: as the tree language calls it.
-        until: a condition on the message; any message does where not given.
-        timeout: seconds on the node's clock after which it fails; never where not given.
-        save: called with such a message; where it raises ValueError (ExpressionError is one), that
-            message was not the one waited for.
+        timeout: seconds on the node's clock after which it fails; None: never.
+        read: called with each message; raises ValueError for one that is not waited for.
     """
 
     def __init__(
@@ -154,16 +152,14 @@ class WaitForMessage(Connected[Latest]):
         message_type: type | str,
         topic: str,
         *,
-        qos: str = "default",
-        until: Callable[[Any], bool] | None = None,
-        timeout: float | None = None,
-        save: Callable[[Any], None] | None = None,
+        qos: str,
+        timeout: float | None,
+        read: Callable[[Any], None],
     ) -> None:
         super().__init__(name)
         self._given = message_type, topic, qos
-        self._until = until
         self._timeout = timeout
-        self._save = save
+        self._read = read
 
     def _make(self, backend: Backend) -> Latest:
         latest = Latest(backend, *self._given)
@@ -182,16 +178,13 @@ class WaitForMessage(Connected[Latest]):
         topic = latest.subscription.name
         self.feedback_message = f"waiting for a message on {topic}"
         for _ in range(len(latest.kept)):  # not what comes meanwhile: a tick must end
-            message = latest.kept.popleft()
             try:
-                if self._until is None or self._until(message):
-                    if self._save is not None:
-                        self._save(message)
-                    self.feedback_message = ""
-                    return Status.SUCCESS
-                self.feedback_message = "a message came, but not the one waited for"
-            except ValueError as error:  # ExpressionError, or what is saved does not fit
+                self._read(latest.kept.popleft())
+            except ValueError as error:  # ExpressionError is one
                 self.feedback_message = str(error)
+            else:
+                self.feedback_message = ""
+                return Status.SUCCESS
         if self.left() > 0.0:
             return Status.RUNNING
         why = "" if latest.came else latest.subscription.why_nobody()

@@ -34,7 +34,11 @@ def publish(backend: VirtualBackend) -> Publish:
 def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_tick(
     backend: VirtualBackend, publish: Publish
 ) -> None:
-    waits = WaitForMessage("w", Int32, "level", until=lambda message: message.data == 2)
+    def read(message: Int32) -> None:
+        if message.data != 2:
+            raise ValueError("another")
+
+    waits = WaitForMessage("w", Int32, "level", qos="default", timeout=None, read=read)
     waits.setup(node=backend)
     publish(2)  # before it waits
     waits.tick_once()
@@ -61,7 +65,7 @@ def test_the_newest_messages_are_kept_for_who_waits(
 def test_messages_that_came_before_it_began_are_told(
     backend: VirtualBackend, publish: Publish
 ) -> None:
-    waits = WaitForMessage("w", Int32, "level", timeout=0.05)
+    waits = WaitForMessage("w", Int32, "level", qos="default", timeout=0.05, read=print)
     waits.setup(node=backend)
     publish(1)
     waits.tick_once()

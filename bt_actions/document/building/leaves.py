@@ -107,14 +107,22 @@ def _check(node: TreeNode, context: Context) -> Behaviour:
     return Check(name, written.expression, context.read)
 
 
-def _saver(node: TreeNode, context: Context, root: str) -> Callable[[Any], None] | None:
-    """What keeps parts of an answer or a message, as `save` says."""
+def _reader(
+    node: TreeNode, context: Context, root: str, condition: str, unmet: str
+) -> Callable[[Any], None]:
+    """What judges an answer or a message, and keeps parts of it, as `save` says.
+
+    It raises ValueError, with `unmet` where the condition does not hold.
+    """
+    holds = context.condition(node.values.get(condition), root)
     saved = context.saved(node.values.get("save"), root)
-    if not saved:
-        return None
-    return lambda given: context.scope.write_all(
-        {name: part(given) for name, part in saved.items()}
-    )
+
+    def read(given: Any) -> None:
+        if holds is not None and not holds(given):
+            raise ValueError(unmet)
+        context.scope.write_all({name: part(given) for name, part in saved.items()})
+
+    return read
 
 
 def _service(node: TreeNode, context: Context) -> Behaviour:
@@ -128,8 +136,7 @@ def _service(node: TreeNode, context: Context) -> Behaviour:
         server=timeout.get("server", 5.0),
         response=timeout.get("response", 5.0),
         retry=_retry(values, context),
-        expect=context.condition(values.get("expect"), "result"),
-        save=_saver(node, context, "result"),
+        read=_reader(node, context, "result", "expect", "the answer is not what was expected"),
     )
 
 
@@ -156,9 +163,10 @@ def _wait_for_message(node: TreeNode, context: Context) -> Behaviour:
         _interface(values["type"], "msg", context),
         context.name(values, "topic"),
         qos=text_of(values, "qos") or "default",
-        until=context.condition(values.get("until"), "message"),
         timeout=timeout,
-        save=_saver(node, context, "message"),
+        read=_reader(
+            node, context, "message", "until", "a message came, but not the one waited for"
+        ),
     )
 
 
