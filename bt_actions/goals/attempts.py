@@ -94,29 +94,25 @@ class Attempts:
         return max(0.0, resume_at - now.ros)
 
     def _worth_it(self, record: AttemptRecord) -> bool:
-        if record.outcome not in self.retry.outcomes:
-            if record.outcome in RETRYABLE:
-                why_not = f"{record.outcome} is not among the outcomes of retry"
-                record.reason += f" (not tried again: {why_not})"
-            return False
         why_not = self._why_not(record)
         if why_not:
             record.reason += f" (not tried again: {why_not})"
-            return False
-        if self._when is not None and record.result is not None:
-            try:
-                return bool(self._when(record.result))
-            except Exception as error:  # noqa: BLE001 - the user's: any
-                record.reason += f" (not tried again: retry.when: {in_words(error)})"
-                return False
-        return True
+        return why_not is None
 
-    def _why_not(self, record: AttemptRecord) -> str:
-        """Why nothing is tried again beside a goal, or after it, whatever its outcome; or ""."""
+    def _why_not(self, record: AttemptRecord) -> str | None:
+        """Why it is not tried again: "" where that goes without saying; None where it is."""
+        if record.outcome not in self.retry.outcomes:
+            known = record.outcome in RETRYABLE
+            return f"{record.outcome} is not among the outcomes of retry" if known else ""
         if record.end is End.UNKNOWN:
             return "it may still be running"
         if record.end is End.SERVER_GONE and Outcome.SERVER_LOST not in self.retry.outcomes:
             return "its server went away, and it may still be running there"
         if record.end is End.SUCCEEDED and record.outcome is not Outcome.UNEXPECTED_RESULT:
             return "it has succeeded, though its result was lost"
-        return ""
+        if self._when is not None and record.result is not None:
+            try:
+                return None if self._when(record.result) else ""
+            except Exception as error:  # noqa: BLE001 - the user's: any
+                return f"retry.when: {in_words(error)}"
+        return None

@@ -12,8 +12,8 @@ dead server and its successor.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
 
 from bt_actions.goals.terms import NEVER
 
@@ -44,12 +44,12 @@ class Server(Enum):
     AMBIGUOUS = "ambiguous"
 
 
-class _Answers(NamedTuple):
-    """What came back to one probe, and when it was sent."""
-
-    number: int
-    first: float
+@dataclass(slots=True)
+class _Probe:
     sent: float
+    answers: int = 0
+    first: float = NEVER
+    """When its first answer came."""
 
 
 class ServerWatch:
@@ -64,8 +64,7 @@ class ServerWatch:
         self._crowded_since: float | None = None
         self._not_alone_before = NEVER
         self._probed_at = NEVER
-        self._sent: dict[int, float] = {}  # probe: when it was sent
-        self._answers: dict[int, _Answers] = {}  # by probe
+        self._probes: dict[int, _Probe] = {}  # by their numbers
         self.heard_at = NEVER
         """When any word of a server came: whoever speaks is there."""
         self._most_answers = 0  # to one question
@@ -84,7 +83,7 @@ class ServerWatch:
         self._ready = ready
         if gids != self.gids:
             self.alone, self._most_answers = False, 0
-            self._answers.clear()
+            self._probes.clear()
             self._crowded_since = now if len(gids) > 1 else None
             self.gids = gids
         since = self._crowded_since
@@ -108,10 +107,8 @@ class ServerWatch:
 
     def _answered_once(self, now: float, sent_since: float) -> bool:
         return any(
-            answers.number == 1
-            and now - answers.first >= NO_SECOND_AFTER
-            and answers.sent >= sent_since
-            for answers in self._answers.values()
+            probe.answers == 1 and now - probe.first >= NO_SECOND_AFTER and probe.sent >= sent_since
+            for probe in self._probes.values()
         )
 
     def alone_since(self, now: float, moment: float) -> bool:
@@ -123,19 +120,21 @@ class ServerWatch:
 
     def probe_sent(self, now: float, probe: int) -> None:
         """Take note that a probe with this number goes out."""
-        self._sent[probe] = now
-        if len(self._sent) > PROBES_KEPT:
-            del self._sent[next(iter(self._sent))]
+        self._probes[probe] = _Probe(now)
+        if len(self._probes) > PROBES_KEPT:
+            del self._probes[next(iter(self._probes))]
 
-    def probe_answered(self, now: float, probe: int) -> None:
-        """Take one answer to the probe numbered `probe`."""
+    def probe_answered(self, now: float, number: int) -> None:
+        """Take one answer to a probe; none counts that is older than who is shown now."""
         self.heard_at = now
-        count, first, sent = self._answers.get(probe, (0, now, self._sent.get(probe, NEVER)))
-        self._answers[probe] = _Answers(count + 1, first, sent)
-        if len(self._answers) > PROBES_KEPT:
-            del self._answers[next(iter(self._answers))]
-        if count:
-            self.two_answered(count + 1)
+        probe = self._probes.get(number)
+        if probe is None:
+            return
+        probe.answers += 1
+        if probe.answers == 1:
+            probe.first = now
+        else:
+            self.two_answered(probe.answers)
 
     def two_answered(self, answers: int = 2) -> None:
         """Take note that two, or more, have answered one question, a probe or another."""

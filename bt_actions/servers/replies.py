@@ -51,7 +51,6 @@ class Replies:
         self._goal = goal
         self._was_gone = False
         """When last looked at, none of these was there."""
-        self._accepted_by = 0
         self._refused = False
         self._ended: tuple[int, Any] | None = None
         self._denied_at: float | None = None  # by one that it was not sent to, maybe
@@ -99,14 +98,13 @@ class Replies:
         if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:
             return None  # by one, twice
         accepted = sum(answers)
-        self._accepted_by = max(self._accepted_by, accepted)
         if accepted:
             self._refused = False
             self.spoke(watch, now)
         if accepted > 1:
             self.sent_to |= watch.gids
             watch.two_answered()
-            self._fresh_since = now
+            self._fresh_since, self._told_of_two = now, True
             return Event.SERVER_AMBIGUOUS, None
         if answers[-1]:
             if not self._goal.accepted or len(self.sent_to) == 1:
@@ -162,7 +160,7 @@ class Replies:
                 if len(answers) < _answers_wanted(watch) and self._may_be_at_two(watch):
                     self._ended = done
                     return None
-            if len(ended) > 1 and self._accepted_by < 2 and not self._told_of_two:  # both ran it
+            if len(ended) > 1 and not self._told_of_two:  # both ran it
                 watch.two_answered()
                 return Event.SERVER_AMBIGUOUS, done
             return Event.RESULT, done

@@ -87,7 +87,8 @@ class Drain:
                     if self._waits:
                         return Sleep(LOOK)
                 self._gives_up_at = now + LAST_REQUESTS
-            if self._has_requests and now < self._gives_up_at:
+            requests = (each.endpoint.cancels.has_request(each.goal.id) for each in self._waits)
+            if now < self._gives_up_at and any(requests):
                 self._deliver_arrived()
                 return Sleep(LOOK)
             return Done(self._finish())
@@ -95,10 +96,6 @@ class Drain:
     def _deliver_arrived(self) -> None:
         for endpoint in dict.fromkeys(handle.endpoint for handle in self._waits):
             endpoint.deliver_arrived()
-
-    @property
-    def _has_requests(self) -> bool:
-        return any(each.endpoint.cancels.has_request(each.goal.id) for each in self._waits)
 
     def _finish(self) -> list[GoalHandle]:
         for handle in self._waits:  # all at once, though a server's queue drops what is too much

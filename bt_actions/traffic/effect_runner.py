@@ -7,11 +7,12 @@ under the host's lock.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from bt_actions.goals.terms import Command, Event, State
 from bt_actions.traffic.begun import note, wake
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.effects import Do, Effect
+from bt_actions.traffic.effects import Do
 from bt_actions.traffic.handle import Endpoint, GoalHandle
 from bt_actions.traffic.host import Entry, Host
 
@@ -40,21 +41,21 @@ class EffectRunner:
             Command.CANCEL: self._cancel,
         }
 
-    def carry_out(self, effect: Effect) -> None:
-        """Do it."""
-        self._host.trace.does(effect)
-        if effect.do is Command.SEND:
-            self._send(effect)
+    def carry_out(self, do: Do | Command, handle: GoalHandle, message: Any) -> None:
+        """Do this for a goal; `message` is what is to be sent."""
+        self._host.trace.does(do)
+        if do is Command.SEND:
+            self._send(handle, message)
         else:
-            self._does[effect.do](effect.handle)
+            self._does[do](handle)
 
-    def _send(self, effect: Effect) -> None:
+    def _send(self, handle: GoalHandle, message: Any) -> None:
         """Count who gets it, have it on record, and send the request."""
-        handle, endpoint = effect.handle, self._endpoint
+        endpoint = self._endpoint
         try:
             handle.replies.sent(endpoint.watch)
             self._put_on_record(handle)
-            endpoint.transport.send(handle.goal.id, effect.message)
+            endpoint.transport.send(handle.goal.id, message)
             known = handle.replies.sent_to
             endpoint.observe()
             handle.replies.sent(endpoint.watch)  # who opened since got it, too
@@ -64,10 +65,7 @@ class EffectRunner:
             endpoint.tell(handle, Event.SEND_FAILED, error)
 
     def _ask_result(self, handle: GoalHandle) -> None:
-        try:
-            self._endpoint.transport.ask_result(handle.goal.id)
-        except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
-            self._failed("ASK_RESULT could not be sent", error)
+        self._ask("ASK_RESULT", self._endpoint.transport.ask_result, handle.goal.id)
 
     def _cancel(self, handle: GoalHandle) -> None:
         if handle.goal.state is State.DONE:  # and nothing is sent after that
@@ -81,10 +79,13 @@ class EffectRunner:
 
     def send_cancel(self, goal_id: bytes) -> bool:
         """Ask now; return whether the request has left."""
+        return self._ask("CANCEL", self._endpoint.transport.cancel, goal_id)
+
+    def _ask(self, what: str, send: Callable[[bytes], None], goal_id: bytes) -> bool:
         try:
-            self._endpoint.transport.cancel(goal_id)
+            send(goal_id)
         except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
-            self._failed("CANCEL could not be sent", error)
+            self._failed(f"{what} could not be sent", error)
             return False
         return True
 

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from bt_actions.goals.policy import Busy
 from bt_actions.goals.terms import Command, State
@@ -29,16 +27,6 @@ class Do(Enum):
     STRIKE = "take it off the record"
     RETIRE = "see to it no more"
     REPLACE = "tell older goals on its resources that it has taken their place"
-
-
-@dataclass(frozen=True, slots=True)
-class Effect:
-    """One thing to be done."""
-
-    do: Do | Command
-    handle: GoalHandle
-    message: Any = None
-    """The goal to be sent."""
 
 
 def what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Do | Command]:
@@ -65,12 +53,12 @@ class Effects:
     """The queue; the caller holds the host's lock."""
 
     def __init__(self) -> None:
-        self._waiting: deque[tuple[Callable[[Effect], None], Effect]] = deque()
+        self._waiting: deque[Callable[[], None]] = deque()
         self._runs = False
 
-    def put(self, carry_out: Callable[[Effect], None], effect: Effect) -> None:
+    def put(self, carry_out: Callable[[], None]) -> None:
         """Have this carried out behind what was decided before."""
-        self._waiting.append((carry_out, effect))
+        self._waiting.append(carry_out)
 
     def run_all(self) -> None:
         """Carry out all, unless that is under way."""
@@ -79,7 +67,6 @@ class Effects:
         self._runs = True
         try:
             while self._waiting:
-                carry_out, effect = self._waiting.popleft()
-                carry_out(effect)
+                self._waiting.popleft()()
         finally:
             self._runs = False

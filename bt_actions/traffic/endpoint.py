@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from functools import partial
 from typing import Any
 
 from bt_actions.goals.goal import Goal
@@ -25,7 +26,7 @@ from bt_actions.servers.replies import DENIALS, Told
 from bt_actions.traffic.begun import wake
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.effect_runner import EffectRunner
-from bt_actions.traffic.effects import Effect, what_follows
+from bt_actions.traffic.effects import what_follows
 from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.handle import GoalHandle, NodeTraffic
 from bt_actions.traffic.host import Host
@@ -241,7 +242,7 @@ class ActionEndpoint:
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
             goal.reason += self._traffic.why_not(handle)
         for do in what_follows(handle, commands):
-            self.domain.effects.put(self._effect_runner.carry_out, Effect(do, handle, message))
+            self.domain.effects.put(partial(self._effect_runner.carry_out, do, handle, message))
         if (due := goal.due_in(now)) is not None:
             self._host.scheduler.wake_by(now.steady + due)
         self.domain.effects.run_all()

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from bt_actions.goals.terms import Command, Event
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.effects import Effect
+from bt_actions.traffic.effects import Do
 from bt_actions.traffic.handle import GoalHandle
 from bt_actions.traffic.scheduler import Scheduler
 
@@ -93,7 +93,7 @@ class Trace:
     ) -> None:
         """A goal was told what happened, and returned these commands."""
 
-    def does(self, effect: Effect) -> None:
+    def does(self, do: Do | Command) -> None:
         """What a goal has decided is about to be done."""
 
     def shows_time(self, handle: GoalHandle) -> None:

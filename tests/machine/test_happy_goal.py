@@ -8,7 +8,7 @@ from typing import Any
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.traffic import handle as traffic
-from bt_actions.traffic.effects import Do, Effect
+from bt_actions.traffic.effects import Do
 from tests.machine.histories import Play
 from tests.machine.production import Witness
 
@@ -30,8 +30,8 @@ class Steps(Witness):
         super().told(handle, event, detail, commands)
         self.steps.append((event, []))
 
-    def does(self, effect: Effect) -> None:
-        self.steps[-1][1].append(effect.do)
+    def does(self, do: Do | Command) -> None:
+        self.steps[-1][1].append(do)
 
 
 def test_each_message_enters_once_the_graph_is_asked_once_and_there_is_one_goal() -> None:
