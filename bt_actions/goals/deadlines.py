@@ -40,15 +40,15 @@ class Deadlines:
 
     def left(self, now: Now) -> list[tuple[float, Event]]:
         """Return the seconds until each, the earliest first; negative where it has passed."""
-        waits = sorted(((self._left(event, now), event) for event in self._due), key=_seconds)
-        suspended = self._suspended_for(now)
-        return (
-            [(max(left, suspended), event) for left, event in waits] if suspended > 0.0 else waits
-        )
+        suspended = self._not_before - now.steady
+        waits = [(self._left(event, now), event) for event in self._due]
+        waits.sort(key=lambda wait: wait[0])
+        return [(max(left, suspended), event) for left, event in waits]
 
     def take_passed(self, event: Event, now: Now) -> bool:
         """Whether this one is still set and has passed; it is forgotten then."""
-        if event not in self._due or max(self._left(event, now), self._suspended_for(now)) > 0.0:
+        suspended = now.steady < self._not_before
+        if event not in self._due or suspended or self._left(event, now) > 0.0:
             return False
         del self._due[event]
         return True
@@ -62,9 +62,6 @@ class Deadlines:
         """Let none take effect within so many seconds: what is awaited may be on its way."""
         self._not_before = now.steady + seconds
 
-    def _suspended_for(self, now: Now) -> float:
-        return self._not_before - now.steady
-
     def follow(self, now: Now) -> None:
         """It is so late; where the ROS clock has jumped back, deadlines on it jump with it."""
         back = self.now.ros - now.ros
@@ -77,7 +74,3 @@ class Deadlines:
         if event in ON_ROS_CLOCK:  # where the clock has jumped back, no more than what remained
             return self._due[event] - max(now.ros, self.now.ros)
         return self._due[event] - now.steady
-
-
-def _seconds(wait: tuple[float, Event]) -> float:
-    return wait[0]

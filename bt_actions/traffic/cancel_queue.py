@@ -57,12 +57,9 @@ class Cancels:
 
     def send_more(self, now: float) -> None:
         """Send what there is room for."""
-        while self._waiting and self._under_way(now) < AT_MOST:
+        for goal_id in [each for each, at in self._asked.items() if now - at >= ANSWERED_WITHIN]:
+            del self._asked[goal_id]
+        while self._waiting and len(self._asked) < AT_MOST:
             goal_id = next(iter(self._waiting))
             if self._waiting.pop(goal_id)(goal_id):
                 self._asked[goal_id] = now
-
-    def _under_way(self, now: float) -> int:
-        for goal_id in [each for each, at in self._asked.items() if now - at >= ANSWERED_WITHIN]:
-            del self._asked[goal_id]
-        return len(self._asked)
