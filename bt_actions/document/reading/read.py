@@ -51,10 +51,10 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
         )
         return None
     values = read_keys(_without(node, "root"), _but_root(keys), source, keys)
-    if "root" in keys and not library and node.get("root") is None:
-        if all(closest(key.text, keys) != "root" for key, _ in node.pairs):
-            message = "the key 'root' is missing: it holds the tree's nodes"
-            source.report("BT108", start_of(node), message)
+    wanted = "root" in keys and not library and node.get("root") is None
+    if wanted and all(closest(key.text, keys) != "root" for key, _ in node.pairs):
+        message = "the key 'root' is missing: it holds the tree's nodes"
+        source.report("BT108", start_of(node), message)
     document.values = values
     name = values.get("tree")
     document.name = name if isinstance(name, str) else ""
