@@ -26,6 +26,7 @@ class RosHost:
     """What the goals of this process have in common."""
 
     def __init__(self) -> None:
+        self.steady, self.new_goal_id = time.monotonic, new_goal_id
         self.lock = threading.RLock()
         """Taken before a lock of rclpy's, or of a transport's, never after."""
         self.changed = threading.Condition(self.lock)
@@ -55,14 +56,6 @@ class RosHost:
         """Return what is shared in the ROS domain of this number."""
         with self.lock:
             return self._domains.setdefault(number, Domain(number))
-
-    def steady(self) -> float:
-        """Return seconds that only ever go forward."""
-        return time.monotonic()
-
-    def new_goal_id(self) -> bytes:
-        """Return 16 bytes that no goal has had."""
-        return new_goal_id()
 
     def appears(self) -> None:
         """Take note that this process begins to see others now; the caller holds the lock."""

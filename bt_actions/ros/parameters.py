@@ -72,20 +72,17 @@ def declare_input(node: Node, name: str, kind: FieldType, value: object, descrip
     parameter of that name already: then nothing is shown.
     """
     shown = list(_shown(name, kind, to_plain(value)))
-    if any(node.has_parameter(each) for each, *_ in shown):
+    if any(node.has_parameter(each.name) for _, each in shown):
         return False
-    for each, its_kind, its_type, its_value in shown:
-        node.declare_parameter(each, its_type, ignore_override=True)
-        node.set_parameters([Parameter(each, its_type, its_value)])  # so a list may be empty
-        node.set_descriptor(each, _descriptor(its_kind, its_type, description))
+    for its_kind, each in shown:
+        node.declare_parameter(each.name, each.type_, ignore_override=True)
+        node.set_parameters([each])  # so a list may be empty
+        node.set_descriptor(each.name, _descriptor(its_kind, each.type_, description))
     return True
 
 
-_Shown = tuple[str, FieldType, Parameter.Type, Any]
-
-
-def _shown(name: str, kind: FieldType, value: Any) -> Iterator[_Shown]:
-    """The parameters that an input is: names, types as a tree and as ROS has them, values."""
+def _shown(name: str, kind: FieldType, value: Any) -> Iterator[tuple[FieldType, Parameter]]:
+    """The parameters that an input is, and what they are to a tree."""
     if isinstance(kind, Message):
         for field, its_kind in describe(kind.cls).items():
             yield from _shown(f"{name}.{field}", its_kind, value[field])
@@ -93,7 +90,7 @@ def _shown(name: str, kind: FieldType, value: Any) -> Iterator[_Shown]:
     its_type = _type(kind, value)
     if its_type is Parameter.Type.STRING and not isinstance(value, str):
         value = as_json(value)  # which is YAML, and quick for many points
-    yield name, kind, its_type, value
+    yield kind, Parameter(name, its_type, value)
 
 
 def _type(kind: FieldType, value: Any) -> Parameter.Type:
