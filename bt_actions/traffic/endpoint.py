@@ -204,13 +204,17 @@ class ActionEndpoint:
                 self._give_back_time(handle, now.steady)
                 if handle.paused:
                     return
-                if goal.due_in(now) == 0.0:
+                due = goal.due_in(now)
+                if due == 0.0:
                     self.deliver_arrived()
                     now = self.participant.now()
                     self._suspend_after_stall(goal, now)
+                    due = goal.due_in(now)
                 self._host.trace.shows_time(handle)
                 for event in goal.due(now):
                     self._apply(handle, event, now)
+                if due:
+                    self._host.scheduler.wake_by(now.steady + due)
             except Exception as error:  # noqa: BLE001 - a mistake of ours: any
                 self._warn_once("a deadline could not be applied", error)
 

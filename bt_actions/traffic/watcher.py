@@ -53,6 +53,7 @@ class Watcher:
             return self.look_early(now)
         if now >= self._look_at or self._counts_others():
             self.observe_and_tell(now)
+            handover.bound_the_lost(endpoint, self._host)
             unclear = endpoint.watch.state(now) is Server.UNCLEAR
             if unclear or endpoint.has_unsent:
                 self._look_at = now + LOOK_WHILE_WAITING
@@ -68,10 +69,6 @@ class Watcher:
                 wait = min(wait, DELIVER_EVERY)
         for handle in list(endpoint.goals.values()):
             endpoint.apply_deadlines(handle)
-            due = handle.goal.due_in(endpoint.participant.now())
-            if due is not None and not handle.paused:
-                wait = min(wait, due)
-        handover.bound_the_lost(endpoint, self._host)
         return max(wait, 0.001)
 
     @property
