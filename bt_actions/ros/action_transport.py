@@ -107,7 +107,7 @@ class RosTransport:
         """Under the one lock, as all requests."""
         self.on_trial = False
         """The listener has another client; here it wants to hear of statuses alone."""
-        self._closed = False
+        self.closed = False
         check_for_type_support(action_type)
         self._impl = action_type.Impl
         services = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
@@ -194,7 +194,7 @@ class RosTransport:
         taken = self._inbox
         status_type, read_statuses = status_reader()
         with self._lock:
-            if self._closed:
+            if self.closed:
                 return
             with self.handle:
                 for _ in range(TAKE_AT_MOST):
@@ -294,17 +294,12 @@ class RosTransport:
         with self._node.handle:
             return bool(self.handle.is_action_server_available())
 
-    @property
-    def closed(self) -> bool:
-        """Whether it takes and sends nothing any more."""
-        return self._closed
-
     def close(self) -> None:
         """Destroy the client. Answers that are still under way are lost."""
         with self._lock:
-            if self._closed:
+            if self.closed:
                 return
-            self._closed = True
+            self.closed = True
             self.handle.destroy_when_not_in_use()
         self._on_close(self)
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from bt_actions.goals.resources import Resources
 from bt_actions.traffic.cancel_queue import Cancels
 from bt_actions.traffic.effects import Effects
 from bt_actions.traffic.handle import Action, Endpoint, GoalHandle
-
-LOST_KEPT = 100
-"""Goals of one action remembered in case their server, or their request, turns up: the newest."""
 
 
 class Domain:
@@ -29,7 +26,7 @@ class Domain:
         """A server went out of sight once: what else its process serves may have, too."""
         self.known: set[Action] = set()
         """The actions that had a server once."""
-        self.lost: dict[Action, list[GoalHandle]] = {}
+        self.lost: dict[Action, list[GoalHandle]] = defaultdict(list)
         """Lost goals whose endpoint is gone: their server may be back for the next one."""
         self.cancels: dict[Action, Cancels] = defaultdict(Cancels)
         """The cancel requests of this process."""
@@ -38,13 +35,3 @@ class Domain:
         """Yield the goals of all open endpoints."""
         for endpoint in self.open:
             yield from endpoint.goals.values()
-
-    def keep_lost(
-        self, action: Action, handle: GoalHandle, forget: Callable[[bytes], None]
-    ) -> None:
-        """Remember a lost goal whose endpoint goes."""
-        kept = self.lost.setdefault(action, [])
-        kept.append(handle)
-        for forgotten in kept[:-LOST_KEPT]:
-            forget(forgotten.goal.id)
-        del kept[:-LOST_KEPT]

@@ -10,10 +10,13 @@ from __future__ import annotations
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.traffic.domain import LOST_KEPT, Domain
+from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import TOO_NEW
+
+LOST_KEPT = 100
+"""Goals of one action remembered in case their server, or their request, turns up: the newest."""
 
 
 def take_over(endpoint: Endpoint, domain: Domain, now: float) -> None:
@@ -51,7 +54,7 @@ def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
         endpoint.take_in(handle)
 
 
-def park(endpoint: Endpoint, host: Host, domain: Domain, *, all_of_them: bool = False) -> None:
+def park(endpoint: Endpoint, domain: Domain, *, all_of_them: bool = False) -> None:
     """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
     for handle in list(endpoint.goals.values()):
         goal = handle.goal
@@ -59,7 +62,7 @@ def park(endpoint: Endpoint, host: Host, domain: Domain, *, all_of_them: bool = 
             endpoint.tell(handle, Event.PARKED)
         if goal.lost:
             goal.deadlines.clear()  # nobody looks out for its server from now on
-            domain.keep_lost(endpoint.action, handle, host.record.strike)
+            domain.lost[endpoint.action].append(handle)
             endpoint.retire(handle)
 
 

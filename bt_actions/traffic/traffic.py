@@ -79,7 +79,7 @@ class Traffic:
         with self.host.lock:
             endpoint.users -= 1
             if endpoint.users <= 0:
-                handover.park(endpoint, self.host, self._domain)
+                handover.park(endpoint, self._domain)
             self.drop_if_unused(endpoint)
 
     def drop_if_unused(self, endpoint: Endpoint) -> None:
@@ -216,7 +216,7 @@ class Traffic:
         with self.host.lock:
             self.closed = True
             for endpoint in list(self._endpoints.values()):
-                handover.park(endpoint, self.host, self._domain, all_of_them=True)
+                handover.park(endpoint, self._domain, all_of_them=True)
                 for handle in list(endpoint.goals.values()):
                     endpoint.tell(handle, Event.ABANDONED)
                 endpoint.transport.close()

@@ -58,6 +58,7 @@ class ActionTransport(Protocol):
     A request raises whatever the middleware raises where it cannot be sent.
     """
 
+    closed: bool
     on_trial: bool
     """The listener has another transport; of this one it wants to hear of statuses alone."""
 
@@ -103,10 +104,6 @@ class ActionTransport(Protocol):
 
     def close(self) -> None:
         """Send and deliver nothing any more; what is still under way is lost. Twice: fine."""
-
-    @property
-    def closed(self) -> bool:
-        """Whether it was closed."""
 
 
 class Seeker(Protocol):

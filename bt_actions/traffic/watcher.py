@@ -226,4 +226,4 @@ class Watcher:
         patience = max((each.goal.drains_within for each in endpoint.goals.values()), default=0.0)
         silent = self._host.steady() - endpoint.heard_at > max(SILENT_FOR, patience)
         if silent and not self._host.stalls.answers_take(self._host.steady()):
-            handover.park(endpoint, self._host, self._domain, all_of_them=True)
+            handover.park(endpoint, self._domain, all_of_them=True)

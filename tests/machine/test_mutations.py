@@ -231,7 +231,12 @@ def adopts_nothing_that_was_left(patch: Patch) -> None:
 
 @mutation
 def remembers_nothing_that_is_lost(patch: Patch) -> None:
-    patch.setattr(Domain, "keep_lost", lambda self, *lost: None)
+    def park(endpoint: Any, domain: Domain, *, all_of_them: bool = False) -> None:
+        original(endpoint, domain, all_of_them=all_of_them)
+        domain.lost.clear()
+
+    original = handover.park
+    patch.setattr(handover, "park", park)
 
 
 @mutation

@@ -268,7 +268,7 @@ def test_a_client_that_is_destroyed_in_the_executors_hands_does_not_end_the_spin
     alive = threading.Event()
     executor = SingleThreadedExecutor(context=node.context)
     with spinning(node, executor):
-        until(lambda: client._closed, meanwhile=lambda: executor.create_task(alive.clear))
+        until(lambda: client.closed, meanwhile=lambda: executor.create_task(alive.clear))
         executor.create_task(alive.set)
         assert alive.wait(2.0)
 

@@ -29,11 +29,11 @@ NEVER_DONE = (Outcome.CANCELED, Outcome.SERVER_AMBIGUOUS)
 
 def cancel(outcome: Outcome, why: str) -> Step:
     """Return the step that cancels what runs."""
-
-    def step(goal: Facts, detail: Any) -> State:
-        return stop(goal, outcome, goal.say(why, detail))
-
-    return Step(step, frozenset({State.CANCELING}), f"Cancel: {outcome}")
+    return Step(
+        lambda goal, detail: stop(goal, outcome, goal.say(why, detail)),
+        frozenset({State.CANCELING}),
+        f"Cancel: {outcome}",
+    )
 
 
 def stop(goal: Facts, outcome: Outcome, reason: str) -> State:
