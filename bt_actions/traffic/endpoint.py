@@ -119,12 +119,12 @@ class ActionEndpoint:
         """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
         running = []
         for goal_id, status in statuses.items():
-            handle = self._heard_of(goal_id) if status > 0 else None
-            if handle is not None:
+            if goal_id not in self.goals:  # nearly all, of a server that keeps what has ended
+                if 0 < status < STATUS_SUCCEEDED:
+                    self._ended.runs(goal_id)
+                    running.append(goal_id)
+            elif status > 0 and (handle := self._heard_of(goal_id)) is not None:
                 self.pass_on(handle, handle.replies.shown(self.watch, self._host.steady(), status))
-            elif 0 < status < STATUS_SUCCEEDED:
-                self._ended.runs(goal_id)
-                running.append(goal_id)
         self._predecessors.see(running)
 
     def probe_answered(self, probe: int) -> None:
