@@ -13,15 +13,11 @@ The bug is rclpy #1452, mended by rclpy #1547: not needed any more with a releas
 from __future__ import annotations
 
 import threading
-import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from rclpy.executors import MultiThreadedExecutor, TimeoutException
 
-BREATH = 5e-5
-"""Seconds in which whoever was woken by what was served gets the interpreter: the next wait set is
-not made before, with the lock of the interpreter in hand. An action takes a tenth less."""
 AT_MOST = 0.01
 """Seconds for which a spin waits for the pool, and does not notice that it is to end."""
 
@@ -49,7 +45,6 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
         if not getattr(entity, "never_waits", False):
             return super()._make_handler(entity, *args)
         entity.take_data()
-        time.sleep(BREATH)
         return None
 
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
