@@ -58,7 +58,8 @@ class Watcher:
             if unclear or endpoint.has_unsent:
                 self._look_at = now + LOOK_WHILE_WAITING
             elif any(not handle.is_over for handle in endpoint.goals.values()):
-                self._look_at = now + (LOOK_AT_REST if self._rests else LOOK_WHILE_RUNNING)
+                rests = self._is_alone and not any(self._held_back)
+                self._look_at = now + (LOOK_AT_REST if rests else LOOK_WHILE_RUNNING)
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
@@ -72,17 +73,16 @@ class Watcher:
         return max(wait, 0.001)
 
     @property
-    def _rests(self) -> bool:
-        """Whether one server was there at the last look, ready, and for long."""
-        alone = self._looked_like is Server.READY and not self._endpoint.watch.is_crowded
-        return alone and not any(self._held_back)
+    def _is_alone(self) -> bool:
+        """Whether one server was there at the last look, and ready."""
+        return self._looked_like is Server.READY and not self._endpoint.watch.is_crowded
 
     def state_before_send(self, now: float) -> Server:
         """Return the server's state; look, unless that was done just now, and the count is as then.
 
         Who has taken another's place since is seen right after the send.
         """
-        is_new = now - self._looked_at < LOOK_AT_REST and self._rests
+        is_new = now - self._looked_at < LOOK_AT_REST and self._is_alone
         if is_new and self._endpoint.participant.alive() and not self._counts_others():
             return Server.READY
         return self.observe_and_tell(now)
