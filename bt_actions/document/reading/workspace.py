@@ -93,7 +93,7 @@ class Workspace:
                 source.errors = errors
 
     def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
-        key = (_key(source.path or Path(source.name)), False)
+        key = (chain[-1] if chain else _key(Path(source.name)), False)
         if key in self._documents:
             return self._documents[key]
         self._sources.append(source)

@@ -189,7 +189,8 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
     """
     name = name or str(path)
     try:
-        mode = path.stat().st_mode
+        status = path.stat()
+        mode, size = status.st_mode, min(status.st_size, MAX_BYTES)
         if stat.S_ISDIR(mode):
             raise _unreadable(name, "this is a directory, not a tree")
         if stat.S_ISFIFO(mode) and not pipes:
@@ -199,7 +200,9 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
         if not stat.S_ISREG(mode):
             raise _unreadable(name, "this is no regular file")
         with path.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+            data = stream.read(size + 1)  # to ask for more takes that much memory at once
+            if len(data) > size:  # it has grown, or nobody knows how large it is
+                data += stream.read(MAX_BYTES + 1 - len(data))
     except DocumentError:  # is a ValueError, too
         raise
     except FileNotFoundError:
