@@ -25,13 +25,11 @@ from rclpy.utilities import get_default_context
 from bt_actions.ros.alive import is_open
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_OPTIONS = {
-    frozenset({signal.SIGINT, signal.SIGTERM}): SignalHandlerOptions.ALL,
-    frozenset({signal.SIGINT}): SignalHandlerOptions.SIGINT,
-    frozenset({signal.SIGTERM}): SignalHandlerOptions.SIGTERM,
-    frozenset[signal.Signals](): SignalHandlerOptions.NO,
+_BITS: dict[int, int] = {
+    signal.SIGINT: int(SignalHandlerOptions.SIGINT),
+    signal.SIGTERM: int(SignalHandlerOptions.SIGTERM),
 }
-"""What rclpy calls its handlers for these signals."""
+"""What rclpy calls its handlers for these signals; for both, the sum."""
 
 Interrupt = Callable[[bool, bool], bool | None]
 _watch: _Watch | None = None
@@ -100,17 +98,17 @@ class _Watch:
     def take_off(self) -> None:
         """Put all back: SIGINT's handler last of Python's, as KeyboardInterrupt is back with it."""
         if self._had_context and not is_open(get_default_context()):
-            self._rclpys = frozenset()  # rclpy.shutdown() would have taken them off
+            self._rclpys = 0  # rclpy.shutdown() would have taken them off
         meanwhile = _rclpys()  # what an rclpy.init() has put on
         if meanwhile:
             uninstall_signal_handlers()
         # Over which the program has set one of its own, rclpy counts its own as set for ever.
-        self._rclpys = (self._rclpys | meanwhile) - _rclpys()
+        self._rclpys = (self._rclpys | meanwhile) & ~_rclpys()
         try:
             self.put_back()
         finally:
             if self._rclpys:  # after Python's, which would be set over them
-                install_signal_handlers(_OPTIONS[self._rclpys])
+                install_signal_handlers(SignalHandlerOptions(self._rclpys))
 
     def put_back(self) -> None:
         for number in reversed(self._before):
@@ -133,8 +131,8 @@ class _Watch:
         return any(self._is_fatal(number) for number in self._received)
 
     def _is_fatal(self, number: int) -> bool:
-        of_rclpy = self._rclpys | _rclpys()
-        return self._before.get(number) is signal.SIG_DFL and number not in of_rclpy
+        of_rclpy = (self._rclpys | _rclpys()) & _BITS.get(number, 0)
+        return self._before.get(number) is signal.SIG_DFL and not of_rclpy
 
     def let_take_effect(self) -> None:
         """Raise what was received; KeyboardInterrupt last, after which nothing could be."""
@@ -150,7 +148,7 @@ class _Watch:
         self.put_back()
         self._before.clear()
         self._received.clear()
-        self._rclpys = frozenset()
+        self._rclpys = 0
 
     def _note(self, number: int, _frame: object) -> None:
         if self._is_over:  # a handler of the user's calls this one
@@ -166,10 +164,9 @@ class _Watch:
             raise KeyboardInterrupt
 
 
-def _rclpys() -> frozenset[signal.Signals]:
-    """For which signals rclpy's handlers are in force."""
-    now = get_current_signal_handlers_options()
-    return next(numbers for numbers, options in _OPTIONS.items() if options == now)
+def _rclpys() -> int:
+    """For which signals rclpy's handlers are in force, as in `_BITS`."""
+    return int(get_current_signal_handlers_options())
 
 
 def _disown() -> None:
