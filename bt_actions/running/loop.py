@@ -292,7 +292,6 @@ class TickLoop:
 
     def _wind_up(self, drain: Drain) -> Sleep | Done[Status]:
         """Drain the tree's goals, and tell."""
-        self.goals.tell(self._now)
         step = drain.step(self._now, hurry=self.abandoned)
         self.goals.tell(self._now)
         if isinstance(step, Sleep):
