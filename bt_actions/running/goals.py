@@ -6,16 +6,18 @@ Changes are noted on any thread, and told on the one that ticks. Sends nothing.
 
 from __future__ import annotations
 
-import contextlib
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.traffic.begun import begun_in
 from bt_actions.traffic.handle import Change, GoalHandle, Run
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +53,11 @@ class RunGoals:
         self.is_watched = True
         """Whether anybody but its leaf acts on what becomes of a goal."""
 
-    @contextlib.contextmanager
-    def begun_here(self) -> Iterator[None]:
-        """What this thread sets up and ticks meanwhile is ours."""
+    def begun_in(self, step: Callable[[], T]) -> T:
+        """Return what `step` does; what it sets up and ticks is ours."""
         before = begun_in.set(self._run)
         try:
-            yield
+            return step()
         finally:
             begun_in.reset(before)
 

@@ -136,9 +136,7 @@ class TickLoop:
         self._now = now
         if self._drain is None:
             try:
-                with self.goals.begun_here():
-                    seconds = self._go_on()
-                if seconds is not None:
+                if (seconds := self.goals.begun_in(self._go_on)) is not None:
                     return Sleep(seconds)
             except BaseException as error:  # noqa: BLE001 - raised again after the drain
                 self.fail(error)
