@@ -93,7 +93,7 @@ class Admission:
         )
 
     def _left_near(self, handle: GoalHandle) -> list[GoalHandle]:
-        """Return the goals of this process that were lost, or given up and are not accounted for.
+        """Return the goals of this process that were lost, or have given up their resources.
 
         Those that share a server, or resources, with this one.
         """
@@ -101,7 +101,7 @@ class Admission:
         return [
             each
             for each in self._domain.handles()
-            if (each.goal.lost or each.goal.outstanding)
+            if (each.goal.lost or not each.goal.claims_resources)
             and (each.endpoint.action == action or each.goal.resources & handle.goal.resources)
         ]
 

@@ -177,12 +177,12 @@ class Watcher:
 
     def observe(self) -> None:
         """Observe who is in sight; what follows is for `observe_and_tell` to say."""
+        watch = self._endpoint.watch
         with contextlib.suppress(Exception):
-            now, before = self._host.steady(), self._endpoint.watch.gids
-            self._ask_discovery(now, concludes=False)
-            if self._endpoint.watch.gids != before:
-                self._looked_at = NEVER
-            self._was_away |= self._endpoint.watch.state(now) is Server.ABSENT
+            if self._endpoint.transport.servers() != watch.gids:
+                now, self._looked_at = self._host.steady(), NEVER
+                self._ask_discovery(now, concludes=False)
+                self._was_away |= watch.state(now) is Server.ABSENT
 
     def _ask_discovery(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""
