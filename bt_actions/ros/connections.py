@@ -45,11 +45,7 @@ def qos_profile(name: str) -> QoSProfile:
     return {
         "default": QoSProfile(depth=10),
         "sensor": qos_profile_sensor_data,
-        "latched": QoSProfile(
-            depth=1,
-            reliability=ReliabilityPolicy.RELIABLE,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL,
-        ),
+        "latched": QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
         "best_effort": QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT),
         "services": qos_profile_services_default,
     }[name]

@@ -14,7 +14,7 @@ from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.ros.graph import servers
@@ -37,7 +37,7 @@ class ActionView:
         self._client = node.create_client(
             CancelGoal,
             f"{action}/_action/cancel_goal",
-            qos_profile=QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE),
+            qos_profile=QoSProfile(depth=DEPTH),
         )
         self._status = node.create_subscription(
             GoalStatusArray,
@@ -45,7 +45,6 @@ class ActionView:
             lambda _: None,
             QoSProfile(
                 depth=DEPTH,
-                reliability=ReliabilityPolicy.RELIABLE,
                 durability=DurabilityPolicy.TRANSIENT_LOCAL,
             ),
         )

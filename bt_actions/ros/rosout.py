@@ -11,7 +11,7 @@ from typing import Literal
 from rcl_interfaces.msg import Log
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
@@ -31,7 +31,6 @@ class Rosout:
             "/rosout",
             QoSProfile(  # rosout's own
                 depth=1000,
-                reliability=ReliabilityPolicy.RELIABLE,
                 durability=DurabilityPolicy.TRANSIENT_LOCAL,
                 lifespan=Duration(seconds=10),
             ),
