@@ -123,14 +123,17 @@ class Watcher:
     def observe_and_tell(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
         endpoint, watch = self._endpoint, self._endpoint.watch
-        if not endpoint.participant.alive():
+        alive = endpoint.participant.alive()
+        if not alive:
             self._orphan()
-            self._look_blindly(now)
-            return Server.ABSENT
         self._deliver_pending(now)
         if endpoint.transport.closed:  # by what came, and nobody used the endpoint
             return Server.ABSENT
-        before = self._looked_like
+        if not alive:
+            if watch.is_crowded:  # of those shown when the node went, asking tells who lives
+                watch.observe(now, True, watch.gids)
+                self._tell_goals(now)
+            return Server.ABSENT
         try:
             self._ask_discovery(now)
         except Exception:  # noqa: BLE001 - the participant was destroyed since
@@ -139,22 +142,8 @@ class Watcher:
             return Server.ABSENT
         handover.adopt(endpoint, self._host, self._domain)
         handover.take_over(endpoint, self._domain, now)
-        runs = any(handle.goal.sent and not handle.goal.lost for handle in endpoint.goals.values())
-        if self._route.take_question(now) or watch.wants_probe(now, runs=runs):
-            endpoint.probe()
-        for handle in list(endpoint.goals.values()):
-            gone = watch.gone(now, handle.replies.sent_to)
-            if not gone:
-                handle.not_gone_before = NEVER  # it has been discovered
-            if gone and now < handle.not_gone_before:
-                continue  # it has not been discovered yet, though its status may have come already
-            in_sight = handle.replies.sent_to <= watch.gids and not gone
-            if not in_sight and self._host.stalls.servers_take(self._host.steady()) > 0.0:
-                continue  # as this process stood still
-            if handle.goal.sent:
-                if gone and not handle.goal.lost:
-                    endpoint.deliver_arrived()  # its last words
-                endpoint.pass_on(handle, handle.replies.looked(watch, now))
+        self._tell_goals(now)
+        before = self._looked_like
         state = self._looked_like = watch.state(now)
         self._looked_at = now
         if before is Server.ABSENT or self._was_away:
@@ -174,6 +163,26 @@ class Watcher:
                 )
         self._route.seek(now)
         return state
+
+    def _tell_goals(self, now: float) -> None:
+        """Ask who lives, if that is open, and tell each goal what is known of its server."""
+        endpoint, watch = self._endpoint, self._endpoint.watch
+        runs = any(handle.goal.sent and not handle.goal.lost for handle in endpoint.goals.values())
+        if self._route.take_question(now) or watch.wants_probe(now, runs=runs):
+            endpoint.probe()
+        for handle in list(endpoint.goals.values()):
+            gone = watch.gone(now, handle.replies.sent_to)
+            if not gone:
+                handle.not_gone_before = NEVER  # it has been discovered
+            if gone and now < handle.not_gone_before:
+                continue  # it has not been discovered yet, though its status may have come already
+            in_sight = handle.replies.sent_to <= watch.gids and not gone
+            if not in_sight and self._host.stalls.servers_take(self._host.steady()) > 0.0:
+                continue  # as this process stood still
+            if handle.goal.sent:
+                if gone and not handle.goal.lost:
+                    endpoint.deliver_arrived()  # its last words
+                endpoint.pass_on(handle, handle.replies.looked(watch, now))
 
     def observe(self) -> None:
         """Observe who is in sight; what follows is for `observe_and_tell` to say."""
@@ -198,19 +207,6 @@ class Watcher:
             if late or self._host.stalls.answers_take(self._host.steady()):
                 self._endpoint.watch.stood_still(now)
             self._endpoint.deliver_arrived()
-
-    def _look_blindly(self, now: float) -> None:
-        """Of the servers that were shown when the node went, find out by asking who lives."""
-        endpoint, watch = self._endpoint, self._endpoint.watch
-        self._deliver_pending(now)
-        if not watch.is_crowded or endpoint.transport.closed:
-            return
-        watch.observe(now, True, watch.gids)
-        if watch.wants_probe(now):
-            endpoint.probe()
-        for handle in list(endpoint.goals.values()):
-            if handle.goal.sent:
-                endpoint.pass_on(handle, handle.replies.looked(watch, now))
 
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""
