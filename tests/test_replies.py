@@ -58,56 +58,56 @@ def alone(watch: ServerWatch) -> float:
 
 def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
     said = sent(watch)
-    assert said.accepted(watch, 0.0, [True]) == (Event.ACCEPTED, None)
-    assert said.accepted(watch, 0.0, [False]) == (Event.REJECTED, None)
-    assert said.canceled(watch, 0.0, 0.0, [DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
-    assert said.finished(watch, 0.0, 0.0, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
-    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) == (Event.RESULT_UNKNOWN, None)
-    assert said.finished(watch, 0.0, 0.0, [(2, None)]) == (Event.STATUS, 2)
+    assert said.answered("goal", watch, 0.0, 0.0, [True]) == (Event.ACCEPTED, None)
+    assert said.answered("goal", watch, 0.0, 0.0, [False]) == (Event.REJECTED, None)
+    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
+    assert said.answered("result", watch, 0.0, 0.0, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
+    assert said.answered("result", watch, 0.0, 0.0, [UNKNOWN]) == (Event.RESULT_UNKNOWN, None)
+    assert said.answered("result", watch, 0.0, 0.0, [(2, None)]) == (Event.STATUS, 2)
 
 
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    assert events(said.accepted(watch, 0.0, [True])) == [Event.ACCEPTED]
-    assert events(said.accepted(watch, 0.0, [True, True])) == [Event.SERVER_AMBIGUOUS]
+    assert events(said.answered("goal", watch, 0.0, 0.0, [True])) == [Event.ACCEPTED]
+    assert events(said.answered("goal", watch, 0.0, 0.0, [True, True])) == [Event.SERVER_AMBIGUOUS]
     assert watch.both_live
 
 
 def test_one_server_that_accepts_twice_is_one_server(watch: ServerWatch) -> None:
     said = replies.Replies(Goal(b"1", "move", Timeouts(), Now(0.0, 0.0)))
     said.sent_to = frozenset({ONE})
-    assert said.accepted(watch, 0.0, [True, True]) is None
+    assert said.answered("goal", watch, 0.0, 0.0, [True, True]) is None
     assert not watch.both_live
 
 
 def test_what_one_refuses_the_other_may_accept(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.accepted(watch, 0.0, [False]) is None
-    assert events(said.accepted(watch, 0.0, [False, True])) == [Event.ACCEPTED]
-    assert said.accepted(watch, 0.0, [True, False]) is None
-    assert events(said.accepted(watch, 0.0, [False, False])) == [Event.REJECTED]
+    assert said.answered("goal", watch, 0.0, 0.0, [False]) is None
+    assert events(said.answered("goal", watch, 0.0, 0.0, [False, True])) == [Event.ACCEPTED]
+    assert said.answered("goal", watch, 0.0, 0.0, [True, False]) is None
+    assert events(said.answered("goal", watch, 0.0, 0.0, [False, False])) == [Event.REJECTED]
 
 
 def test_a_refusal_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.accepted(watch, 0.0, [False]) is None
+    assert said.answered("goal", watch, 0.0, 0.0, [False]) is None
     assert said.looked(watch, 0.0) is None
     assert events(said.looked(watch, alone(watch))) == [Event.REJECTED]
 
 
 def test_what_one_has_ended_the_other_may_run(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
-    assert said.finished(watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == (Event.RESULT, ABORTED)
+    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
+    assert said.answered("result", watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == (Event.RESULT, ABORTED)
 
 
 def test_what_both_have_ended_was_at_two_servers(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
-    told = said.finished(watch, 0.0, 0.0, [ABORTED, SUCCEEDED])
+    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
+    told = said.answered("result", watch, 0.0, 0.0, [ABORTED, SUCCEEDED])
     assert told == (Event.SERVER_AMBIGUOUS, SUCCEEDED)
     assert watch.both_live
 
 
 def test_an_end_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
+    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
     assert said.looked(watch, 0.0) is None
     assert said.looked(watch, alone(watch)) == (Event.RESULT, ABORTED)
 
@@ -116,20 +116,30 @@ def test_an_end_may_be_that_of_the_one_that_has_gone_since(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
     assert said.looked(watch, 0.0) is None
-    assert said.finished(watch, 0.0, 0.0, [ABORTED]) is None
+    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
     watch.observe(1.0, True, frozenset({ONE}))
     assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED], "ask whoever is left"
-    assert said.finished(watch, 1.1, 0.9, [ABORTED]) is None, "asked while both were there"
-    assert said.finished(watch, 1.2, 1.1, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
+    assert said.answered("result", watch, 1.1, 0.9, [ABORTED]) is None, (
+        "asked while both were there"
+    )
+    assert said.answered("result", watch, 1.2, 1.1, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
 
 
 def test_what_one_denies_the_other_may_have(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.canceled(watch, 0.0, 0.0, [DENIED]) is None
-    assert said.canceled(watch, 0.0, 0.0, [DENIED, CANCELED]) == (Event.CANCEL_ANSWERED, CANCELED)
-    assert said.canceled(watch, 0.0, 0.0, [CANCELED, DENIED]) is None
-    assert said.canceled(watch, 0.0, 0.0, [DENIED, DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
-    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) is None
-    assert events(said.finished(watch, 0.0, 0.0, [UNKNOWN, UNKNOWN])) == [Event.RESULT_UNKNOWN]
+    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED]) is None
+    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED, CANCELED]) == (
+        Event.CANCEL_ANSWERED,
+        CANCELED,
+    )
+    assert said.answered("cancel", watch, 0.0, 0.0, [CANCELED, DENIED]) is None
+    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED, DENIED]) == (
+        Event.CANCEL_ANSWERED,
+        DENIED,
+    )
+    assert said.answered("result", watch, 0.0, 0.0, [UNKNOWN]) is None
+    assert events(said.answered("result", watch, 0.0, 0.0, [UNKNOWN, UNKNOWN])) == [
+        Event.RESULT_UNKNOWN
+    ]
 
 
 def test_two_that_live_are_told_of_where_both_may_have_it(
@@ -162,7 +172,7 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
     assert events(said.looked(watch, 0.0)) == [Event.SERVER_CHANGED]
-    assert said.finished(watch, 0.0, 0.0, [UNKNOWN]) is None
+    assert said.answered("result", watch, 0.0, 0.0, [UNKNOWN]) is None
     assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
 
 
@@ -173,7 +183,7 @@ def test_a_server_that_was_taken_for_dead_is_back_when_that_was_wrong(
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
     said.looked(watch, 0.0)
-    said.finished(watch, 0.0, 0.0, [UNKNOWN])
+    said.answered("result", watch, 0.0, 0.0, [UNKNOWN])
     now = alone(watch)
     told(said, said.looked(watch, now), now)
     assert said._goal.lost
@@ -226,11 +236,11 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
     """It was too busy to be heard, accepts, and is too busy again; the newcomer denies the goal."""
     said = beside_a_newcomer(watch)
     now = alone(watch)
-    assert told(said, said.accepted(watch, now, [True]), now) == [Event.ACCEPTED]
+    assert told(said, said.answered("goal", watch, now, now, [True]), now) == [Event.ACCEPTED]
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
     later = now + NO_SECOND_AFTER
-    assert said.finished(watch, later, now, [UNKNOWN]) is None
+    assert said.answered("result", watch, later, now, [UNKNOWN]) is None
     watch.observe(later, True, BOTH)
     assert said.looked(watch, later) is None
     assert watch.alone_since(later, now), "which would do, had it come later"
@@ -241,12 +251,12 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
 def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -> None:
     said = beside_a_newcomer(watch)
     told(said, (Event.INTERRUPTED, None), 0.0)
-    assert said.canceled(watch, 0.2, 0.1, [DENIED]) is None
+    assert said.answered("cancel", watch, 0.2, 0.1, [DENIED]) is None
     assert said.looked(watch, 0.3) is None
     now = alone(watch)
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
-    assert said.canceled(watch, now, now, [DENIED]) is None
+    assert said.answered("cancel", watch, now, now, [DENIED]) is None
     now += NO_SECOND_AFTER
     assert told(said, said.looked(watch, now), now) == [Event.SERVER_LOST]
     assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"

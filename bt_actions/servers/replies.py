@@ -87,14 +87,14 @@ class Replies:
         self, request: str, watch: ServerWatch, now: float, asked: float, answers: Sequence[Any]
     ) -> Told:
         """Take an answer to a request: "goal", "cancel" or "result"."""
+        self._note_changes(watch, now)
         if request == "goal":
-            return self.accepted(watch, now, answers)
-        take = self.canceled if request == "cancel" else self.finished
+            return self._accepted(watch, now, answers)
+        take = self._canceled if request == "cancel" else self._finished
         return take(watch, now, asked, answers)
 
-    def accepted(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
+    def _accepted(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
         """Take an answer to the goal request: accepted or not."""
-        self._note_changes(watch, now)
         if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:
             return None  # by one, twice
         accepted = sum(answers)
@@ -121,11 +121,10 @@ class Replies:
             return Event.SERVER_AMBIGUOUS, None  # by the one that is gone?
         return Event.REJECTED, None
 
-    def canceled(
+    def _canceled(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[int]
     ) -> Told:
         """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal."""
-        self._note_changes(watch, now)
         if answers[-1] != CANCEL_UNKNOWN_GOAL:
             self.spoke(watch, now)
             return Event.CANCEL_ANSWERED, answers[-1]
@@ -140,11 +139,10 @@ class Replies:
                 return self._denied(now)  # maybe by a newcomer
         return Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL
 
-    def finished(
+    def _finished(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
-        self._note_changes(watch, now)
         runs = [answer for answer in answers if answer[0] not in (0, *ENDS)]
         if runs:  # answered too soon, by a server that is none of rclpy's or rclcpp's
             self._ended = None
