@@ -16,7 +16,8 @@ import select
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+
+from rclpy.logging import get_logger
 
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
@@ -28,14 +29,6 @@ WITHIN = 1.0
 LONGEST = 3000
 """Bytes of a line; a pipe that has room at all has room for 4,096."""
 STDERR = 2
-BY_RCLPY: dict[str, Callable[[Any, str], object]] = {
-    "debug": lambda logger, text: logger.debug(text),
-    "info": lambda logger, text: logger.info(text),
-    "warn": lambda logger, text: logger.warning(text),
-    "error": lambda logger, text: logger.error(text),
-    "fatal": lambda logger, text: logger.fatal(text),
-}
-"""rclpy keeps to one level for each line of code that logs."""
 
 
 class _StandardError(logging.Handler):
@@ -87,9 +80,9 @@ class Log:
         """Log something that needs attention."""
         self._put(self._logger.error, text)
 
-    def by(self, logger: Any, level: str, text: str) -> None:
-        """Log a line of a tree by one of rclpy's loggers; `level` is one of `LEVELS`."""
-        self._put(partial(self._write_by, logger, level), text)
+    def by(self, name: str, level: str, text: str) -> None:
+        """Log a line of a tree by rclpy's logger of this name; `level` is one of `LEVELS`."""
+        self._put(partial(self._write_by, name, LEVELS[level]), text)
 
     def flush(self) -> None:
         """Wait until all that was said is written; not for long, and in vain only once."""
@@ -123,11 +116,11 @@ class Log:
             self._patience = WITHIN
             self._lines.task_done()
 
-    def _write_by(self, logger: Any, level: str, text: str) -> None:
+    def _write_by(self, name: str, level: int, text: str) -> None:
         try:
-            BY_RCLPY[level](logger, text)
-        except Exception:  # noqa: BLE001 - its node is gone, say; the line is not lost
-            self._logger.log(LEVELS[level], text)
+            get_logger(name).log(text, level)  # a new one, as each line of code keeps to one level
+        except Exception:  # noqa: BLE001 - ROS is shut down, say; the line is not lost
+            self._logger.log(level, text)
 
 
 def _has_room() -> None:

@@ -96,7 +96,7 @@ class NodeParticipant:
 
     def log(self, level: str, text: str) -> None:
         """Write a line to the node's log."""
-        log.by(self.node.get_logger(), level, text)
+        log.by(self.node.get_logger().name, level, text)
 
     # What traffic asks for
 

@@ -12,13 +12,12 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 import rclpy.logging
 
 from bt_actions.ros import log as module
-from bt_actions.ros.log import BY_RCLPY, LONGEST, MOST, Log
+from bt_actions.ros.log import LONGEST, MOST, Log
 from bt_actions.traffic.backend import LEVELS
 from tests.support.waiting import until
 
@@ -38,14 +37,15 @@ class Written(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         self.lines.append(f"{record.levelname.lower()}: {record.getMessage()}")
 
-    def __getattr__(self, level: str) -> Any:
-        return lambda text: self.lines.append(f"{level}: {text}")
+    def log(self, text: str, level: int) -> None:
+        self.lines.append(f"{logging.getLevelName(level).lower()}: {text}")
 
 
 @pytest.fixture
 def written(monkeypatch: pytest.MonkeyPatch) -> Iterator[Written]:
     each = Written()
     monkeypatch.setattr(module, "_has_room", lambda: each.reads.wait(60.0))
+    monkeypatch.setattr(module, "get_logger", lambda _name: each)
     yield each
     each.reads.set()
 
@@ -69,7 +69,7 @@ def test_a_line_fits_into_a_pipe_that_has_room(log: Log, written: Written) -> No
 
 def test_a_tree_that_logs_in_a_loop_loses_nothing_that_fits(log: Log, written: Written) -> None:
     for number in range(MOST):
-        log.by(written, "info", str(number))
+        log.by("tree", "info", str(number))
     until(lambda: len(written.lines) == MOST)
     assert written.lines == [f"info: {number}" for number in range(MOST)]
 
@@ -134,7 +134,7 @@ def test_a_terminal_that_nobody_reads_holds_up_nothing() -> None:
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_a_line_looks_as_one_of_rclpys(level: str, capfd: pytest.CaptureFixture[str]) -> None:
-    BY_RCLPY[level](rclpy.logging.get_logger("test"), "of a goal")
+    rclpy.logging.get_logger("test").log("of a goal", LEVELS[level])
     by_rclpy = capfd.readouterr().err
     Log("test")._logger.log(LEVELS[level], "of a goal")
     by_hand = capfd.readouterr().err
