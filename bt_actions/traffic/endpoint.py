@@ -303,7 +303,6 @@ class ActionEndpoint:
             self._host.scheduler.remove(self)
             self.watcher.rest()
             self._traffic.drop_if_unused(self)
-        self._host.trace.retired(handle)
 
     def goals_of(self, owner: Any) -> list[GoalHandle]:
         """Return a leaf's goals that are open here, also what a second server took."""

@@ -99,9 +99,6 @@ class Trace:
     def shows_time(self, handle: GoalHandle) -> None:
         """A goal is about to be shown the time."""
 
-    def retired(self, handle: GoalHandle) -> None:
-        """An endpoint sees to this goal no more."""
-
 
 class Host(Protocol):
     """What the goals of a process, or of one simulated run, have in common."""

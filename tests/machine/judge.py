@@ -322,7 +322,7 @@ class Judge:
             handle.ledger.crowded = True
 
     def is_done(self, handle: GoalHandle) -> None:
-        """A goal is DONE, and its endpoint has retired it."""
+        """A goal is DONE."""
         world, several = self.caller.world, self._may_be_several(handle)
         if self.caller.closed or len(handle.ledger.heard) < 2 or not several:
             return

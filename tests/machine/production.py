@@ -201,11 +201,8 @@ class Witness(Trace):
         if known is not None and self._before is not None:
             shown = None if event.name.endswith("_DUE") else event
             self._caller.judge.after(known, self._before, shown, detail, commands)
-
-    def retired(self, handle: traffic.GoalHandle) -> None:
-        known = self._caller.known(handle.goal)
-        if known is not None and handle.goal.state is State.DONE:
-            self._caller.judge.is_done(known)
+            if handle.goal.state is State.DONE and self._before.state is not State.DONE:
+                self._caller.judge.is_done(known)
 
 
 class ModelHost:
