@@ -77,7 +77,7 @@ class ActionEndpoint:
         self.watcher = Watcher(self, host, domain, self.route)
         self.in_doubt, self.holds_back = self.route.in_doubt, self.route.holds_back
         self.observe, self.observe_and_tell = self.watcher.observe, self.watcher.observe_and_tell
-        self.state_before_send = self.watcher.state_before_send
+        self.recent_state = self.watcher.recent_state
         self.run_due, self.ask_to_cancel = self.watcher.run_due, self._effect_runner.ask_to_cancel
 
     def __repr__(self) -> str:

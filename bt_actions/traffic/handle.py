@@ -87,7 +87,7 @@ class Endpoint(Listener, Scheduled, Protocol):
     def observe_and_tell(self, now: float) -> Server:
         """Observe the server, tell the goals what that means for them, and return its state."""
 
-    def state_before_send(self, now: float) -> Server:
+    def recent_state(self, now: float) -> Server:
         """Return the server's state; observe it, where that may have changed."""
 
     def observe(self) -> None:

@@ -156,7 +156,7 @@ class Traffic:
                 endpoint.tell(handle, Event.INTERRUPTED)
             if handle.goal.state is not State.WAITING_FOR_SERVER:
                 return
-            if endpoint.state_before_send(self.host.steady()) is Server.AMBIGUOUS:
+            if endpoint.recent_state(self.host.steady()) is Server.AMBIGUOUS:
                 endpoint.tell(handle, Event.SERVER_AMBIGUOUS)
             if not self._admission.may_send(handle):
                 return

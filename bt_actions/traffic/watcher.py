@@ -52,14 +52,14 @@ class Watcher:
         if not endpoint.goals:
             return self.look_early(now)
         if now >= self._look_at or self._counts_others():
-            self.observe_and_tell(now)
+            (self.recent_state if self._rests else self.observe_and_tell)(now)
             handover.bound_the_lost(endpoint, self._host)
             unclear = endpoint.watch.state(now) is Server.UNCLEAR
             if unclear or endpoint.has_unsent:
                 self._look_at = now + LOOK_WHILE_WAITING
             elif any(not handle.is_over for handle in endpoint.goals.values()):
-                rests = self._is_alone and not any(self._held_back)
-                self._look_at = now + (LOOK_AT_REST if rests else LOOK_WHILE_RUNNING)
+                rests = self._looked_at + LOOK_AT_REST
+                self._look_at = rests if self._rests else now + LOOK_WHILE_RUNNING
             else:
                 self._look_at = now + LOOK_WHILE_LOST
         wait = self._look_at - now
@@ -77,10 +77,15 @@ class Watcher:
         """Whether one server was there at the last look, and ready."""
         return self._looked_like is Server.READY and not self._endpoint.watch.is_crowded
 
-    def state_before_send(self, now: float) -> Server:
-        """Return the server's state; look, unless that was done just now, and the count is as then.
+    @property
+    def _rests(self) -> bool:
+        """Whether it was so, and nothing is held back from it."""
+        return self._is_alone and not any(self._held_back)
 
-        Who has taken another's place since is seen right after the send.
+    def recent_state(self, now: float) -> Server:
+        """Return the server's state; look, unless that was done lately, and the count is as then.
+
+        Who has taken another's place since is seen right after a send.
         """
         is_new = now - self._looked_at < LOOK_AT_REST and self._is_alone
         if is_new and self._endpoint.participant.alive() and not self._counts_others():
@@ -213,6 +218,7 @@ class Watcher:
         endpoint, now = self._endpoint, self._host.steady()
         if not endpoint.orphaned:
             endpoint.orphaned, endpoint.heard_at = True, now
+            self._looked_like = Server.ABSENT
             if any(not handle.accounted_for for handle in endpoint.goals.values()):
                 self._host.log.warning(f"{endpoint.name}: the node is gone; canceling what it left")
         for handle in list(endpoint.goals.values()):  # also one that was begun since
