@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Protocol
+
+from yaml import Mark
 
 from bt_actions.document.findings import Span
 
@@ -34,22 +35,11 @@ _SPECIAL = re.compile(r"([-+]?)\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 _MAX_DIGITS = 400
 
 
-class Mark(Protocol):
-    """A place in a text, as libyaml has it: counted from 0."""
-
-    @property
-    def index(self) -> int: ...
-    @property
-    def line(self) -> int: ...
-    @property
-    def column(self) -> int: ...
-
-
 class Node:
     """A range of the text; lines and columns count from 1, the end is one past the last."""
 
     __slots__ = ("begin", "end")
-    begin: Mark
+    begin: Mark  # which counts from 0
     end: Mark
 
     @property
