@@ -49,10 +49,8 @@ class Admission:
         left = self._left_near(handle)
         if self._cancel_what_is_back(handle, left):
             left = self._left_near(handle)
-        in_flight = sum(
-            each.goal.in_flight and each.endpoint.action == endpoint.action
-            for each in self._domain.handles()
-        )
+        at_server = (each for each in self._domain.open if each.action == endpoint.action)
+        in_flight = sum(each.goal.in_flight for one in at_server for each in one.goals.values())
         return in_flight < IN_FLIGHT and not any(
             _conflicts_with(each, handle) or _may_come_back_for(each, handle, now) for each in left
         )
