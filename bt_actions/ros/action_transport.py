@@ -181,13 +181,10 @@ class RosTransport:
 
     # Answers
 
-    def deliver_arrived(self) -> bool:
-        """Take and deliver what has arrived, here and now, whether or not somebody spins.
-
-        Returns whether there was anything.
-        """
+    def deliver_arrived(self) -> None:
+        """Take and deliver what has arrived, here and now, whether or not somebody spins."""
         self.take_data()
-        return self.deliver()
+        self.deliver()
 
     def take_data(self) -> None:
         """Take all that has arrived into the inbox."""
@@ -242,8 +239,8 @@ class RosTransport:
         question.answers.append(answer)
         self._inbox.append((kind, question.about, (question.asked, tuple(question.answers))))
 
-    def deliver(self) -> bool:
-        """Deliver what has been taken; return whether there was anything."""
+    def deliver(self) -> None:
+        """Deliver what has been taken."""
         with host.lock:
             any_came = bool(self._inbox)
             while self._inbox:
@@ -255,7 +252,6 @@ class RosTransport:
             if any_came:
                 with contextlib.suppress(Exception):  # nothing was lost by that
                     self._listener.all_delivered()
-            return any_came
 
     def _tell(self, kind: Any, about: Any, detail: Any) -> None:
         tell = self._listener

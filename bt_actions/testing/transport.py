@@ -97,9 +97,8 @@ class VirtualTransport:
 
     # Answers
 
-    def deliver_arrived(self) -> bool:
+    def deliver_arrived(self) -> None:
         """Find nothing: what has arrived was delivered."""
-        return False
 
     def _answered(self, question: _Question, answer: Any) -> None:
         if self.closed or not (question in self._questions or question in self._past):

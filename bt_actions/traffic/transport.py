@@ -86,8 +86,8 @@ class ActionTransport(Protocol):
         But for further acceptances of the newest `GOALS_KEPT` goals.
         """
 
-    def deliver_arrived(self) -> bool:
-        """Deliver what has arrived, here and now; return whether there was anything."""
+    def deliver_arrived(self) -> None:
+        """Deliver what has arrived, here and now."""
 
     @property
     def has_more(self) -> bool:

@@ -101,8 +101,8 @@ class ModelTransport:
         while len(self._past) > GOALS_KEPT:
             del self._past[next(iter(self._past))]
 
-    def deliver_arrived(self) -> bool:
-        return False
+    def deliver_arrived(self) -> None:
+        """Nothing: what has arrived was delivered."""
 
     def close(self) -> None:
         self.closed = True

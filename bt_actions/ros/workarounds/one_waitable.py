@@ -28,8 +28,8 @@ class Taking(Protocol):
     def take_data(self) -> None:
         """Take all that has arrived."""
 
-    def deliver(self) -> bool:
-        """Deliver what was taken; return whether there was anything."""
+    def deliver(self) -> None:
+        """Deliver what was taken."""
 
 
 class OneWaitable(Waitable):  # type: ignore[misc]  # rclpy is not typed
