@@ -174,7 +174,8 @@ class TickLoop:
         wait = min(LONGEST_WAIT, max(0.0, self._deadline - self._now))
         if self._held():
             return min(wait, self.heartbeat)
-        self._burst = (self._burst + 1) % BURST if self._tick() else 0
+        goes_on = self._tick() and (self._visitor.may_go_on or self._has_others)
+        self._burst = (self._burst + 1) % BURST if goes_on else 0
         if self.watchdog.gave_up:
             return None
         if self.tree.root.status in (Status.SUCCESS, Status.FAILURE):
@@ -229,11 +230,16 @@ class TickLoop:
             raise _Abandoned
         return self._misbehaved()
 
+    @property
+    def _has_others(self) -> bool:
+        """Whether anybody else is called at each tick."""
+        tree = self.tree
+        return bool(tree.pre_tick_handlers or tree.post_tick_handlers or len(tree.visitors) > 1)
+
     def _rests_for(self) -> float:
         """Seconds until the next tick, where nothing happens before."""
-        tree, visitor = self.tree, self._visitor
-        others = tree.pre_tick_handlers or tree.post_tick_handlers or len(tree.visitors) > 1
-        watched = bool(others) or visitor.watching
+        visitor = self._visitor
+        watched = self._has_others or visitor.watching
         self.goals.is_watched = watched or bool(self._observers)
         rest = self.heartbeat * (1.0 if watched else RARELY)
         for due_in in visitor.timed:

@@ -79,6 +79,8 @@ class ChangeVisitor(VisitorBase):
         """`due_in` of those that run and have one (ActionBehaviour.due_in)."""
         self.watching = True
         """Whether any that was ticked may watch what tells nobody, as the clock or a variable."""
+        self.may_go_on = True
+        """Whether another tick, at once, may do more: an action's leaf waits for what comes."""
         self._before, self._after_each = before, after_each
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
@@ -134,9 +136,11 @@ class ChangeVisitor(VisitorBase):
             self._running = [node for node in visited if node.status is Status.RUNNING]
             dues = [getattr(node, "due_in", None) for node in self._running]
             self.timed = [due for due in dues if callable(due)]
-            self.watching = any(
-                type(node) not in _PASS_ON and type(node).update is not ActionBehaviour.update
-                for node in visited
+            others = [n for n in visited if type(n).update is not ActionBehaviour.update]
+            self.watching = any(type(node) not in _PASS_ON for node in others)
+            self.may_go_on = self.watching or not all(
+                isinstance(node, composites.Sequence | composites.Selector) and node.memory
+                for node in others
             )
         return changes
 

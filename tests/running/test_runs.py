@@ -85,7 +85,7 @@ class TestTicks:
         stage.loop._observers.clear()
         assert stage.runner.run() is Status.SUCCESS
         assert stage.runner.now < 6.0
-        assert tree.count == 12, "at each end of a goal, and once more as that changed a status"
+        assert tree.count == 8, "at each end of a goal, and until the first is sent"
 
 
 class TestItsEnd:
