@@ -43,8 +43,8 @@ lint: dev ## ruff: rules and formatting; bandit: security
 	$(BIN)/bandit --quiet --recursive --configfile pyproject.toml bt_actions
 
 chaos: dev ## every scenario with killed processes and cut networks, and storms; writes docs/reliability.md
-	$(BIN)/python -m pytest tests/scenarios -m "" --reliability docs/reliability.md
-	$(BIN)/python -m pytest tests --ignore tests/scenarios -m chaos
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/scenarios -m "" --reliability docs/reliability.md
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests --ignore tests/scenarios -m chaos
 
 soak: dev ## 20,000 goals with every fault; an hour or two
 	$(BIN)/python scripts/soak.py

@@ -45,6 +45,7 @@ def record(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> I
     record = Record(
         family=family(request.module.__doc__),
         scenario=sentence(request.node.name),
+        number=request.session.items.index(request.node),
         leniency=1.0 if request.config.getoption("--reliability", None) else ON_A_BUSY_MACHINE,
         did=first_paragraph(request.function.__doc__),
     )
@@ -96,28 +97,24 @@ def pytest_runtest_makereport(
             record.verdict = f"skipped: {report.longrepr[2].removeprefix('Skipped: ')}"
         elif report.failed:
             record.verdict = "failed"
-            if item.config.getoption("--reliability", None):
-                tell_at_once(item, report)
         elif report.when == "call":
             record.verdict = "passed"
     return report
 
 
-def tell_at_once(item: pytest.Item, report: pytest.TestReport) -> None:
-    """Print why a scenario did not hold: a run of an hour may be cut short before its summary."""
-    terminal = item.config.get_terminal_writer()
-    terminal.line()
-    terminal.sep("_", f"{item.name}, {report.when}")
-    terminal.line(report.longreprtext)
-    for title, text in report.sections:
-        terminal.sep("-", title)
-        terminal.line(text)
-
-
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    path = session.config.getoption("--reliability", None)
-    if path:
-        write(Path(path), session.config.stash[_RECORDS])
+    path, records = session.config.getoption("--reliability", None), session.config.stash[_RECORDS]
+    if path and hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["scenarios"] = [record.told() for record in records]
+    elif path:
+        write(Path(path), sorted(records, key=lambda record: record.number))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Take in what a worker of pytest-xdist has recorded; one that crashed leaves nothing."""
+    told = getattr(node, "workeroutput", {}).get("scenarios", [])
+    node.config.stash[_RECORDS] += [Record(**each) for each in told]
 
 
 @pytest.fixture(autouse=True)

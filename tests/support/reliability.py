@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from bt_actions.goals.attempts import AttemptRecord
 from bt_actions.simulation import journal
@@ -44,6 +45,8 @@ class Record:
 
     family: str
     scenario: str
+    number: int = 0
+    """Its place in the report."""
     did: str = ""
     outcome: str = ""
     seconds: float | None = None
@@ -73,6 +76,10 @@ class Record:
             )
             if len(told) > SHOWN:
                 self.shows = summary(self.journals)
+
+    def told(self) -> dict[str, Any]:
+        """Return what its row is made of, as plain data."""
+        return {**vars(self), "journals": [], "visits": []}
 
     @property
     def row(self) -> str:
