@@ -44,6 +44,8 @@ class Asking:
     """What was answered, a code of action_msgs/srv/CancelGoal."""
     denied_since: float | None = None
     """Every answer since then was: unknown goal."""
+    in_vain: bool = False
+    """The end of its tree waited for it in vain; none does again, until its server is back."""
     _denied_at: float = 0.0
 
     def ask(self, now: float) -> float:

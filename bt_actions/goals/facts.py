@@ -62,14 +62,14 @@ class Facts:
         self.feedback: Any = None
         self.claims_resources = True
         """It has its resources, or a place in the queue for them."""
-        self.drain_gave_up = False
-        """The end of its tree waited for it in vain; none does again, until its server is back."""
         self.asking = Asking()
         self.lost_result = LostResult()
         self.deadlines = Deadlines(now)
         self.deadlines.arm(Event.QUEUE_DUE, timeouts.queue)
         self.commands: list[Command] = []
         """Of the step that is being made."""
+        self.detail: Any = None
+        """What came with the event that it is made at."""
 
     @property
     def phase(self) -> State:
@@ -121,10 +121,10 @@ class Facts:
 
     # For the steps
 
-    def say(self, why: str, detail: Any = None) -> str:
+    def say(self, why: str) -> str:
         """Return a reason with the names and numbers of this goal in it."""
         names = ", ".join(sorted(self.resources))
-        return why.format(names=names, server=self.server, limits=self.timeouts, detail=detail)
+        return why.format(names=names, server=self.server, limits=self.timeouts, detail=self.detail)
 
     def plan(self, outcome: Outcome, reason: str) -> None:
         """Let it have this outcome when it has ended, unless that is decided."""
@@ -143,9 +143,10 @@ class Facts:
         else:
             self.settle(self.planned, self.reason)
 
-    def take_result(self, detail: tuple[int, Any]) -> int:
+    def take_result(self) -> int:
         """Keep the result, and note how it ended; return the status."""
-        status, self.result = detail
+        status: int
+        status, self.result = self.detail
         self.end = ENDS[status] if self.accounts_for_all(self.result) else End.UNKNOWN
         return status
 
@@ -174,8 +175,8 @@ class Facts:
         self.deadlines.arm(Event.POLL_DUE, self.asking.ask(self.steady))
 
 
-Does = Callable[[Facts, Any], State | None]
-"""Takes the goal and what came with the event; returns the next state, if it is another one."""
+Does = Callable[[Facts], State | None]
+"""Changes the goal; returns the next state, if it is another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,9 +188,9 @@ class Step:
     """Beside the state in which it is made."""
     says: str
 
-    def __call__(self, goal: Facts, detail: Any = None) -> State:
+    def __call__(self, goal: Facts) -> State:
         """Make it; return the state that follows."""
-        return self.does(goal, detail) or goal.state
+        return self.does(goal) or goal.state
 
 
 def leads_to(*to: State) -> Callable[[Does], Step]:
@@ -201,5 +202,5 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
 
 @leads_to()
-def drop(goal: Facts, detail: Any) -> None:
+def drop(goal: Facts) -> None:
     """Nothing: it came too late, or twice, to mean anything."""

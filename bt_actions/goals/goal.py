@@ -62,7 +62,8 @@ class Goal(Facts):
         if event in FROM_SERVER and self.asking.hear() and not is_over:
             self.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)  # it can be asked again
         step, previous = TABLE[self.state, event], self.state
-        state = step(self, detail)
+        self.detail = detail
+        state = step(self)
         assert state is previous or state in step.to, f"{event} took {self!r} to {state}"
         if state is State.DONE and previous is not State.DONE:
             self.deadlines.clear()
@@ -126,7 +127,7 @@ class Goal(Facts):
     def outstanding(self) -> bool:
         """Whether a server that has it must be rid of it before it gets another goal."""
         unknown = not self.claims_resources and self.end is End.UNKNOWN and self.sent
-        return unknown and (self.accepted or not self.drain_gave_up)
+        return unknown and (self.accepted or not self.asking.in_vain)
 
     def blocks(self, other: Goal, *, same_server: bool) -> bool:
         """Whether this goal, given up as it is, must be accounted for before `other` is sent."""

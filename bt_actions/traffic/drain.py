@@ -62,7 +62,7 @@ class Drain:
             self._waits = [
                 handle
                 for handle in self._wanted
-                if _may_end(handle) and not handle.goal.drain_gave_up
+                if _may_end(handle) and not handle.goal.asking.in_vain
             ]
             self._gives_up_at: float | None = None
             self._lost: set[GoalHandle] = set()

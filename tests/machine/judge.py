@@ -195,7 +195,7 @@ class Judge:
         else:
             settled = goal.outcome is not None and goal.end is not End.UNKNOWN
             excused = settled or (
-                goal.may_still_be_accepted and goal.drain_gave_up and not goal.claims_resources
+                goal.may_still_be_accepted and goal.asking.in_vain and not goal.claims_resources
             )
         self._hold(excused, f"no deadline is forgotten ({state.name})")
 
@@ -310,7 +310,7 @@ class Judge:
                 )
                 excused: str | bool = other.ledger.excuse
                 excused = excused or (other.ledger.crowded and len(other.ledger.heard) < 2)
-                excused = excused or (other.goal.drain_gave_up and not other.goal.accepted)
+                excused = excused or (other.goal.asking.in_vain and not other.goal.accepted)
                 rule = f"{other} was given up, and is canceled before {handle} is sent there"
                 self._hold(not runs or excused, rule)
             elif other is not handle and other.endpoint.name == handle.endpoint.name:
@@ -381,7 +381,7 @@ class Judge:
             or (handle.goal.outcome is not None and handle.goal.end is not End.UNKNOWN)
             or (
                 handle.goal.may_still_be_accepted
-                and handle.goal.drain_gave_up
+                and handle.goal.asking.in_vain
                 and not handle.goal.claims_resources
             )
             for handle in self.caller.handles
@@ -395,7 +395,7 @@ class Judge:
             goal = handle.goal
             done = goal.state is State.DONE or goal.end is not End.UNKNOWN
             done |= (
-                goal.may_still_be_accepted and goal.drain_gave_up and not goal.claims_resources
+                goal.may_still_be_accepted and goal.asking.in_vain and not goal.claims_resources
             )  # and reported so
             self._hold(goal.outcome is not None and done, f"every goal ends: {handle} {goal!r}")
             self._hold(
@@ -426,7 +426,7 @@ class Judge:
         else:
             forgot = any(job.goal_id not in job.server.jobs for job in jobs)
             dead = any(not job.server.alive for job in jobs)
-            asked = goal.may_still_be_accepted and goal.drain_gave_up  # it was never answered
+            asked = goal.may_still_be_accepted and goal.asking.in_vain  # it was never answered
             another = len(handle.replies.sent_to) > 1  # as far as is known, and it denied the goal
             cause = closed or ledger.crowded or forgot or dead or asked or another
             self._hold(cause, f"UNKNOWN with a cause: {said}")

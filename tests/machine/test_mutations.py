@@ -64,8 +64,8 @@ def ignore(patch: Patch, event: Event, *states: State) -> None:
 
 @mutation
 def forgets_the_cancel_before_acceptance(patch: Patch) -> None:
-    def accepted(goal: Facts, detail: Any) -> State:
-        state = requested.turned_up(goal, detail)
+    def accepted(goal: Facts) -> State:
+        state = requested.turned_up(goal)
         goal.commands.remove(Command.CANCEL)
         return state
 
@@ -115,8 +115,8 @@ def retries_beside_a_server_that_is_gone(patch: Patch) -> None:
 
 @mutation
 def waits_for_feedback_of_a_goal_that_has_ended(patch: Patch) -> None:
-    def seen(goal: Facts, detail: Any) -> State:
-        state = running.status(goal, detail)
+    def seen(goal: Facts) -> State:
+        state = running.status(goal)
         goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback)
         return state
 
@@ -138,18 +138,18 @@ def keeps_the_resource(patch: Patch) -> None:
 
 @mutation
 def releases_when_the_leaf_stops_waiting(patch: Patch) -> None:
-    def cancel_due(goal: Facts, detail: Any) -> State:
+    def cancel_due(goal: Facts) -> State:
         goal.release()
-        return canceling.cancel_due(goal, detail)
+        return canceling.cancel_due(goal)
 
     decide(patch, Event.CANCEL_DUE, cancel_due, State.CANCELING)
 
 
 @mutation
 def releases_when_the_cancel_is_sent(patch: Patch) -> None:
-    def interrupted(goal: Facts, detail: Any) -> State:
+    def interrupted(goal: Facts) -> State:
         goal.release()
-        return interrupt(goal, detail)
+        return interrupt(goal)
 
     interrupt = TABLE[State.EXECUTING, Event.INTERRUPTED]
     decide(patch, Event.INTERRUPTED, interrupted, State.EXECUTING)
@@ -157,7 +157,7 @@ def releases_when_the_cancel_is_sent(patch: Patch) -> None:
 
 @mutation
 def cancels_after_done(patch: Patch) -> None:
-    def again(goal: Facts, detail: Any) -> State:
+    def again(goal: Facts) -> State:
         goal.commands.append(Command.CANCEL)
         return State.DONE
 
@@ -177,8 +177,8 @@ def ignores_that_the_server_was_lost(patch: Patch) -> None:
 
 @mutation
 def forgets_a_lost_goal(patch: Patch) -> None:
-    def lose(goal: Facts, detail: Any) -> State:
-        canceling.server_lost(goal, detail)
+    def lose(goal: Facts) -> State:
+        canceling.server_lost(goal)
         return State.DONE
 
     decide(patch, Event.SERVER_LOST, lose, State.EXECUTING)
@@ -256,8 +256,9 @@ def reports_success_though_it_was_interrupted(patch: Patch) -> None:
 
 @mutation
 def calls_a_failed_goal_succeeded(patch: Patch) -> None:
-    def finished(goal: Facts, detail: Any) -> State:
-        return running.finished(goal, (4, detail[1]))
+    def finished(goal: Facts) -> State:
+        goal.detail = 4, goal.detail[1]
+        return running.finished(goal)
 
     decide(patch, Event.RESULT, finished, State.EXECUTING)
 
@@ -338,8 +339,8 @@ def forgets_who_waits(patch: Patch) -> None:
 
 @mutation
 def says_gone_for_every_end(patch: Patch) -> None:
-    def close(goal: Facts, detail: Any) -> State:
-        state = canceling.finished(goal, detail)
+    def close(goal: Facts) -> State:
+        state = canceling.finished(goal)
         goal.end = End.SERVER_GONE
         return state
 

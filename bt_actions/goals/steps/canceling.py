@@ -9,8 +9,6 @@ and the goal is kept: where its server is seen again, it is canceled first of al
 
 from __future__ import annotations
 
-from typing import Any
-
 from bt_actions.goals.asking import ASK_AGAIN, LOOKED_OUT_FOR
 from bt_actions.goals.facts import Facts, Step, leads_to
 from bt_actions.goals.policy import End, Outcome
@@ -30,7 +28,7 @@ NEVER_DONE = (Outcome.CANCELED, Outcome.SERVER_AMBIGUOUS)
 def cancel(outcome: Outcome, why: str) -> Step:
     """Return the step that cancels what runs."""
     return Step(
-        lambda goal, detail: stop(goal, outcome, goal.say(why, detail)),
+        lambda goal: stop(goal, outcome, goal.say(why)),
         frozenset({State.CANCELING}),
         f"Cancel: {outcome}",
     )
@@ -51,7 +49,7 @@ def _plan_anew(goal: Facts, outcome: Outcome, why: str) -> None:
 
 
 @leads_to()
-def interrupted(goal: Facts, detail: Any) -> None:
+def interrupted(goal: Facts) -> None:
     """Whatever it was canceled for, its outcome will be CANCELED."""
     asked_at = goal.asking.asked_at
     is_news = goal.outcome is not None or goal.planned is not Outcome.CANCELED
@@ -61,22 +59,22 @@ def interrupted(goal: Facts, detail: Any) -> None:
 
 
 @leads_to()
-def replaced(goal: Facts, detail: Any) -> None:
+def replaced(goal: Facts) -> None:
     """Whatever it was canceled for, it must not be tried again beside the newer one."""
     _plan_anew(goal, Outcome.CANCELED, "replaced by a newer goal")
 
 
 @leads_to()
-def taken_by_two(goal: Facts, detail: Any) -> None:
+def taken_by_two(goal: Facts) -> None:
     """Cancel, at both; it must not count as done, or be tried again."""
     _plan_anew(goal, Outcome.SERVER_AMBIGUOUS, "both of two servers may have it")
     goal.ask()
 
 
 @leads_to(State.DONE)
-def finished(goal: Facts, detail: Any) -> State:
+def finished(goal: Facts) -> State:
     """What it was canceled for; SUCCEEDED, late, if only a deadline had passed."""
-    if goal.take_result(detail) == STATUS_SUCCEEDED and goal.planned not in NEVER_DONE:
+    if goal.take_result() == STATUS_SUCCEEDED and goal.planned not in NEVER_DONE:
         goal.settle(Outcome.SUCCEEDED, f"late: {goal.reason}")
     if goal.outcome is None and goal.asking.answer == CANCEL_REJECTED:
         goal.reason += goal.cancel_said
@@ -85,13 +83,13 @@ def finished(goal: Facts, detail: Any) -> State:
 
 
 @leads_to()
-def cancel_answered(goal: Facts, detail: Any) -> None:
+def cancel_answered(goal: Facts) -> None:
     """Take note of it: what counts is how the goal ends, or how long it is denied."""
-    goal.asking.answered(detail, goal.steady)
+    goal.asking.answered(goal.detail, goal.steady)
 
 
 @leads_to(State.DONE)
-def cancel_due(goal: Facts, detail: Any) -> State:
+def cancel_due(goal: Facts) -> State:
     """The leaf is free; the server is asked on and on, unless the status shows the end."""
     if goal.lost_result.status is None:
         goal.settle_as_planned()
@@ -100,13 +98,13 @@ def cancel_due(goal: Facts, detail: Any) -> State:
     if goal.lost_result.questions > 1:
         return goal.end_by_status()
     if goal.lost_result.questions == 0:
-        ask_again(goal, None)
+        ask_again(goal)
     goal.deadlines.arm(Event.CANCEL_DUE, ASK_AGAIN)  # the result itself tells more
     return State.CANCELING
 
 
 @leads_to(State.DONE)
-def ask_again(goal: Facts, detail: Any) -> State:
+def ask_again(goal: Facts) -> State:
     """Ask again; after several questions for a result believe the status."""
     if goal.lost_result.asked_in_vain():
         return goal.end_by_status()
@@ -115,9 +113,9 @@ def ask_again(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def drain_gave_up(goal: Facts, detail: Any) -> State:
+def drain_gave_up(goal: Facts) -> State:
     """Nobody waits any longer; what is not known by now is UNKNOWN, and may become known."""
-    goal.drain_gave_up = True
+    goal.asking.in_vain = True
     if goal.lost_result.questions > 0:
         return goal.end_by_status()
     goal.settle_as_planned()
@@ -127,9 +125,9 @@ def drain_gave_up(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.LOST, State.DONE)
-def server_lost(goal: Facts, detail: Any) -> State:
+def server_lost(goal: Facts) -> State:
     """Free the leaf: SERVER_LOST; keep the goal, in case the server is not dead."""
-    goal.settle_as_planned(Outcome.SERVER_LOST, str(detail))
+    goal.settle_as_planned(Outcome.SERVER_LOST, str(goal.detail))
     goal.asking.denied_since = None
     if goal.phase is not State.NOT_RECEIVED:  # what was denied for less may have come since
         goal.end = End.SERVER_GONE
@@ -140,7 +138,7 @@ def server_lost(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.LOST, State.DONE)
-def parked(goal: Facts, detail: Any) -> State:
+def parked(goal: Facts) -> State:
     """Keep the goal for the next node that sees its server; what is not known stays UNKNOWN."""
     goal.settle_as_planned(Outcome.CANCELED, "its node was closed")
     if goal.may_still_be_accepted:
@@ -157,14 +155,14 @@ def _keep(goal: Facts) -> State:
 
 
 @leads_to(State.CANCELING, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED, State.NOT_RECEIVED)
-def returned(goal: Facts, detail: Any) -> State:
+def returned(goal: Facts) -> State:
     """Cancel what it may still run."""
     goal.asking.begin_anew(goal.steady)
     if goal.phase is State.NOT_RECEIVED:  # nor will it; to ask does no harm
         goal.commands.append(Command.CANCEL)
         return State.NOT_RECEIVED
     goal.end = End.UNKNOWN
-    goal.drain_gave_up = False  # there is somebody again who can tell
+    goal.asking.in_vain = False  # there is somebody again who can tell
     goal.ask()
     if goal.accepted:
         return State.CANCELING
@@ -175,13 +173,13 @@ def returned(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.CANCELING)
-def runs(goal: Facts, detail: Any) -> State:
+def runs(goal: Facts) -> State:
     """It runs, so its server is back: canceled at once."""
     return (returned if goal.accepted else requested.turned_up)(goal)
 
 
 @leads_to()
-def ask_another(goal: Facts, detail: Any) -> None:
+def ask_another(goal: Facts) -> None:
     """Ask for the result; what is to be canceled, is asked to cancel again, too."""
     if goal.state not in (State.EXECUTING, State.REPLACED):
         goal.commands.append(Command.CANCEL)
@@ -190,11 +188,11 @@ def ask_another(goal: Facts, detail: Any) -> None:
 
 
 @leads_to()
-def looked_out(goal: Facts, detail: Any) -> None:
+def looked_out(goal: Facts) -> None:
     """Nobody waits for it any more; should its server be back all the same, it is canceled."""
 
 
 @leads_to(State.DONE)
-def abandoned(goal: Facts, detail: Any) -> State:
+def abandoned(goal: Facts) -> State:
     """Forget it; what is not known by now stays so."""
     return State.DONE

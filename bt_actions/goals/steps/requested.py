@@ -7,8 +7,6 @@ tree need not wait; whenever it turns up, it is canceled.
 
 from __future__ import annotations
 
-from typing import Any
-
 from bt_actions.goals.asking import ASK_IN_ANY_CASE
 from bt_actions.goals.facts import Facts, Step, leads_to
 from bt_actions.goals.policy import End, Outcome
@@ -18,15 +16,15 @@ from bt_actions.goals.terms import Command, Event, State
 def give_up(outcome: Outcome, why: str) -> Step:
     """Return the step that ends what was not sent."""
 
-    def step(goal: Facts, detail: Any) -> State:
-        goal.settle(outcome, goal.say(why, detail))
+    def step(goal: Facts) -> State:
+        goal.settle(outcome, goal.say(why))
         return State.DONE
 
     return Step(step, frozenset({State.DONE}), f"Give up: {outcome}")
 
 
 @leads_to(State.WAITING_FOR_SERVER)
-def granted(goal: Facts, detail: Any) -> State:
+def granted(goal: Facts) -> State:
     """Hold the resources, and wait for the server."""
     goal.deadlines.disarm(Event.QUEUE_DUE)
     goal.deadlines.arm(Event.SERVER_DUE, goal.timeouts.server)
@@ -34,7 +32,7 @@ def granted(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.SENDING)
-def send(goal: Facts, detail: Any) -> State:
+def send(goal: Facts) -> State:
     """Send it; until the server says how it ended, its end is UNKNOWN."""
     goal.deadlines.disarm(Event.SERVER_DUE)
     goal.deadlines.suspend(0.0, goal.deadlines.now)  # it was for a server that is out of sight
@@ -45,16 +43,16 @@ def send(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def send_failed(goal: Facts, detail: Any) -> State:
+def send_failed(goal: Facts) -> State:
     """Give up: SERVER_UNAVAILABLE; nothing was started."""
     goal.end = End.NEVER_STARTED
-    why = f"the goal request could not be sent: {detail}"
+    why = f"the goal request could not be sent: {goal.detail}"
     goal.settle(goal.planned or Outcome.SERVER_UNAVAILABLE, why)
     return State.DONE
 
 
 @leads_to(State.EXECUTING)
-def begin(goal: Facts, detail: Any) -> State:
+def begin(goal: Facts) -> State:
     """Ask for the result; timeout.result and timeout.feedback begin."""
     goal.deadlines.disarm(Event.ACCEPT_DUE)
     goal.deadlines.arm(Event.RESULT_DUE, goal.timeouts.result)
@@ -65,7 +63,7 @@ def begin(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def rejected(goal: Facts, detail: Any) -> State:
+def rejected(goal: Facts) -> State:
     """Nothing was started: REJECTED, or what it was canceled for."""
     goal.end = End.NEVER_STARTED
     why = f"{goal.server} refused the goal"
@@ -78,8 +76,8 @@ def rejected(goal: Facts, detail: Any) -> State:
 def withdraw(outcome: Outcome, why: str) -> Step:
     """Return the step for a goal that is not wanted any more before it was accepted."""
 
-    def step(goal: Facts, detail: Any) -> State:
-        goal.plan(outcome, goal.say(why, detail))
+    def step(goal: Facts) -> State:
+        goal.plan(outcome, goal.say(why))
         if goal.timeouts.accept is None:
             goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience)
         if outcome is Outcome.SERVER_AMBIGUOUS:  # whoever has it
@@ -91,7 +89,7 @@ def withdraw(outcome: Outcome, why: str) -> Step:
 
 
 @leads_to(State.UNCONFIRMED)
-def accept_due(goal: Facts, detail: Any) -> State:
+def accept_due(goal: Facts) -> State:
     """Ask by canceling, and give the server timeout.accept again to answer that."""
     if goal.planned is None:
         goal.plan(
@@ -104,7 +102,7 @@ def accept_due(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.PRESUMED_NOT_RECEIVED, State.NOT_RECEIVED)
-def presume(goal: Facts, detail: Any) -> State:
+def presume(goal: Facts) -> State:
     """The leaf is free; if the server has denied the goal just now: NEVER_STARTED."""
     goal.settle_as_planned()
     if not goal.asking.denied_lately(goal.steady):
@@ -128,16 +126,16 @@ def _denied_for_long(goal: Facts) -> State:
 
 
 @leads_to(State.NOT_RECEIVED)
-def denied_again(goal: Facts, detail: Any) -> State:
+def denied_again(goal: Facts) -> State:
     """Denied for 30 s, nobody need wait for it any more."""
-    goal.asking.answered(detail, goal.steady)
-    if not goal.drain_gave_up:  # after its server was back, it was UNKNOWN until now
+    goal.asking.answered(goal.detail, goal.steady)
+    if not goal.asking.in_vain:  # after its server was back, it was UNKNOWN until now
         goal.end = End.NEVER_STARTED
     return _denied_for_long(goal)
 
 
 @leads_to(State.CANCELING)
-def turned_up(goal: Facts, detail: Any) -> State:
+def turned_up(goal: Facts) -> State:
     """It was accepted after nobody wanted it any more: canceled at once, however late."""
     goal.end = End.UNKNOWN
     goal.asking.denied_since = None

@@ -5,8 +5,6 @@ Most of them are the same whether it is still wanted or not.
 
 from __future__ import annotations
 
-from typing import Any
-
 from bt_actions.goals.asking import ASK_AGAIN, ASK_IN_ANY_CASE, DOUBTS, LostResult
 from bt_actions.goals.facts import PATIENCE, Facts, leads_to
 from bt_actions.goals.policy import Outcome
@@ -23,35 +21,35 @@ from bt_actions.goals.terms import (
 
 
 @leads_to()
-def feedback(goal: Facts, detail: Any) -> None:
+def feedback(goal: Facts) -> None:
     """The silence is over; timeout.feedback begins anew."""
-    still_runs(goal, detail)
+    still_runs(goal)
     if goal.lost_result.status is None:
         goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback)
 
 
 @leads_to()
-def still_runs(goal: Facts, detail: Any) -> None:
+def still_runs(goal: Facts) -> None:
     """It runs, whoever has denied it, or, long ago, shown that it had ended."""
-    goal.feedback = detail
+    goal.feedback = goal.detail
     goal.lost_result.denials = 0
     if goal.lost_result.questions > 0:
         goal.lost_result = LostResult()
 
 
 @leads_to()
-def status(goal: Facts, detail: Any) -> None:
+def status(goal: Facts) -> None:
     """If it has ended, its result is due, and asked for again in case it was lost."""
-    if detail not in ENDS:
+    if goal.detail not in ENDS:
         goal.lost_result = LostResult()
     elif goal.lost_result.status is None:
-        goal.lost_result.status = detail
+        goal.lost_result.status = goal.detail
         goal.deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended
         goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)
 
 
 @leads_to(State.DONE)
-def ask_for_result(goal: Facts, detail: Any) -> State:
+def ask_for_result(goal: Facts) -> State:
     """Ask again; after several questions believe the status."""
     if goal.lost_result.asked_in_vain():
         goal.settle_as_planned(Outcome.SERVER_LOST, f"{goal.server} finished, but gave no result")
@@ -63,9 +61,9 @@ def ask_for_result(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def finished(goal: Facts, detail: Any) -> State:
+def finished(goal: Facts) -> State:
     """SUCCEEDED, ABORTED or CANCELED_BY_OTHER."""
-    ended = goal.take_result(detail)
+    ended = goal.take_result()
     told = {
         STATUS_CANCELED: "canceled, and not by this process",
         STATUS_ABORTED: f"aborted by {goal.server}",
@@ -75,7 +73,7 @@ def finished(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.DONE)
-def denied(goal: Facts, detail: Any) -> State:
+def denied(goal: Facts) -> State:
     """Ask again; believed the third time: SERVER_LOST, or what it was canceled for."""
     goal.lost_result.denials += 1
     if goal.lost_result.denials < DOUBTS:
@@ -89,10 +87,10 @@ def denied(goal: Facts, detail: Any) -> State:
 
 
 @leads_to(State.REPLACED, State.CANCELING)
-def replaced(goal: Facts, detail: Any) -> State:
+def replaced(goal: Facts) -> State:
     """Give it timeout.cancel to end by itself; where another server has the newer, cancel."""
-    if detail not in (None, goal.server):
-        return canceling.stop(goal, Outcome.CANCELED, f"replaced by a newer goal on {detail}")
+    if goal.detail not in (None, goal.server):
+        return canceling.stop(goal, Outcome.CANCELED, f"replaced by a newer goal on {goal.detail}")
     if goal.state is State.EXECUTING:  # else by a newer one still, which gives it no more time
         goal.plan(Outcome.CANCELED, "replaced by a newer goal")
         goal.deadlines.disarm(Event.RESULT_DUE, Event.FEEDBACK_DUE)
