@@ -995,10 +995,10 @@ class TestTwice:
     def test_shutdown_waits_for_what_the_second_server_took(
         self, new_host: HostFactory, name: str, node: Any, loop: str, record: Record
     ) -> None:
-        """The second server wakes up when the run is over, and takes 2 s to cancel; shutdown"""
+        """The second server wakes up when the run is over, and takes 1.5 s to cancel; shutdown"""
         one, other = new_host(short_lease=False), new_host(short_lease=False)
         one.open(name)
-        journal = other.open(name, "*:slow=100", "*:delay_cancel=2")
+        journal = other.open(name, "*:slow=100", "*:delay_cancel=1.5")
         leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=20.0))
         until_both_hear(leaf, node)
         other.freeze()
