@@ -23,6 +23,7 @@ from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.messages.conversion import MessageError, fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
+from bt_actions.traffic.drain import drain
 from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
@@ -257,7 +258,7 @@ class ActionBehaviour(Behaviour):
         leaves = [leaf for leaf in tree if isinstance(leaf, ActionBehaviour)]
         for leaf in leaves:
             ActionBehaviour.terminate(leaf, Status.INVALID)
-        traffic.drain([handle for leaf in leaves for handle in leaf.open_handles()])
+        drain(traffic.host, [handle for leaf in leaves for handle in leaf.open_handles()])
         for leaf in leaves:
             leaf._leave_endpoint()  # noqa: SLF001 - of our own kind
 

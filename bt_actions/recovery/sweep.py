@@ -164,7 +164,9 @@ class _Sweep:
             looking = now < self._deadline and (now < until or bool(lacks))
             if looking or self._awaits(now):
                 looked = now
-            elif now >= looked + self._patience or self._over:
+            elif now >= looked + self._patience or all(
+                left.is_over for left in self._left.values()
+            ):
                 break
             overdue = [name for name in lacks if looking and self._calls[name].overdue(now)]
             if overdue and now >= until and not self._has_waited:
@@ -222,11 +224,6 @@ class _Sweep:
             for action, call in sorted(self._calls.items())
             if not call.known and (action in required or (self._wanted is None and call.servers))
         ]
-
-    @property
-    def _over(self) -> bool:
-        """Whether every goal that was found has ended."""
-        return all(left.is_over for left in self._left.values())
 
     def _awaits(self, now: float) -> bool:
         """Whether a goal may turn up yet at a server in sight."""

@@ -30,7 +30,7 @@ def close_process() -> None:
         with host.lock:
             host.closing = True
             endpoints = [endpoint for domain in host.domains for endpoint in domain.open]
-            handles = [handle for endpoint in endpoints for handle in endpoint.goals.values()]
+            handles = [handle for endpoint in endpoints for handle in endpoint.handles]
         left = [handle for handle in handles if not handle.goal.lost or handle.looked_out_for]
         try:
             drain(host, left, lambda: hurried)

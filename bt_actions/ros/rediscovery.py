@@ -81,9 +81,7 @@ class SecondParticipant:
         participant.close(self.node, self.node.context)
 
 
-def look_for(
-    seeker: Seeker, action: str, domain: int, enclave: str, *, at_once: bool = False
-) -> None:
+def look_for(seeker: Seeker, action: str, domain: int, enclave: str, *, at_once: bool) -> None:
     """Look for the servers that it misses, until it misses none; the caller holds the lock.
 
     In the enclave of its node, which may be allowed to look where others are not.

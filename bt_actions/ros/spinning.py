@@ -63,7 +63,7 @@ class Spinner:
         name: str = "",
         namespace: str = "",
         context: Context | None = None,
-        died: Callable[[], None] = lambda: None,
+        died: Callable[[], None],
     ) -> None:
         self._users = [died]
         self.error: BaseException | None = None
@@ -185,10 +185,9 @@ class Spinner:
         executor = self.executor
         return self.spins and any(_spins(executor, f) or _calls(executor, f) for f in _frames())
 
-    @property
-    def is_stopped_by_one(self) -> bool:
-        """Whether it has one user left."""
-        return len(self._users) == 1
+    def would_wait_for_itself(self) -> bool:
+        """Whether this thread was called so, and there is one user left, who is to stop it."""
+        return len(self._users) == 1 and self.is_called()
 
     @contextlib.contextmanager
     def replaced(self) -> Iterator[None]:
@@ -242,16 +241,15 @@ class Spinner:
     def _spin(self) -> None:
         """Spin until told to stop; an executor that was given must stay usable, so no shutdown."""
         try:
-            while not self._stopping and not self._left():
+            while not self._stopping:
+                if self._left():
+                    raise self._gone()
                 self.executor.spin_once()  # says nothing of an executor that was shut down
                 if not self.node.context.ok():
                     raise ExternalShutdownException
         except BaseException as error:  # noqa: BLE001 - a dead spin thread must not go unnoticed
             if not self._stopping:
                 self._dies(self._gone() if self._left() else error)
-        else:
-            if not self._stopping:
-                self._dies(self._gone())
 
     def _dies(self, error: BaseException) -> None:
         self.error = error

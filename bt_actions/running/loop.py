@@ -22,7 +22,7 @@ from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeSt
 from bt_actions.running.goals import RunGoals
 from bt_actions.running.ticking import RARELY, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
-from bt_actions.traffic.drain import Drain
+from bt_actions.traffic.drain import Drain, drain
 from bt_actions.utilities.places import culprit_of, path_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
@@ -252,7 +252,7 @@ class TickLoop:
         """Whether the tree is paused; carries a change of that over to goals not sent yet."""
         if self._pause_wanted != self._paused:
             self._paused = self._pause_wanted
-            (self._traffic.pause if self._paused else self._traffic.resume)(self.goals.not_over)
+            self._traffic.pause(self.goals.not_over, self._paused)
         return self._paused
 
     def _guarded(self, step: Callable[[], None]) -> None:
@@ -329,7 +329,7 @@ class TickLoop:
                 shutdown()
             except Exception as error:  # noqa: BLE001 - the user's: any
                 self._raised("shutdown of a behaviour raised", error)
-        self._traffic.drain(self.goals.not_over)
+        drain(self._traffic.host, self.goals.not_over)
 
     def close(self, now: float) -> None:
         """Listen to goals no more, and tell what has only now become known of them."""

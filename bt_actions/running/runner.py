@@ -302,7 +302,7 @@ class TreeRunner:
         """
         if self._is_down:
             return
-        if self._spins_here():
+        if self._spinner.would_wait_for_itself():
             raise _waits_for_itself(
                 "shutdown()", "call it on another one, or in a done callback of `future`"
             )
@@ -312,9 +312,6 @@ class TreeRunner:
             self._shut_down(patience=-1.0)
         if self._is_down:
             self._loop.raise_what_ended_it()
-
-    def _spins_here(self) -> bool:
-        return self._spinner.is_stopped_by_one and self._spinner.is_called()
 
     def _at_exit(self) -> None:
         with contextlib.suppress(KeyboardInterrupt), wiring.ended_by_signals(self._signalled):
@@ -355,8 +352,8 @@ class TreeRunner:
         return self
 
     def __exit__(self, _kind: object, error: object, _traceback: object) -> None:
-        if error is None or not self._spins_here():  # else what run() has said would be lost
-            self.shutdown()
+        if error is None or not self._spinner.would_wait_for_itself():
+            self.shutdown()  # else what run() has said would be lost
 
     # A run
 

@@ -29,16 +29,15 @@ def wake(handles: Iterable[GoalHandle]) -> None:
 def note(host: Host, handle: GoalHandle) -> None:
     """Report a goal's change to the log, and to its run."""
     goal, log = handle.goal, host.log
-    unknown = goal.outcome is not None and goal.end is End.UNKNOWN
-    if unknown and not handle.told_unknown:
-        if handle.told_gone:
+    told, handle.told = handle.told, None if goal.outcome is None else goal.end
+    if handle.told is End.UNKNOWN is not told:
+        if told is End.SERVER_GONE:
             log.warning(f"{goal!r}: its server is back; canceling it, should it still run there")
         else:
             why = f"{goal.reason}{goal.cancel_said}"
             log.error(f"{goal!r}: not accounted for, it may still be running: {why}")
-    elif not unknown and handle.told_unknown:
+    elif told is End.UNKNOWN is not handle.told:
         log.info(f"{goal!r}: accounted for at last")
-    handle.told_unknown, handle.told_gone = unknown, goal.end is End.SERVER_GONE
     if handle.begun_in is not None:
         handle.begun_in.tell(Change(handle, goal.state, goal.outcome, goal.end, goal.reason))
     host.changed.notify_all()

@@ -130,7 +130,7 @@ class ActionEndpoint:
     def probe_answered(self, probe: int) -> None:
         """Pass on the answer to a probe."""
         self.watch.probe_answered(self._host.steady(), probe)
-        wake(self.goals.values())
+        wake(self.handles)
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
@@ -175,9 +175,14 @@ class ActionEndpoint:
         return self._forks != self._host.forks
 
     @property
+    def handles(self) -> list[GoalHandle]:
+        """Those of the goals that are here now."""
+        return list(self.goals.values())
+
+    @property
     def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
-        return any(not handle.goal.sent for handle in self.goals.values())
+        return any(not handle.goal.sent for handle in self.handles)
 
     def tell(
         self, handle: GoalHandle, event: Event, detail: Any = None, message: Any = None
@@ -307,7 +312,7 @@ class ActionEndpoint:
     def goals_of(self, owner: Any) -> list[GoalHandle]:
         """Return a leaf's goals that are open here, also what a second server took."""
         with self._host.lock:
-            return [handle for handle in self.goals.values() if handle.owner is owner]
+            return [handle for handle in self.handles if handle.owner is owner]
 
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""

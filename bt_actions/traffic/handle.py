@@ -61,6 +61,10 @@ class Endpoint(Listener, Scheduled, Protocol):
         """Whether this was made before a fork, and we are the child: the goals are not ours."""
 
     @property
+    def handles(self) -> list[GoalHandle]:
+        """Those of the goals that are here now."""
+
+    @property
     def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
 
@@ -126,9 +130,8 @@ class GoalHandle:
     keeps_feedback: bool = False
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     replies: Replies = field(init=False)
-    told_unknown: bool = False
-    """The log says that it is not accounted for; and later, on whatever node, that it is."""
-    told_gone: bool = False
+    told: End | None = None
+    """The end that the log knows of: it says where that is UNKNOWN, and is not any more."""
     paused: bool = False
     """Its tree is, and it was not sent."""
     held_back_since: float | None = None

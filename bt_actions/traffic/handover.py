@@ -56,7 +56,7 @@ def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
 
 def park(endpoint: Endpoint, domain: Domain, *, all_of_them: bool = False) -> None:
     """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
-    for handle in list(endpoint.goals.values()):
+    for handle in endpoint.handles:
         goal = handle.goal
         if all_of_them or (goal.outcome is not None and not goal.claims_resources):
             endpoint.tell(handle, Event.PARKED)
@@ -70,7 +70,7 @@ def bound_the_lost(endpoint: Endpoint, host: Host) -> None:
     """Give up the oldest of too many lost goals; none that its server may still decide on."""
     forgettable = [
         handle
-        for handle in endpoint.goals.values()
+        for handle in endpoint.handles
         if handle.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
         and handle.goal.outcome is not None
         and not handle.goal.may_still_be_accepted

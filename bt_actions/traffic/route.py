@@ -95,11 +95,11 @@ class Route:
             return False
         if now - endpoint.participant.seen_since < TOO_NEW:
             return False
-        if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.goals.values()):
+        if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.handles):
             return False  # nobody here wants it; it is remembered, as what is parked is
         known = self._domain.ever_lost_sight or endpoint.action in self._domain.known
         running = (State.SENDING, State.EXECUTING, State.REPLACED)
-        still = all(handle.goal.state not in running for handle in endpoint.goals.values())
+        still = all(handle.goal.state not in running for handle in endpoint.handles)
         return (known and self._is_absent(now) and still) or self._is_unresponsive(now)
 
     def _is_absent(self, now: float) -> bool:
@@ -176,7 +176,7 @@ class Route:
             )
             return
         self._host.log.info(f"{name}: does not hear this node any more; a new one is heard")
-        for handle in list(endpoint.goals.values()):
+        for handle in endpoint.handles:
             if handle.replies.sent_to & seen:  # it may be shown later than another of its name
                 handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
             handle.goal.deadlines.suspend(ANSWERS_TAKE, endpoint.participant.now())

@@ -41,10 +41,6 @@ class Traffic:
         self._admission = Admission(host, self._domain, self._endpoints, self._open_to)
         self.why_not = self._admission.why_not
 
-    def now(self) -> Now:
-        """Return this moment, by both clocks of the node."""
-        return self.participant.now()
-
     def endpoint(self, action_type: Any, action_name: str) -> ActionEndpoint:
         """Return the shared endpoint to an action, and count its user.
 
@@ -115,7 +111,7 @@ class Traffic:
         with self.host.lock:
             held = frozenset(self._full_name(each) for each in resources)
             goal = Goal(
-                self.host.new_goal_id(), endpoint.name, timeouts, self.now(),
+                self.host.new_goal_id(), endpoint.name, timeouts, self.participant.now(),
                 resources=held, busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
             handle = GoalHandle(
@@ -184,40 +180,23 @@ class Traffic:
         """The tree no longer wants it. Returns at once; the goal is drained."""
         handle.endpoint.tell(handle, Event.INTERRUPTED)
 
-    def pause(self, handles: Iterable[GoalHandle]) -> None:
-        """Stop the deadlines of goals that were not sent yet."""
+    def pause(self, handles: Iterable[GoalHandle], wanted: bool) -> None:
+        """Stop the deadlines of goals that were not sent yet, or let them run on."""
         with self.host.lock:
             for handle in handles:
-                handle.paused = not handle.goal.sent
+                handle.paused = wanted and not handle.goal.sent
                 handle.endpoint.apply_deadlines(handle)
-
-    def resume(self, handles: Iterable[GoalHandle]) -> None:
-        """Let the deadlines run on, with what remained of them."""
-        with self.host.lock:
-            for handle in handles:
-                handle.paused = False
-                handle.endpoint.apply_deadlines(handle)
-
-    def drain(
-        self, handles: Iterable[GoalHandle], hurry: Callable[[], bool] = lambda: False
-    ) -> list[GoalHandle]:
-        """Cancel these goals and wait until each is accounted for; see drain.py."""
-        return drain(self.host, handles, hurry)
 
     def destroy(self, hurry: Callable[[], bool] = lambda: False) -> None:
         """Drain what is still open and close the transports; nobody may spin the node any more."""
         with self.host.lock:
-            left = [
-                handle
-                for endpoint in self._endpoints.values()
-                for handle in endpoint.goals.values()
-            ]
-        self.drain(left, hurry)
+            left = [each for endpoint in self._endpoints.values() for each in endpoint.handles]
+        drain(self.host, left, hurry)
         with self.host.lock:
             self.closed = True
             for endpoint in list(self._endpoints.values()):
                 handover.park(endpoint, self._domain, all_of_them=True)
-                for handle in list(endpoint.goals.values()):
+                for handle in endpoint.handles:
                     endpoint.tell(handle, Event.ABANDONED)
                 endpoint.transport.close()
             self._endpoints.clear()

@@ -57,7 +57,7 @@ class Watcher:
             unclear = endpoint.watch.state(now) is Server.UNCLEAR
             if unclear or endpoint.has_unsent:
                 self._look_at = now + LOOK_WHILE_WAITING
-            elif any(not handle.is_over for handle in endpoint.goals.values()):
+            elif any(not handle.is_over for handle in endpoint.handles):
                 rests = self._looked_at + LOOK_AT_REST
                 self._look_at = rests if self._rests else now + LOOK_WHILE_RUNNING
             else:
@@ -66,9 +66,9 @@ class Watcher:
         endpoint.cancels.send_more(now)
         if endpoint.orphaned or self._route.elsewhere:
             endpoint.deliver_arrived()
-            if not all(handle.accounted_for for handle in endpoint.goals.values()):
+            if not all(handle.accounted_for for handle in endpoint.handles):
                 wait = min(wait, DELIVER_EVERY)
-        for handle in list(endpoint.goals.values()):
+        for handle in endpoint.handles:
             endpoint.apply_deadlines(handle)
         return max(wait, 0.001)
 
@@ -156,7 +156,7 @@ class Watcher:
         self._was_away = False
         held_back = (now - endpoint.in_sight_since < BESIDE, self._route.holds_back(now))
         if (state, held_back) != (before, self._held_back):
-            wake(endpoint.goals.values())  # what waits for it, or was held back, may be sent
+            wake(endpoint.handles)  # what waits for it, or was held back, may be sent
         self._held_back = held_back
         if state is not before:
             self._domain.ever_lost_sight |= state is Server.ABSENT
@@ -172,10 +172,10 @@ class Watcher:
     def _tell_goals(self, now: float) -> None:
         """Ask who lives, if that is open, and tell each goal what is known of its server."""
         endpoint, watch = self._endpoint, self._endpoint.watch
-        runs = any(handle.goal.sent and not handle.goal.lost for handle in endpoint.goals.values())
+        runs = any(handle.goal.sent and not handle.goal.lost for handle in endpoint.handles)
         if self._route.take_question(now) or watch.wants_probe(now, runs=runs):
             endpoint.probe()
-        for handle in list(endpoint.goals.values()):
+        for handle in endpoint.handles:
             gone = watch.gone(now, handle.replies.sent_to)
             if not gone:
                 handle.not_gone_before = NEVER  # it has been discovered
@@ -219,13 +219,13 @@ class Watcher:
         if not endpoint.orphaned:
             endpoint.orphaned, endpoint.heard_at = True, now
             self._looked_like = Server.ABSENT
-            if any(not handle.accounted_for for handle in endpoint.goals.values()):
+            if any(not handle.accounted_for for handle in endpoint.handles):
                 self._host.log.warning(f"{endpoint.name}: the node is gone; canceling what it left")
-        for handle in list(endpoint.goals.values()):  # also one that was begun since
+        for handle in endpoint.handles:  # also one that was begun since
             handle.goal.deadlines.disarm(Event.LOOK_OUT_DUE)  # from here nobody sees it come back
             if handle.goal.outcome is None:
                 endpoint.tell(handle, Event.INTERRUPTED)
-        patience = max((each.goal.drains_within for each in endpoint.goals.values()), default=0.0)
+        patience = max((each.goal.drains_within for each in endpoint.handles), default=0.0)
         silent = self._host.steady() - endpoint.heard_at > max(SILENT_FOR, patience)
         if silent and not self._host.stalls.answers_take(self._host.steady()):
             handover.park(endpoint, self._domain, all_of_them=True)

@@ -66,10 +66,10 @@ class TestTicks:
         gate.passed = True
         for _ in range(3):
             assert stepped.step() is None
-        stepped.traffic.pause.assert_called_once()
+        stepped.traffic.pause.assert_called_once_with([], True)
         stepped.loop.pause(False)
         assert stepped.step() is Status.SUCCESS
-        stepped.traffic.resume.assert_called_once()
+        stepped.traffic.pause.assert_called_with([], False)
 
 
 class TestInterrupt:
