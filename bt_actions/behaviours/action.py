@@ -350,7 +350,7 @@ class ActionBehaviour(Behaviour):
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why
         elif more := self.explain(outcome, goal.result):
             reason += f"; {more}"
-        return self._record(handle.goal, outcome, reason, backend)
+        return self._record(goal, outcome, reason, backend)
 
     def _record(self, goal: Goal, outcome: Outcome, reason: str, backend: Backend) -> AttemptRecord:
         now = backend.clock.now().ros

@@ -98,7 +98,7 @@ def variables_in(data: Any) -> set[str]:
     if isinstance(data, Var):
         return {key(data.name)}
     if isinstance(data, Mapping):
-        return set().union(*(variables_in(value) for value in data.values()))
+        return set().union(*map(variables_in, data.values()))
     if isinstance(data, list | tuple) and not numbers_only(data):
-        return set().union(*(variables_in(value) for value in data))
+        return set().union(*map(variables_in, data))
     return set()

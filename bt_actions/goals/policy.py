@@ -144,11 +144,7 @@ class Timeouts:
     @classmethod
     def of(cls, value: Timeouts | float | None) -> Timeouts:
         """Return `value` as Timeouts: None means the defaults, a bare number the result."""
-        if value is None:
-            return cls()
-        if isinstance(value, Timeouts):
-            return value
-        return cls(result=value)
+        return value if isinstance(value, Timeouts) else cls(result=value)
 
 
 @dataclass(frozen=True, slots=True)

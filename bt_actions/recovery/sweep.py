@@ -255,9 +255,11 @@ class _Sweep:
         for number, code in view.answers():
             self._calls[action].answered(number, time.monotonic())
             left = self._questions.get((action, number))
-            if left is not None and code in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
+            if left is None:
+                continue
+            if code in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
                 left.denials.answered(number)
-            elif left is not None:
+            else:
                 self._turns_up(left)
 
     def _glance(self, now: float) -> None:

@@ -33,8 +33,16 @@ def mismatch(
         return f"{theirs} is {listing(sorted({each.topic_type for each in others}))}, not {kind}"
     offers, wants = (same, [qos]) if publish else ([qos], same)
     for keeps, published, asked in (
-        (_reliable, "best effort, write 'qos: best_effort'", "reliable, not best effort"),
-        (_latched, "not latched, write 'qos: default'", "latched, write 'qos: latched'"),
+        (
+            lambda qos: qos.reliability is not ReliabilityPolicy.BEST_EFFORT,
+            "best effort, write 'qos: best_effort'",
+            "reliable, not best effort",
+        ),
+        (
+            lambda qos: qos.durability is DurabilityPolicy.TRANSIENT_LOCAL,
+            "not latched, write 'qos: default'",
+            "latched, write 'qos: latched'",
+        ),
     ):
         if all(map(keeps, wants)) and not any(map(keeps, offers)):
             return f"{theirs} is {published if publish else asked}"
@@ -82,11 +90,3 @@ def without_service(node: Node, service: str, kind: str) -> str:
     if service in known:
         return ": it is in sight, but was not ready"
     return f": nobody offers it{elsewhere(service, kind, known)}"
-
-
-def _reliable(qos: QoSProfile) -> bool:
-    return bool(qos.reliability is not ReliabilityPolicy.BEST_EFFORT)
-
-
-def _latched(qos: QoSProfile) -> bool:
-    return bool(qos.durability is DurabilityPolicy.TRANSIENT_LOCAL)

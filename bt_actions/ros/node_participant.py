@@ -145,11 +145,14 @@ class NodeParticipant:
 
     def _is_remapped(self, name: str) -> bool:
         """Whether rules of this node lead any part of an action elsewhere."""
-        topics = [f"{name}/_action/{part}" for part in ("status", "feedback")]
-        services = [f"{name}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
-        resolve_topic, resolve = self.node.resolve_topic_name, self.node.resolve_service_name
-        return any(resolve_topic(topic) != topic for topic in topics) or any(
-            resolve(service) != service for service in services
+        parts = {
+            self.node.resolve_topic_name: ("status", "feedback"),
+            self.node.resolve_service_name: ("send_goal", "cancel_goal", "get_result"),
+        }
+        return any(
+            resolve(full := f"{name}/_action/{part}") != full
+            for resolve, its in parts.items()
+            for part in its
         )
 
     def instead(self, action_type: Any, name: str) -> str:

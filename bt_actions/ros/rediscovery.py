@@ -87,9 +87,7 @@ def look_for(seeker: Seeker, action: str, domain: int, enclave: str, *, at_once:
     In the enclave of its node, which may be allowed to look where others are not.
     With `at_once`, whatever pause between two looks for others has been reached begins anew.
     """
-    rediscovery = _by_domain.get((domain, enclave))
-    if rediscovery is None:
-        rediscovery = _by_domain[domain, enclave] = Rediscovery(domain, enclave)
+    rediscovery = _by_domain.setdefault((domain, enclave), Rediscovery(domain, enclave))
     rediscovery.add(seeker, action, at_once=at_once)
 
 

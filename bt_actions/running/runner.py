@@ -225,7 +225,7 @@ class TreeRunner:
         turns into an exception, and what ends the main thread in good order, drains them.
         """
         self._begin()
-        before, self._started = self._started, StartedRun(lambda: self._run(None), self._release)
+        before, self._started = self._started, StartedRun(self._run_and_release)
         if before is not None:
             before.tell_unheard(self._log.error)
         try:
@@ -234,6 +234,12 @@ class TreeRunner:
             self._started = before
             self._release()
             raise
+
+    def _run_and_release(self) -> Status:
+        try:
+            return self._run(None)
+        finally:
+            self._release()
 
     def _release(self) -> None:
         self._runs_on = None

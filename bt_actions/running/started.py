@@ -14,10 +14,10 @@ from bt_actions.utilities.plain_text import raised
 class StartedRun(threading.Thread):
     """One run."""
 
-    def __init__(self, work: Callable[[], Status], release: Callable[[], None]) -> None:
-        """`release` is called on its thread when it is over, before the future tells of it."""
+    def __init__(self, work: Callable[[], Status]) -> None:
+        """`work` is called on its thread; the future tells what came of it."""
         super().__init__(name="bt_actions-tree", daemon=True)
-        self._work, self._release = work, release
+        self._work = work
         self.future = futures.Future[Status]()
         self.future.set_running_or_notify_cancel()
         self.is_heard = False
@@ -28,10 +28,8 @@ class StartedRun(threading.Thread):
         try:
             status = self._work()
         except BaseException as error:  # noqa: BLE001 - raised again by who waits for it
-            self._release()
             self.future.set_exception(error)
         else:
-            self._release()
             self.future.set_result(status)
 
     def tell_unheard(self, tell: Callable[[str], None]) -> None:
