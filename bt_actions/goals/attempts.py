@@ -75,7 +75,10 @@ class Attempts:
     def again(self, record: AttemptRecord, now: Now, chance: random.Random) -> bool:
         """File `record`; return whether there will be another attempt after a pause."""
         self.history.append(record)
-        if len(self.history) >= self.retry.attempts or not self._worth_it(record):
+        why_not = self._why_not(record) if len(self.history) < self.retry.attempts else ""
+        if why_not:
+            record.reason += f" (not tried again: {why_not})"
+        if why_not is not None:
             return False
         self._resume_at = now.ros + self.retry.pause(len(self.history), chance)
         self._ros_seen = now.ros
@@ -92,12 +95,6 @@ class Attempts:
         if not look_only:
             self._resume_at, self._ros_seen = resume_at, now.ros
         return max(0.0, resume_at - now.ros)
-
-    def _worth_it(self, record: AttemptRecord) -> bool:
-        why_not = self._why_not(record)
-        if why_not:
-            record.reason += f" (not tried again: {why_not})"
-        return why_not is None
 
     def _why_not(self, record: AttemptRecord) -> str | None:
         """Why it is not tried again: "" where that goes without saying; None where it is."""

@@ -78,13 +78,13 @@ def _name_of_machine(_pid: int) -> str:
     In another time namespace the same process has another moment of its start.
     """
     parts = [socket.gethostname()]
-    try:
-        parts.append(Path("/etc/machine-id").read_text(encoding="utf-8").strip())
-    except OSError:
-        parts.append("")
-    for namespace in ("pid", "time"):
+    for read in (
+        lambda: Path("/etc/machine-id").read_text(encoding="utf-8").strip(),
+        lambda: str(Path("/proc/self/ns/pid").readlink()),
+        lambda: str(Path("/proc/self/ns/time").readlink()),
+    ):
         try:
-            parts.append(str(Path(f"/proc/self/ns/{namespace}").readlink()))
+            parts.append(read())
         except OSError:
             parts.append("")
     return "\n".join(parts)

@@ -37,9 +37,7 @@ def time_of(value: object, now: Callable[[], int]) -> object:
 
 def duration_of(value: object) -> object:
     """``500 ms`` or seconds as the fields of a builtin_interfaces/Duration."""
-    if isinstance(value, str):
-        return _seconds(parse_duration(value))
-    return _seconds(value)
+    return _seconds(parse_duration(value) if isinstance(value, str) else value)
 
 
 def _seconds(value: object) -> object:

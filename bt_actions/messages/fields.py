@@ -103,15 +103,10 @@ def _type(slot: Any) -> FieldType:
 
     if isinstance(slot, idl.BasicType):
         return Scalar(_NAMES.get(slot.typename, slot.typename))
+    limit = getattr(slot, "maximum_size", None)  # of what is bounded
     if isinstance(slot, idl.AbstractGenericString):
-        name = "wstring" if isinstance(slot, idl.AbstractWString) else "string"
-        bounded = isinstance(slot, (idl.BoundedString, idl.BoundedWString))
-        return Scalar(name, slot.maximum_size if bounded else None)
-    if isinstance(slot, idl.Array):
-        return Listing(_type(slot.value_type), size=slot.size)
-    if isinstance(slot, idl.BoundedSequence):
-        return Listing(_type(slot.value_type), limit=slot.maximum_size)
-    if isinstance(slot, idl.UnboundedSequence):
-        return Listing(_type(slot.value_type))
+        return Scalar("wstring" if isinstance(slot, idl.AbstractWString) else "string", limit)
+    if isinstance(slot, idl.AbstractNestedType):
+        return Listing(_type(slot.value_type), getattr(slot, "size", None), limit)
     module = importlib.import_module(".".join(slot.namespaces))
     return Message(getattr(module, slot.name))

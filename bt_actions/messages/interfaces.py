@@ -112,10 +112,10 @@ def short_name(cls: type) -> str:
 
 def _split(name: str, kind: Kind) -> tuple[str, str]:
     parts = name.split("/")
-    if len(parts) == 3 and parts[1] in _WORDS and parts[1] != kind:
-        raise UnknownInterface(f"{name!r} names no {_WORDS[kind]}, but one of {parts[1]}/")
-    if len(parts) == 3 and parts[1] == kind:
-        parts = [parts[0], parts[2]]
+    if len(parts) == 3 and parts[1] in _WORDS:
+        if parts[1] != kind:
+            raise UnknownInterface(f"{name!r} names no {_WORDS[kind]}, but one of {parts[1]}/")
+        del parts[1]
     if len(parts) != 2 or not _PACKAGE.fullmatch(parts[0]) or not _NAME.fullmatch(parts[1]):
         raise UnknownInterface(f"{name!r} is no type name: it is written package/{kind}/Name")
     return parts[0], parts[1]

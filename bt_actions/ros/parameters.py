@@ -98,13 +98,14 @@ def _type(kind: FieldType, value: Any) -> Parameter.Type:
         single = _type(kind.item, 0)
         if all(_type(kind.item, item) is single for item in value):
             return Parameter.Type[f"{single.name}_ARRAY"]
-    if not isinstance(kind, Scalar):
-        return Parameter.Type.STRING
-    if kind.name in FLOATS:
-        return Parameter.Type.DOUBLE
-    if kind.name in INTEGERS:
-        return Parameter.Type.INTEGER if value <= _MOST else Parameter.Type.STRING
-    return Parameter.Type.BOOL if kind.name == "bool" else Parameter.Type.STRING
+    if isinstance(kind, Scalar):
+        if kind.name in FLOATS:
+            return Parameter.Type.DOUBLE
+        if kind.name in INTEGERS and value <= _MOST:
+            return Parameter.Type.INTEGER
+        if kind.name == "bool":
+            return Parameter.Type.BOOL
+    return Parameter.Type.STRING
 
 
 def _descriptor(kind: FieldType, its_type: Parameter.Type, description: str) -> ParameterDescriptor:

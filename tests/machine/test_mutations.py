@@ -89,18 +89,18 @@ def takes_a_late_answer_for_the_attempt_that_runs_now(patch: Patch) -> None:
     patch.setattr(ActionEndpoint, "_heard_of", heard_of)
 
 
-@mutation
-def retries_before_the_end_is_known(patch: Patch) -> None:
-    patch.setattr(Attempts, "_worth_it", lambda self, record: record.outcome in self.retry.outcomes)
-
-
 def tried_again_unless(patch: Patch, refused: Callable[[AttemptRecord], bool]) -> None:
     """Ask nothing of an attempt but its outcome, and one thing more."""
-    patch.setattr(
-        Attempts,
-        "_worth_it",
-        lambda self, record: record.outcome in self.retry.outcomes and not refused(record),
-    )
+
+    def why_not(self: Attempts, record: AttemptRecord) -> str | None:
+        return None if record.outcome in self.retry.outcomes and not refused(record) else ""
+
+    patch.setattr(Attempts, "_why_not", why_not)
+
+
+@mutation
+def retries_before_the_end_is_known(patch: Patch) -> None:
+    tried_again_unless(patch, lambda record: False)
 
 
 @mutation
