@@ -88,6 +88,7 @@ class Watcher:
         Who has taken another's place since is seen right after a send.
         """
         is_new = now - self._looked_at < LOOK_AT_REST and self._is_alone
+        is_new &= self._endpoint.action not in self._domain.lost  # what was left is canceled first
         if is_new and self._endpoint.participant.alive() and not self._counts_others():
             return Server.READY
         return self.observe_and_tell(now)

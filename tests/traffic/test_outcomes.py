@@ -569,3 +569,24 @@ def test_every_outcome_and_every_end_has_a_test_here() -> None:
     text = Path(__file__).read_text(encoding="utf-8")
     for value in [*Outcome, *End]:
         assert f"{type(value).__name__}.{value.name}" in text, value
+
+
+@pytest.mark.parametrize("busy", ["share", "wait"])
+def test_what_another_node_left_is_canceled_first_also_at_a_server_just_looked_at(
+    world: World, busy: str
+) -> None:
+    world.serve("1:ignore_cancel")
+    network, other = world.network, VirtualBackend(world.network)
+    node = VirtualBackend(network, host=other.host)
+    old = MoveRobot("old", 9.0, timeout=Timeouts(cancel=0.2), resources=["a"])
+    looks = MoveRobot("looks", 0.0, busy="share", resources=["b"])
+    new = MoveRobot("new", 0.1, busy=busy, resources=["b"])
+    for leaf, backend in ((old, other), (looks, node), (new, node)):
+        leaf.setup(node=backend)
+    for leaf in (old, old, looks, looks):
+        leaf.tick_once()
+        network.timeline.advance(network.now() + 0.2)
+    assert executing(old)
+    other.traffic.destroy()
+    new.tick_once()
+    assert new.progress().state == "WAITING_FOR_SERVER"
