@@ -24,12 +24,7 @@ class Resources(Generic[Holder]):
         self._queue: dict[Holder, frozenset[str]] = {}
 
     def request(self, holder: Holder, names: frozenset[str], busy: Busy) -> Event | None:
-        """Ask for all of `names`; return GRANTED or TAKEN, or None where `holder` has to wait.
-
-        Raises ValueError when it has asked before.
-        """
-        if holder in self._held or holder in self._queue:
-            raise ValueError(f"{holder!r} holds or waits already")
+        """Ask, once, for all of `names`; return GRANTED or TAKEN, or None where it has to wait."""
         free = not self.holders(names)
         waits = free and any(names & wanted for wanted in self._queue.values())
         if busy in (Busy.REPLACE, Busy.SHARE) or (free and not waits):

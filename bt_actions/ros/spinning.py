@@ -76,9 +76,9 @@ class Spinner:
         self._asked_at = 0.0
         self.owns_node = node is None
         """Whether the node was made here."""
-        if executor not in (None, "multi", "single") and not isinstance(executor, Executor):
-            raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {executor!r}")
         given = executor if isinstance(executor, Executor) else None
+        if given is None and executor not in (None, "multi", "single"):
+            raise ValueError(f"executor must be 'multi', 'single' or an Executor, not {executor!r}")
         if node is not None and node.executor is not None:
             if node not in node.executor.get_nodes():
                 node.executor = None  # left behind by an executor that was shut down
@@ -192,14 +192,14 @@ class Spinner:
     @contextlib.contextmanager
     def replaced(self) -> Iterator[None]:
         """Have another thread call callbacks while this one, if it was called by ours, waits."""
-        lends = isinstance(self.executor, OnceExecutor) and self.is_called()
-        if lends:
-            self.executor.add_threads(1)
+        if not isinstance(self.executor, OnceExecutor) or not self.is_called():
+            yield
+            return
+        self.executor.pool.add_threads(1)
         try:
             yield
         finally:
-            if lends:
-                self.executor.add_threads(-1)
+            self.executor.pool.add_threads(-1)
 
     def _check(self) -> None:
         if self._moved() or getattr(self.executor, "_is_shutdown", False):  # rclpy's name of it
@@ -288,7 +288,7 @@ class Spinner:
         self._halt()
         if self.spins and self._own_executor:
             if isinstance(self.executor, OnceExecutor):
-                self.executor.finish()  # what it still runs needs the executor's guard
+                self.executor.pool.shutdown()  # what it still runs needs the executor's guard
             self.executor.shutdown()
         if self._added and self.node.executor is self.executor:
             self.node.executor = None  # takes it out of the executor, and lets another have it

@@ -30,15 +30,7 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
     def __init__(self, num_threads: int, *, context: Any = None) -> None:
         super().__init__(num_threads, context=context)
         self._executor.shutdown()  # it has no thread yet
-        self._executor = self._pool = _Pool(num_threads)
-
-    def add_threads(self, number: int) -> None:
-        """Have so many threads more, at most; those that are there stay."""
-        self._pool.add_threads(number)
-
-    def finish(self) -> None:
-        """Take no more work, and wait for what is there."""
-        self._pool.shutdown()
+        self._executor = self.pool = _Pool(num_threads)
 
     def _make_handler(self, entity: Any, *args: Any) -> Any:
         """Make the task that serves what is ready; None: it has been served."""
@@ -50,7 +42,7 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
         """Return what is to be run next, as rclpy's does; TimeoutException: nothing, as yet."""
         ready = super().wait_for_ready_callbacks(*args, **options)
-        if ready[0] is None or self._pool.holds(ready[0]):
+        if ready[0] is None or self.pool.holds(ready[0]):
             raise TimeoutException
         return ready
 
@@ -73,6 +65,7 @@ class _Pool(ThreadPoolExecutor):
         return task(*args, **options)
 
     def add_threads(self, number: int) -> None:
+        """Have so many threads more, at most; those that are there stay."""
         self._max_workers += number
 
     def holds(self, task: Any) -> bool:
