@@ -29,6 +29,7 @@ from tests.support.waiting import holds_for, until
 
 Serve = Callable[..., Journal]
 Tree = Callable[..., Path]
+InPhase = Callable[..., tuple[Process, Journal | None]]
 
 ACCEPT, CANCEL = 3.0, 3.0
 """Deadlines of the trees here."""
@@ -55,28 +56,31 @@ ENDS = {
 }
 
 
-def in_phase(
-    phase: str, launch: Launch, serve: Serve, tree: Tree, name: str, fault: str | None = None
-) -> tuple[Process, Journal | None]:
-    """Start a run and wait until its goal is in that phase."""
-    usual, line, seen = PHASES[phase]
-    faults = [each for each in [fault or usual] if each]
-    journal = serve(*faults) if phase != "WAITING_FOR_SERVER" else None
-    result = "0.5 s" if phase == "CANCELING" else "60 s"
-    path = tree(
-        name,
-        distance=[9.0, 9.0] if phase == "QUEUED" else 9.0,
-        timeout=f"{{queue: 60 s, server: 60 s, accept: {ACCEPT:g} s, result: {result}, "
-        f"cancel: {CANCEL:g} s}}",
-        retry="{attempts: 2, backoff: 60 s}",
-    )
-    if phase == "QUEUED":
-        path.write_text(path.read_text().replace("sequence: Work", "parallel: Work"))
-    run = launch("run", str(path), "--verbose")
-    run.line(line)
-    if journal is not None and seen:
-        journal.wait_for(seen)
-    return run, journal
+@pytest.fixture
+def in_phase(launch: Launch, serve: Serve, tree: Tree, name: str) -> InPhase:
+    """Start a run and wait until its goal is in a phase; at a server with a fault."""
+
+    def start(phase: str, fault: str | None = None) -> tuple[Process, Journal | None]:
+        usual, line, seen = PHASES[phase]
+        faults = [each for each in [fault or usual] if each]
+        journal = serve(*faults) if phase != "WAITING_FOR_SERVER" else None
+        result = "0.5 s" if phase == "CANCELING" else "60 s"
+        path = tree(
+            name,
+            distance=[9.0, 9.0] if phase == "QUEUED" else 9.0,
+            timeout=f"{{queue: 60 s, server: 60 s, accept: {ACCEPT:g} s, result: {result}, "
+            f"cancel: {CANCEL:g} s}}",
+            retry="{attempts: 2, backoff: 60 s}",
+        )
+        if phase == "QUEUED":
+            path.write_text(path.read_text().replace("sequence: Work", "parallel: Work"))
+        run = launch("run", str(path), "--verbose")
+        run.line(line)
+        if journal is not None and seen:
+            journal.wait_for(seen)
+        return run, journal
+
+    return start
 
 
 NUMBERS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
@@ -100,17 +104,10 @@ REPRESENTATIVE = {
     ],
 )
 def test_a_signal_ends_the_run_and_every_goal_first(
-    number: signal.Signals,
-    phase: str,
-    launch: Launch,
-    serve: Serve,
-    tree: Tree,
-    name: str,
-    ledger: Path,
-    record: Record,
+    number: signal.Signals, phase: str, in_phase: InPhase, ledger: Path, record: Record
 ) -> None:
     """The signal named, in the phase named"""
-    run, journal = in_phase(phase, launch, serve, tree, name)
+    run, journal = in_phase(phase)
     sent = run.send(number)
     assert run.wait() == NUMBERS[number], run
     record.took(time.monotonic() - sent, ACCEPT + CANCEL + 1.0)
@@ -149,16 +146,10 @@ def interrupt_again_and_again(run: Process) -> float:
     ],
 )
 def test_a_second_sigint_leaves_at_once_and_cleanup_finishes_its_work(
-    phase: str,
-    fault: str,
-    launch: Launch,
-    serve: Serve,
-    tree: Tree,
-    name: str,
-    record: Record,
+    phase: str, fault: str, in_phase: InPhase, launch: Launch, record: Record
 ) -> None:
     """SIGINT twice, while the server withholds its answer; then `bt-actions cleanup`"""
-    run, journal = in_phase(phase, launch, serve, tree, name, fault)
+    run, journal = in_phase(phase, fault)
     assert journal is not None
     run.send(signal.SIGINT)
     run.line("Ctrl-C again leaves without waiting")
@@ -183,16 +174,10 @@ def test_a_second_sigint_leaves_at_once_and_cleanup_finishes_its_work(
 @pytest.mark.chaos
 @pytest.mark.parametrize("phase", ["WAITING_FOR_SERVER", "BACKOFF"])
 def test_a_second_sigint_where_nothing_is_at_a_server_changes_nothing(
-    phase: str,
-    launch: Launch,
-    serve: Serve,
-    tree: Tree,
-    name: str,
-    ledger: Path,
-    record: Record,
+    phase: str, in_phase: InPhase, ledger: Path, record: Record
 ) -> None:
     """SIGINT again and again"""
-    run, journal = in_phase(phase, launch, serve, tree, name)
+    run, journal = in_phase(phase)
     record.took(interrupt_again_and_again(run), 2.0)
     assert run.wait() == 130, run
     assert "not accounted for" not in str(run)
