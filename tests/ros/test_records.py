@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from bt_actions import MoveRobot, TreeRunner
+from bt_actions import MoveRobot
 from bt_actions.goals.terms import Event
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.host import host as process
 from bt_actions.ros.node_participant import traffic_of
 from bt_actions.traffic.host import Entry
 from tests.support.processes import Host, HostFactory
-from tests.support.trees import state
+from tests.support.trees import started, state
 from tests.support.waiting import until
 
 
@@ -50,8 +50,7 @@ def losing(host: Host, name: str, node: Any) -> Iterator[MoveRobot]:
     """Run a leaf whose server is killed while it decides, and knows it as lost."""
     journal = host.open(name, "1:delay_accept=60")
     leaf = MoveRobot("m", 0.1, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node):
         journal.wait_for("received")
         host.kill()
         until(lambda: leaf.outcome is not None, 40.0)
@@ -63,8 +62,7 @@ def test_a_goal_is_on_record_until_it_is_accepted(
 ) -> None:
     journal = serve("1:delay_accept=3")
     leaf = MoveRobot("m", 0.5, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node):
         goal = journal.wait_for("received").goal
         [(goal_id, (action, domain, servers, lost))] = ledger.open.items()
         assert (goal_id.hex(), action, domain) == (goal, name, node.context.get_domain_id())
@@ -115,8 +113,7 @@ def test_what_is_not_accounted_for_stays(
 ) -> None:
     journal = serve("1:delay_accept=1")
     leaf = MoveRobot("m", 0.1, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node):
         goal = journal.wait_for("received").goal
         with process.lock:
             [handle] = traffic_of(node).endpoint(leaf.action_type, name).goals.values()

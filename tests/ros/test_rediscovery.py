@@ -20,7 +20,7 @@ from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.route import Route
-from tests.support.trees import in_turn
+from tests.support.trees import in_turn, started
 from tests.support.waiting import until
 
 Blind = Callable[[MoveRobot], None]
@@ -66,8 +66,7 @@ def test_what_runs_out_of_sight_is_canceled_and_the_next_goal_succeeds(
     journal = serve()
     first = MoveRobot("first", 40.0, action_name=name)
     second = MoveRobot("second", 0.3, action_name=name, timeout=Timeouts(server=20.0))
-    with TreeRunner(in_turn(first, second), node=node) as runner:
-        runner.start()
+    with started(in_turn(first, second), node=node) as runner:
         until(lambda: first.progress().feedback is not None)
         blind(first)
         until(lambda: first.outcome)
@@ -97,8 +96,7 @@ def test_who_is_not_heard_after_a_stall_hears_of_its_goal_all_the_same(
     monkeypatch.setattr(process, "stalls", Stalls())  # that of the tests is none
     journal = serve()
     leaf = MoveRobot("m", 60.0 if canceled else 4.0, action_name=name, timeout=Timeouts(cancel=2.0))
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node) as runner:
         until(lambda: leaf.progress().feedback is not None)
         client = leaf._endpoint.transport
         with process.lock:

@@ -31,7 +31,7 @@ from bt_actions.traffic.handle import FEEDBACK_KEPT
 from tests.support.accounts import Report, compare
 from tests.support.processes import HostFactory, Journal, Process
 from tests.support.reliability import Record
-from tests.support.trees import Gate, Guard, in_sequence, in_turn, state, together
+from tests.support.trees import Gate, Guard, in_sequence, in_turn, started, state, together
 from tests.support.waiting import until
 
 Serve = Callable[..., Journal]
@@ -123,8 +123,7 @@ def test_a_flood_of_feedback(
     )
     metronome = Metronome()
     root = together(leaf, metronome)
-    with TreeRunner(root, node=node, heartbeat=0.02) as runner:
-        runner.start()
+    with started(root, node=node, heartbeat=0.02) as runner:
         until(lambda: leaf.progress().feedback is not None, 10.0)
         metronome.pauses.clear()
         warm = resident()
@@ -169,8 +168,7 @@ def test_a_flood_while_the_tree_does_not_read(
     came = noted(monkeypatch, "feedback_came")
     leaf = MoveRobot("m", 2.0, action_name=name, on_feedback=lambda feedback: None)
     gate, holds = Gate(), Holds()
-    with TreeRunner(together(leaf, in_sequence(gate, holds)), node=node) as runner:
-        runner.start()
+    with started(together(leaf, in_sequence(gate, holds)), node=node) as runner:
         try:
             until(lambda: leaf.progress().feedback is not None)
             gate.passed = True
@@ -375,8 +373,7 @@ def test_interrupted_is_canceled_whatever_status_it_ends_with(
     """Interrupted by the tree while it runs; the server cancels it, or does otherwise"""
     journal = serve(*([] if fault == "none" else [f"1:{fault}"]))
     leaf = MoveRobot("m", 5.0, action_name=name)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node) as runner:
         until(lambda: state(leaf) == "EXECUTING")
         runner.interrupt()
         assert runner.wait(5.0) is Status.INVALID
@@ -411,8 +408,7 @@ def test_a_goal_that_cannot_be_canceled_is_unknown_within_its_deadline(
     journal = serve(f"1:{fault}")
     timeouts = Timeouts(result=0.2, cancel=0.4)
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=timeouts, retry=3)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node) as runner:
         until(lambda: leaf.outcome)
         settled = time.monotonic()
         assert runner.wait(9.0) is Status.FAILURE
@@ -566,8 +562,7 @@ def test_sixty_goals_that_are_interrupted_at_once_are_all_canceled(
     leaves = [
         MoveRobot(f"m{i}", 90.0, action_name=name, busy="share", timeout=limits) for i in range(60)
     ]
-    with TreeRunner(together(*leaves), node=node) as runner:
-        runner.start()
+    with started(together(*leaves), node=node) as runner:
         journal.wait_for("accepted", 60, 20.0)
         until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
         interrupted = time.monotonic()
@@ -687,8 +682,7 @@ def test_replace_ends_the_older_and_not_the_newer(
     newer = MoveRobot("newer", 1.5, action_name=name, busy="replace")
     starts = Gate()
     tree = together(FailureIsSuccess("goes on", child=older), in_sequence(starts, newer))
-    with TreeRunner(tree, node=node) as runner:
-        runner.start()
+    with started(tree, node=node) as runner:
         until(lambda: state(older) == "EXECUTING")
         starts.passed = True
         assert runner.wait(15.0) is Status.SUCCESS

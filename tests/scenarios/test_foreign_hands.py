@@ -27,7 +27,7 @@ from bt_actions.traffic.admission import IN_FLIGHT
 from tests.support.foreign import PROGRAMS
 from tests.support.processes import PATIENCE, Host, Journal, Process
 from tests.support.reliability import Record, first_paragraph
-from tests.support.trees import state, together
+from tests.support.trees import started, state, together
 from tests.support.waiting import holds_for, until
 
 END_BY_THEMSELVES = [
@@ -306,8 +306,7 @@ def test_the_child_of_a_fork_sees_to_none_of_its_parents_goals(
             held.set()
             over.wait(9.0)
 
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node):
         until(lambda: state(leaf) == "EXECUTING")
         holder = threading.Thread(target=hold)
         holder.start()

@@ -14,7 +14,7 @@ from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.ros.host import host as process
 from tests.support.processes import Host, Journal
 from tests.support.reliability import Record, rounded
-from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, state, together
+from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, started, state, together
 from tests.support.waiting import until
 
 Serve = Callable[..., Journal]
@@ -26,8 +26,7 @@ def test_interrupted_before_acceptance_is_canceled_and_not_completed(
     """interrupt() of a runner when the server has received its goal, which it accepts 1 s late"""
     journal = serve("1:delay_accept=1")
     leaf = MoveRobot("m", 1.0, action_name=name)
-    with TreeRunner(leaf, node=node, executor=executor) as runner:
-        runner.start()
+    with started(leaf, node=node, executor=executor) as runner:
         journal.wait_for("received")
         assert state(leaf) == "SENDING"
         interrupted = time.monotonic()
@@ -87,8 +86,7 @@ def test_preempted_by_a_reactive_sibling_and_entered_again_at_once(
     if phase == "QUEUED":
         holder = MoveRobot("holder", 1.0, action_name=name)
         root = together(holder, reactive)
-    with TreeRunner(root, node=node) as runner:
-        runner.start()
+    with started(root, node=node) as runner:
         until(lambda: state(leaf) == phase, what=phase)
         guard.holds = True
         until(lambda: leaf.status is Status.INVALID)
@@ -148,8 +146,7 @@ def test_preempted_and_entered_again_ten_times(serve: Serve, name: str, node: An
     leaf = MoveRobot("m", 5.0, action_name=name)
     other = Gate("other")
     tree = in_turn(in_sequence(guard, other, memory=False), leaf, memory=False)
-    with TreeRunner(tree, node=node, heartbeat=0.01) as runner:
-        runner.start()
+    with started(tree, node=node, heartbeat=0.01) as runner:
         for number in range(10):
             until(lambda: leaf.status is Status.RUNNING)
             if number % 2:
@@ -235,8 +232,7 @@ class TestABehaviourThatRaises:
         culprit = Raises("culprit", method, when=lambda: True)
         gate = Gate()
         root = together(leaf, in_sequence(gate, culprit, name="branch"), name="root")
-        with TreeRunner(root, node=node, executor=executor) as runner:
-            runner.start()
+        with started(root, node=node, executor=executor) as runner:
             if method != "setup":
                 until(lambda: state(leaf) == "EXECUTING")
             gate.passed = True
@@ -275,8 +271,7 @@ class TestABehaviourThatRaises:
         guard = Guard()
         culprit = Raises("culprit", "terminate")
         root = together(leaf, in_turn(guard, culprit, memory=False, name="branch"), name="root")
-        with TreeRunner(root, node=node) as runner:
-            runner.start()
+        with started(root, node=node) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             guard.holds = True
             with pytest.raises(TreeError, match=r"root/branch/culprit: .*on purpose"):
@@ -291,8 +286,7 @@ class TestABehaviourThatRaises:
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(Raises("culprit", "terminate"), leaf, name="root")
-        with TreeRunner(root, node=node) as runner:
-            runner.start()
+        with started(root, node=node) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             interrupted = time.monotonic()
             runner.interrupt()
@@ -305,8 +299,7 @@ class TestABehaviourThatRaises:
         journal = serve()
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(Raises("culprit", "shutdown"), leaf, name="root")
-        with TreeRunner(root, node=node) as runner:
-            runner.start()
+        with started(root, node=node):
             until(lambda: state(leaf) == "EXECUTING")
         assert journal.ends() == ["canceled"]
 
@@ -388,8 +381,7 @@ def test_a_tree_replaced_while_running_leaves_no_goal(serve: Serve, name: str, n
     """shutdown() of a runner in mid-goal, without a word to its tree; another tree is run"""
     journal = serve()
     old, new = (MoveRobot(each, 0.5, action_name=name) for each in ("old", "new"))
-    with TreeRunner(old, node=node) as runner:
-        runner.start()
+    with started(old, node=node) as runner:
         until(lambda: state(old) == "EXECUTING")
     with TreeRunner(new, node=node) as runner:
         assert runner.run(timeout=5.0) is Status.SUCCESS

@@ -24,7 +24,7 @@ from tests.scenarios.conftest import Launch
 from tests.support.processes import PATIENCE, ROOT, HostFactory, Journal, Process
 from tests.support.reliability import Record
 from tests.support.simulated_time import SimulatedTime
-from tests.support.trees import state
+from tests.support.trees import started, state
 from tests.support.waiting import holds_for, until
 
 Serve = Callable[..., Journal]
@@ -351,8 +351,7 @@ def test_simulated_time_that_is_paused_stops_the_deadlines(
     clock, node = simulated
     journal = serve()
     leaf = MoveRobot("m", 90.0, action_name=name, timeout=Timeouts(result=1.0))
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node) as runner:
         until(lambda: state(leaf) == "EXECUTING")
         clock.rate = 0.0
         assert holds_for(lambda: leaf.outcome is None, 1.5)
@@ -373,8 +372,7 @@ def test_simulated_time_that_jumps_back_leaves_what_remained(
     clock, node = simulated
     journal = serve()
     leaf = MoveRobot("m", 90.0, action_name=name, timeout=Timeouts(result=2.0))
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node) as runner:
         until(lambda: state(leaf) == "EXECUTING")
         accepted = time.monotonic()
         assert holds_for(lambda: leaf.outcome is None, 1.0)
@@ -396,8 +394,7 @@ def test_simulated_time_that_jumps_ahead_by_an_hour(
     clock, node = simulated
     journal = serve()
     leaf = MoveRobot("m", 90.0, action_name=name, timeout=60.0)
-    with TreeRunner(leaf, node=node) as runner:
-        runner.start()
+    with started(leaf, node=node) as runner:
         until(lambda: state(leaf) == "EXECUTING")
         clock.jump(3600.0)
         jumped = time.monotonic()
@@ -513,8 +510,7 @@ def test_cleanup_cancels_what_a_killed_orchestrator_left_and_nothing_else(
     left = journal.wait_for("accepted").goal
     somebody = ActionClient(node, MoveRobotAction, name)
     ours = MoveRobot("ours", 9.0, action_name=name)
-    with TreeRunner(ours, node=node) as runner:
-        runner.start()
+    with started(ours, node=node):
         until(lambda: state(ours) == "EXECUTING")
         assert somebody.wait_for_server(5.0)
         somebody.send_goal_async(MoveRobotAction.Goal(distance=9.0))

@@ -36,7 +36,7 @@ from bt_actions.traffic.endpoint import ActionEndpoint
 from tests.support.middleware import AS_IT_COMES, NOTHING_SET
 from tests.support.processes import Host, HostFactory, Journal, Process
 from tests.support.reliability import Record
-from tests.support.trees import Gate, in_sequence, in_turn, state
+from tests.support.trees import Gate, in_sequence, in_turn, started, state
 from tests.support.waiting import holds_for, until
 
 AT_ONCE = 1.0
@@ -130,8 +130,7 @@ class TestKilled:
         journal = victim.open(name, *([fault[phase]] if phase in fault else []))
         timeouts = Timeouts(accept=30.0, cancel=30.0, result=0.3 if phase == "CANCELING" else None)
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=timeouts)
-        with TreeRunner(leaf, node=node, executor=executor) as runner:
-            runner.start()
+        with started(leaf, node=node, executor=executor) as runner:
             until(lambda: state(leaf) == phase)
             journal.wait_for("received" if phase == "SENDING" else "accepted")
             if phase == "CANCELING":
@@ -162,8 +161,7 @@ class TestKilled:
         journal = Journal(path, f"{robot}/move_robot")
         record.journals.append(journal)
         leaf = MoveRobot("m", 9.0, action_name=journal.server)
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             journal.wait_for("accepted")
             killed = victim.send(signal.SIGKILL)
@@ -182,8 +180,7 @@ class TestKilled:
         victim = new_host(short_lease=False, environment=AS_IT_COMES)
         victim.open(name)
         leaf = MoveRobot("m", 9.0, action_name=name)
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             killed = victim.kill()
             until(lambda: leaf.outcome is not None, 40.0)
@@ -202,8 +199,7 @@ class TestKilled:
         leaf = MoveRobot(
             "m", 9.0, action_name=name, timeout=Timeouts(feedback=1.0, cancel=1.0), retry=3
         )
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             killed = victim.kill()
             assert runner.wait(9.0) is Status.FAILURE
@@ -217,8 +213,7 @@ class TestKilled:
 
 def leave(leaf: MoveRobot) -> None:
     """Shut its runner down in mid-motion, where its server does not end it in time."""
-    with TreeRunner(leaf) as runner:
-        runner.start()
+    with started(leaf):
         until(lambda: state(leaf) == "EXECUTING", 20.0)
     assert leaf.end is End.UNKNOWN
 
@@ -241,8 +236,7 @@ class TestStopped:
         host = new_host(short_lease=False)
         journal = host.open(name)
         leaf = MoveRobot("m", 1.0, action_name=name, timeout=Timeouts(feedback=2.5))
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: leaf.progress().feedback is not None)
             host.send(signal.SIGSTOP)
             assert holds_for(lambda: leaf.outcome is None, 1.0)
@@ -260,8 +254,7 @@ class TestStopped:
         leaf = MoveRobot(
             "m", 9.0, action_name=name, timeout=Timeouts(feedback=0.6, cancel=0.6), retry=3
         )
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: leaf.progress().feedback is not None)
             stopped = host.send(signal.SIGSTOP)
             assert runner.wait(5.0) is Status.FAILURE
@@ -285,8 +278,7 @@ class TestStopped:
         leaf = MoveRobot(
             "m", 1.0, action_name=name, timeout=Timeouts(feedback=0.6, cancel=9.0), retry=2
         )
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: leaf.progress().feedback is not None)
             host.send(signal.SIGSTOP)
             until(lambda: state(leaf) == "CANCELING")
@@ -305,8 +297,7 @@ class TestStopped:
         journal = host.open(name)
         first = MoveRobot("first", 20.0 / 3, action_name=name)
         second = MoveRobot("second", 0.3, action_name=name, timeout=Timeouts(server=20.0))
-        with TreeRunner(in_turn(first, second), node=node) as runner:
-            runner.start()
+        with started(in_turn(first, second), node=node) as runner:
             until(lambda: first.progress().feedback is not None)
             stopped = host.send(signal.SIGSTOP)
             until(lambda: first.outcome, 9.0)
@@ -329,8 +320,7 @@ class TestStopped:
         late = ends == "interrupted-late"  # so its first deadline ends with the look-out
         journal = host.open(name, *(["1:delay_cancel=1"] if late else []))
         leaf = MoveRobot("m", 30.0, action_name=name, timeout=Timeouts(cancel=3.0 if late else 5.0))
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: leaf.progress().feedback is not None)
             host.send(signal.SIGSTOP)
             if late:
@@ -356,8 +346,7 @@ class TestStopped:
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=0.5, cancel=3.0))
         gate = Gate()
         root = Selector("root", memory=True, children=[leaf, gate])
-        with TreeRunner(root, node=node) as runner:
-            runner.start()
+        with started(root, node=node) as runner:
             until(lambda: stood(leaf) == (Outcome.ACCEPT_TIMEOUT, End.NEVER_STARTED))
             stopped = host.send(signal.SIGSTOP)
             until(lambda: leaf.end is End.SERVER_GONE, 9.0, what="no longer said to be denied")
@@ -488,8 +477,7 @@ class TestStopped:
         first.timeouts, second.timeouts = Timeouts(cancel=0.5), Timeouts(server=60.0)
         leave(first)
         stopped.send(signal.SIGSTOP)
-        with TreeRunner(second) as runner:
-            runner.start()
+        with started(second) as runner:
             until_shown(runner.node, f"{name}_1", 1)
             assert holds_for(lambda: state(second) == "WAITING_FOR_SERVER", 5.0)
             assert first.end is End.UNKNOWN
@@ -667,8 +655,7 @@ class TestStopped:
         home = MoveRobot("home", 0.3, action_name=f"{name}_home", resources={"arm"})
         home.timeouts = Timeouts(server=20.0)
         root = py_trees.composites.Selector("arm", memory=True, children=[move, home])
-        with TreeRunner(root, node=node) as runner:
-            runner.start()
+        with started(root, node=node) as runner:
             until(lambda: move.progress().feedback is not None)
             host.send(signal.SIGSTOP)
             until(lambda: state(home) == "WAITING_FOR_SERVER", 20.0)
@@ -717,8 +704,7 @@ class TestClosed:
         journal = host.open(name, *([fault[phase]] if phase in fault else []))
         timeouts = Timeouts(accept=30.0, cancel=30.0, result=0.3 if phase == "CANCELING" else None)
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=timeouts)
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             journal.wait_for("received" if phase == "SENDING" else "accepted")
             until(lambda: state(leaf) == phase)
             if phase == "CANCELING":
@@ -761,8 +747,7 @@ class TestRestarted:
         )
         leaf = MoveRobot("m", 0.4, action_name=name, timeout=timeouts, retry=retry)
         leaf.goal = lambda: {"distance": 0.3 if leaf.history else 5.0}
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: state(leaf) == phase)
             old.wait_for("cancel_requested" if phase == "CANCELING" else "received")
             victim.kill()
@@ -797,8 +782,7 @@ class TestRestarted:
         victim.open(name)
         lost = MoveRobot("lost", 9.0, action_name=name)
         following = MoveRobot("next", 0.3, action_name=name, timeout=Timeouts(server=10.0))
-        with TreeRunner(in_turn(lost, following), node=node) as runner:
-            runner.start()
+        with started(in_turn(lost, following), node=node) as runner:
             until(lambda: state(lost) == "EXECUTING")
             killed = victim.kill()
             until(lambda: lost.outcome, 9.0)
@@ -818,8 +802,7 @@ class TestRestarted:
         journal = hosts[0].open(name)
         retry = Retry(4, outcomes=frozenset({Outcome.SERVER_LOST}))
         leaf = MoveRobot("m", 2.0, action_name=name, retry=retry, timeout=Timeouts(server=10.0))
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             for number, host in enumerate(hosts[1:], start=1):
                 journal.wait_for("accepted", times=number, within=15.0)
                 until(lambda: state(leaf) == "EXECUTING")
@@ -843,8 +826,7 @@ class TestLate:
         """The server comes 3 s after the goal was wanted; server deadline 10 s"""
         host = new_host()
         leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=10.0))
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             assert holds_for(lambda: leaf.outcome is None, 3.0)
             journal = host.open(name)
             opened = time.monotonic()
@@ -883,8 +865,7 @@ class TestTwice:
         leaf = MoveRobot("m", 40.0, action_name=name, timeout=Timeouts(server=20.0))
         until_both_hear(leaf, node)
         other.freeze()
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: leaf.progress().feedback is not None, 20.0)
             woken = other.thaw()
             assert runner.wait(15.0) is Status.FAILURE
@@ -935,8 +916,7 @@ class TestTwice:
         one = new_host()
         journal = one.open(name, "*:no_feedback")
         leaf = MoveRobot("m", 40.0, action_name=name, timeout=Timeouts(server=20.0))
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node):
             until(lambda: state(leaf) == "EXECUTING", 20.0)
             with process.lock:
                 traffic_of(node)._endpoints[name].transport.ready = lambda: False
@@ -954,8 +934,7 @@ class TestTwice:
         one, other = new_host(), new_host()
         journal = one.open(name, "*:no_feedback", thinks=6.0, busy=4.0 + SLOWEST_START)
         leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(accept=30.0))
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: state(leaf) == "SENDING")
             other.open(name)
             assert runner.wait(30.0) is Status.SUCCESS
@@ -975,8 +954,7 @@ class TestTwice:
         leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(accept=1.5), retry=again)
         until_heard(leaf, node)
         one.freeze()
-        with TreeRunner(leaf, node=node) as runner:
-            runner.start()
+        with started(leaf, node=node) as runner:
             until(lambda: state(leaf) == "SENDING")
             other.open(name)
             assert runner.wait(30.0) is Status.FAILURE
@@ -1097,8 +1075,7 @@ class TestTwice:
         refused = MoveRobot("refused", 0.3, action_name=name)
         leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(server=15.0))
         tree = in_turn(refused, in_sequence(leaf))
-        with TreeRunner(tree, node=node) as runner:
-            runner.start()
+        with started(tree, node=node) as runner:
             until(lambda: refused.outcome, 9.0)
             runner.pause()
             killed = other.kill()

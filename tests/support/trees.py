@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy, Status
 from py_trees.composites import Parallel, Selector, Sequence
 
-from bt_actions import ActionBehaviour
+from bt_actions import ActionBehaviour, TreeRunner
+
+
+@contextmanager
+def started(root: Behaviour, **settings: Any) -> Iterator[TreeRunner]:
+    """A tree that runs."""
+    with TreeRunner(root, **settings) as runner:
+        runner.start()
+        yield runner
 
 
 class Gate(Behaviour):
