@@ -108,7 +108,7 @@ class Goal(Facts):
     @property
     def late(self) -> bool:
         """Whether it succeeded, or was refused, when a deadline had passed."""
-        deadline_passed = self.planned is not None and self.planned not in NEVER_DONE
+        deadline_passed = self.planned not in (None, *NEVER_DONE)
         came = self.end is End.SUCCEEDED or self.outcome is Outcome.REJECTED
         return deadline_passed and came
 

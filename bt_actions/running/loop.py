@@ -72,7 +72,7 @@ class TickLoop:
             check: is called before each tick; what it raises ends the run.
             misbehaved: is asked after each behaviour's tick what that did wrong.
         """
-        self.tree, self.heartbeat = tree, heartbeat
+        self.tree, self._heartbeat = tree, heartbeat
         self._traffic, self._node, self._wake = backend_of(node).traffic, node, wake
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
@@ -83,7 +83,7 @@ class TickLoop:
         self._left = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
         self._with_children: list[tuple[Behaviour, list[Behaviour]]] = []  # as found, root last
         self._doing = "setup"
-        self._stop_wanted = self.abandoned = self._pause_wanted = self._paused = False
+        self._stop_wanted = self._abandoned = self._pause_wanted = self._paused = False
         self._timeout: float | None = None
         self._deadline = math.inf
         self._now = 0.0
@@ -101,7 +101,7 @@ class TickLoop:
 
     def interrupt(self, now: float, *, abandon: bool = False) -> None:
         """End the run, or the next one; with `abandon`, also the drain. Safe in a handler."""
-        self.abandoned = self.abandoned or abandon
+        self._abandoned |= abandon
         self.watchdog.end_by(now)
         self._stop_wanted = True  # after it: where this run ends in between, the next is stopped
         self._wake()
@@ -155,7 +155,7 @@ class TickLoop:
 
     def _rest(self) -> None:
         with self._traffic.host.lock:
-            self._stop_wanted = self.abandoned = self._pause_wanted = False
+            self._stop_wanted = self._abandoned = self._pause_wanted = False
             self.goals.run_goes_on = False
 
     def _go_on(self) -> float | None:
@@ -173,7 +173,7 @@ class TickLoop:
         self.goals.tell(self._now)
         wait = min(LONGEST_WAIT, max(0.0, self._deadline - self._now))
         if self._held():
-            return min(wait, self.heartbeat)
+            return min(wait, self._heartbeat)
         goes_on = self._tick() and (self._visitor.may_go_on or self._has_others)
         self._burst = (self._burst + 1) % BURST if goes_on else 0
         if self.watchdog.gave_up:
@@ -241,11 +241,11 @@ class TickLoop:
         visitor = self._visitor
         watched = self._has_others or visitor.watching
         self.goals.is_watched = watched or bool(self._observers)
-        rest = self.heartbeat * (1.0 if watched else RARELY)
+        rest = self._heartbeat * (1.0 if watched else RARELY)
         for due_in in visitor.timed:
             due = due_in()
             if isinstance(due, int | float):
-                rest = min(rest, self.heartbeat, max(due, 0.001))
+                rest = min(rest, self._heartbeat, max(due, 0.001))
         return rest
 
     def _held(self) -> bool:
@@ -296,7 +296,7 @@ class TickLoop:
 
     def _wind_up(self, drain: Drain) -> Sleep | Done[Status]:
         """Drain the tree's goals, and tell."""
-        step = drain.step(self._now, hurry=self.abandoned)
+        step = drain.step(self._now, hurry=self._abandoned)
         self.goals.tell(self._now)
         if isinstance(step, Sleep):
             return step
