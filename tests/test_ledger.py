@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -15,13 +16,7 @@ import pytest
 
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery import ledger as module
-from bt_actions.recovery.ledger import (
-    KEPT_FOR,
-    LENGTH,
-    Ledger,
-    Sent,
-    left_behind,
-)
+from bt_actions.recovery.ledger import KEPT_FOR, LENGTH, Ledger, Sent, left_behind
 from bt_actions.traffic.host import Entry
 
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
@@ -94,9 +89,7 @@ def test_what_a_dead_process_left_is_found(directory: Path) -> None:
     assert {sent.author.pid for sent in found()} == {int(ids[0][12:20], 16)}
 
 
-def test_what_is_struck_is_not_found_again(
-    directory: Path,
-) -> None:
+def test_what_is_struck_is_not_found_again(directory: Path) -> None:
     ids = die()
     first, *others = found()
     first.strike()
@@ -132,9 +125,9 @@ def test_what_more_is_known_of_a_goal_takes_its_place(ledger: Ledger, directory:
     goal_id = new_goal_id()
     ledger.enter(goal_id, Entry("/move", 0, SERVERS, lost=True))
     assert goal_id in ledger
-    ledger.enter(goal_id, Entry("/move", 0, frozenset()))
+    ledger.enter(goal_id, Entry("/move", 0, frozenset(), accept=1e9))
     [entry] = on_record(directory)
-    assert (entry["servers"], entry["lost"]) == ([], False)
+    assert (entry["servers"], entry["lost"], entry["accept"]) == ([], False, KEPT_FOR)
     ledger.strike(goal_id)
     assert goal_id not in ledger
     assert on_record(directory) == []
@@ -210,13 +203,8 @@ def test_a_directory_that_depends_on_where_one_stands_is_refused(
     assert [trouble.filename for trouble in troubles] == ["records"]
 
 
-ENTRY: dict[str, object] = {
-    "action": "/a",
-    "domain": 0,
-    "servers": [],
-    "accept": 0.0,
-    "lost": False,
-}
+ENTRY = {"action": "/a", "domain": 0, "servers": [], "accept": 0.0, "lost": False}
+WRONG = {"accept": math.inf}, {"accept": "x"}, {"accept": -1}, {"action": ["x"]}, {"domain": "0"}
 
 
 def put(directory: Path, *texts: bytes) -> list[str]:
@@ -229,10 +217,13 @@ def put(directory: Path, *texts: bytes) -> list[str]:
     return ids
 
 
+NONSENSE = [b"nonsense", b"[" * 1000, b'"goal"', b"[]", b"\0" * LENGTH, b"\xff\xfe", b'{"goal": ']
+
+
 @pytest.mark.parametrize(
     "text",
-    [b"nonsense", b"[" * 1000, b'"goal"', b"[]", b"\0" * LENGTH, b"\xff\xfe", b'{"goal": '],
-    ids=["a word", "deep", "a text", "a list", "zeros", "no text", "cut off"],
+    [*NONSENSE, *(json.dumps({**ENTRY, **wrong}).encode() for wrong in WRONG)],
+    ids=["a word", "deep", "a text", "a list", "zeros", "no text", "cut off", *map(str, WRONG)],
 )
 def test_what_makes_no_sense_is_told_and_hides_no_other(text: bytes, directory: Path) -> None:
     _bad, good = put(directory, text, json.dumps(ENTRY).encode())

@@ -112,6 +112,13 @@ class TestRun:
         with pytest.raises(ValueError, match="heartbeat"):
             TreeRunner(Gate(), heartbeat=0.0)
 
+    @pytest.mark.parametrize("wrong", [float("nan"), "3"])
+    def test_a_timeout_that_is_no_number_is_refused(self, node: Any, wrong: Any) -> None:
+        with TreeRunner(Gate(), node=node) as runner:
+            for call in runner.run, runner.wait:
+                with pytest.raises(ValueError, match="timeout must be a number of seconds"):
+                    call(wrong)
+
     def test_an_unknown_executor_is_refused_and_leaves_nothing(self, domain: int) -> None:
         before = threading.active_count()
         with pytest.raises(ValueError, match="'multi', 'single'"):

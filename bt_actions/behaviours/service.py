@@ -34,6 +34,9 @@ class CallService(Connected[Service]):
         read: called with the answer; raising ValueError fails.
     """
 
+    _call: Call | None = None
+    _pausing = False
+
     def __init__(
         self,
         name: str,
@@ -55,7 +58,7 @@ class CallService(Connected[Service]):
         self._read = read
 
     def _make(self, backend: Backend) -> Service:
-        self._call: Call | None = None
+        self._call = None
         self.service_type = interface(self.service_type, "srv")
         return backend.service(self.service_type, self._name)
 

@@ -170,7 +170,7 @@ def _write(path: str | Path, entry: Entry, how: int = 0) -> None:
         "action": entry.action,
         "domain": entry.domain,
         "servers": sorted(each.hex() for each in entry.servers),
-        "accept": entry.accept,
+        "accept": min(entry.accept, KEPT_FOR),
         "lost": entry.lost,
     }
     text = json.dumps(plain).encode().ljust(LENGTH)
@@ -187,6 +187,9 @@ def _read(path: Path, author: Author) -> Sent:
     text = path.read_bytes()
     try:
         entry = json.loads(text)
+        is_sound = isinstance(entry["action"], str) and isinstance(entry["domain"], int)
+        if not (is_sound and 0.0 <= entry["accept"] <= KEPT_FOR):
+            raise ValueError
         entry["servers"] = frozenset(map(bytes.fromhex, entry["servers"]))
         return Sent(goal_id=bytes.fromhex(path.stem), author=author, path=path, **entry)
     except (ValueError, KeyError, TypeError, RecursionError):

@@ -91,8 +91,12 @@ def cleanup(
     be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
     with a new one, twice at most.
 
-    Raises CannotStart, if nothing has been looked at yet.
+    Raises CannotStart, if nothing has been looked at yet; ValueError for seconds that are negative
+    or no number.
     """
+    if not (look >= 0.0 and patience >= 0.0 and accept >= 0.0):
+        given = f"look {look}, patience {patience}, accept {accept}"
+        raise ValueError(f"{given}: seconds are 0 or more")
     sweep = _Sweep(look, patience, accept, found, waits, stopped)
     for tries_before in range(3):
         still = Stalls()

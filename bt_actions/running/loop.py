@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
+from numbers import Real
 from typing import Any
 
 from py_trees.behaviour import Behaviour
@@ -20,7 +21,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.running.goals import RunGoals
-from bt_actions.running.ticking import RARELY, ChangeVisitor, Misbehaviour, tick_once
+from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain, drain
 from bt_actions.utilities.places import culprit_of, path_of
@@ -36,6 +37,12 @@ LONGEST_WAIT = 3600.0
 
 class TreeError(Exception):
     """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
+
+
+def check_seconds(timeout: float | None) -> None:
+    """Raise ValueError where it is no number of seconds."""
+    if timeout is not None and not (isinstance(timeout, Real) and timeout == timeout):
+        raise ValueError(f"timeout must be a number of seconds, not {timeout!r}")
 
 
 class _Abandoned(BaseException):
@@ -119,6 +126,7 @@ class TickLoop:
 
     def begin(self, now: float, timeout: float | None = None) -> None:
         """Begin a run on this thread, which is to end within `timeout` seconds."""
+        check_seconds(timeout)
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
@@ -241,7 +249,7 @@ class TickLoop:
         visitor = self._visitor
         watched = self._has_others or visitor.watching
         self.goals.is_watched = watched or bool(self._observers)
-        rest = self._heartbeat * (1.0 if watched else RARELY)
+        rest = self._heartbeat if watched else max(self._heartbeat, QUIET_REST)
         for due_in in visitor.timed:
             due = due_in()
             if isinstance(due, int | float):

@@ -22,7 +22,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions import wiring
 from bt_actions.events import Observer
 from bt_actions.running.goals import GoalReport
-from bt_actions.running.loop import TickLoop, TreeError
+from bt_actions.running.loop import TickLoop, TreeError, check_seconds
 from bt_actions.running.started import StartedRun
 from bt_actions.running.wakeup import WakeUp
 from bt_actions.utilities.places import path_of, root_of
@@ -47,8 +47,8 @@ class TreeRunner:
             all runners that give neither this nor any of what follows but `heartbeat`. A node that
             is in an executor is never spun here: its owner spins it.
         executor: "multi" (the default), "single", or an executor; one without nodes is spun here.
-        heartbeat: seconds after which the tree is ticked though nothing has happened; 20 times as
-            many where what it ticked waits for goals alone, as only others watch the clock.
+        heartbeat: seconds after which the tree is ticked though nothing has happened; 2 s or
+            more where what it ticked waits for goals alone, as only others watch the clock.
         namespace: of the node that is made here.
         name: of that node; one that no other has where it is left out.
         context: for that node; it is shut down with it.
@@ -254,6 +254,7 @@ class TreeRunner:
         seconds; it goes on. Raises RuntimeError before the first `start`, within the run, and,
         without a `timeout`, where `run` does because of the thread.
         """
+        check_seconds(timeout)
         started = self._started
         if started is None:
             raise RuntimeError("nothing to wait for: the tree has not been started")

@@ -14,8 +14,8 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.decorators import ForEach, Repeat, RetryChild, Subtree
 from bt_actions.behaviours.parallel import Parallel
 
-RARELY = 20.0
-"""Heartbeats until a tree is ticked in which nothing watches the clock, come what may."""
+QUIET_REST = 2.0
+"""Seconds until a tree is ticked in which nothing watches the clock; a longer heartbeat counts."""
 _PASS_ON = {
     composites.Sequence,
     composites.Selector,
@@ -136,7 +136,8 @@ class ChangeVisitor(VisitorBase):
             self._running = [node for node in visited if node.status is Status.RUNNING]
             dues = [getattr(node, "due_in", None) for node in self._running]
             self.timed = [due for due in dues if callable(due)]
-            others = [n for n in visited if type(n).update is not ActionBehaviour.update]
+            ours = ActionBehaviour.tick, ActionBehaviour.update
+            others = [n for n in visited if (type(n).tick, type(n).update) != ours]
             self.watching = any(type(node) not in _PASS_ON for node in others)
             self.may_go_on = self.watching or not all(
                 isinstance(node, composites.Sequence | composites.Selector) and node.memory

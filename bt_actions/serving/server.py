@@ -271,8 +271,9 @@ class TreeServer:
             self._end(goal, Ending.DEACTIVATED)
         self._begin(begun)
 
-    def _on_dropped(self, _: _Admitted) -> None:
+    def _on_dropped(self, goal_id: bytes) -> None:
         with self._answered:
+            self._canceled_early.discard(goal_id)
             self._turns.expected -= 1
             self._answered.notify_all()
 
@@ -281,7 +282,7 @@ class TreeServer:
         with self._lock:
             goal = self._goals.get(goal_id)
             if goal is None:
-                self._canceled_early.add(goal_id)  # for `_on_accepted`, which is about to come
+                self._canceled_early.add(goal_id)  # `_on_accepted` or `_on_dropped` is to come
         if goal is not None:
             self._end(goal, Ending.CANCELED)
 

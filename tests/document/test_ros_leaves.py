@@ -57,7 +57,10 @@ def test_a_service_is_called_and_its_answer_saved(
     load: Load, run: Run, switch: Any, executor: str
 ) -> None:
     server, asked, _ = switch
-    root = run(load(CALL.format(server=server, more="")), executor=executor)
+    root = load(CALL.format(server=server, more=""))
+    assert root.due_in()  # type: ignore[attr-defined]
+    root.stop(Status.INVALID)  # before it is set up
+    run(root, executor=executor)
     assert (root.status, asked) == (Status.SUCCESS, [True])
     assert tree_outputs(root) == {"said": "set to True"}
 
@@ -287,14 +290,7 @@ LAMP = "tree: t\nroot: {{publish: {topic}, type: std_msgs/msg/Bool, message: {{d
     ],
 )
 def test_too_few_listeners_fail_in_time_and_are_counted(
-    load: Load,
-    run: Run,
-    node: Any,
-    stranger: Any,
-    name: str,
-    kind: str,
-    needed: int,
-    said: str,
+    load: Load, run: Run, node: Any, stranger: Any, name: str, kind: str, needed: int, said: str
 ) -> None:
     import std_msgs.msg
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 from collections.abc import Callable, Collection
 from typing import Any
@@ -45,7 +46,13 @@ def left(start_program: Callable[..., Process], serve: Callable[..., Journal], n
 
 def sweep(wanted: Collection[str], **more: Any) -> Swept:
     """Clean up; return what came of it."""
-    return cleanup(look=1.0, patience=1.0, wanted=wanted, **more)
+    return cleanup(**{"look": 1.0, "patience": 1.0, "wanted": wanted, **more})
+
+
+@pytest.mark.parametrize("wrong", [{"look": -1.0}, {"patience": math.nan}, {"accept": -1.0}])
+def test_seconds_are_none_or_more(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="seconds are 0 or more"):
+        sweep([], **wrong)
 
 
 def when_sighted(
@@ -123,12 +130,7 @@ def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
     monkeypatch.setattr(module, "LOOK_LONGEST", 0.2)
     told = list[list[str]]()
     monkeypatch.setattr("sys.argv", ["", "--ros-args", "-r", "__ns:=/r1"])
-    swept = cleanup(
-        look=0.1,
-        patience=0.1,
-        wanted={"move", "/r2/move"},
-        waits=told.append,
-    )
+    swept = cleanup(look=0.1, patience=0.1, wanted={"move", "/r2/move"}, waits=told.append)
     assert told == [swept.missing] == [["/r1/move", "/r2/move"]]
     assert swept.domain == domain, "the one in force"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import py_trees
@@ -15,6 +16,11 @@ from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeError
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 from tests.support.trees import Gate, in_sequence, state, together
+
+
+class TicksItself(MoveRobot):
+    def tick(self) -> Iterator[Behaviour]:
+        return super().tick()
 
 
 class Stage:
@@ -62,12 +68,20 @@ class TestTicks:
         assert stage.runner.now < by
         assert tree.count < 40
 
-    @pytest.mark.parametrize(("beside", "ticks"), [([], range(9)), ([Gate()], range(80, 99))])
+    @pytest.mark.parametrize(
+        ("leaf", "heartbeat", "ticks"),
+        [
+            (Gate(), 0.1, range(80, 99)),
+            (TicksItself("n", 1.0), 0.1, range(80, 99)),
+            (MoveRobot("n", 1.0), 0.1, range(5, 9)),
+            (MoveRobot("n", 1.0), 3.0, range(5, 9)),
+        ],
+    )
     def test_come_at_heartbeats_where_more_than_a_goal_is_waited_for(
-        self, beside: list[Behaviour], ticks: range
+        self, leaf: Behaviour, heartbeat: float, ticks: range
     ) -> None:
-        tree = BehaviourTree(together(MoveRobot("m", 1.0), *beside))
-        runner = Stage(tree).runner
+        tree = BehaviourTree(together(MoveRobot("m", 1.0), leaf))
+        runner = Stage(tree, heartbeat=heartbeat).runner
         runner.start()
         runner.advance(8.0)
         assert tree.count in ticks

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+from unittest.mock import AsyncMock
 
 import pytest
 from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport, TreeInfo
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
+from rclpy.action.server import RCLError
 
+from bt_actions.serving import TreeServer
 from tests.serving.conftest import MOVE, Serve
 from tests.support.processes import Journal, Process
 from tests.support.tree_client import PATIENCE, TreeClient
@@ -28,11 +33,8 @@ def test_a_tree_runs_to_its_end_and_tells_what_it_did(
     serve()
     serve_trees()
     status, result = client.result(client.send("move", "{distance: 0.3}"))
-    assert (status, result.error_code, result.settled) == (
-        GoalStatus.STATUS_SUCCEEDED,
-        R.NONE,
-        True,
-    )
+    told = (status, result.error_code, result.settled)
+    assert told == (GoalStatus.STATUS_SUCCEEDED, R.NONE, True)
     assert json.loads(result.outputs).keys() == {"at"}
     (action,) = result.actions
     assert (action.path, action.server, action.attempts) == ("Move / Go", name, 1)
@@ -260,6 +262,22 @@ def test_a_tick_that_does_not_return_does_not_hold_the_process_at_the_second_sig
     )
     assert server.wait() == 3
     assert "hangs: a behaviour does not return from its tick" in server.errors[-1]
+
+
+def test_a_cancel_is_forgotten_with_a_goal_whose_client_vanished(
+    node: Any, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, request = TreeServer(node, trees=folder), RunTree.Impl.SendGoalService.Request()
+
+    def vanish(*_: object) -> None:
+        server._on_cancel(request)
+        raise RCLError("gone")
+
+    monkeypatch.setattr(server._action, "_admit", AsyncMock())
+    monkeypatch.setattr(type(server._action._handle), "send_goal_response", vanish)
+    asyncio.run(server._action._execute_goal_request((None, request)))
+    assert not server._canceled_early
+    server.close()
 
 
 OWN_NODE = """

@@ -36,11 +36,12 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
     """An action server that leaves it to others when a goal is executed and when it has ended.
 
     Args:
-        admit: awaited with a goal request; what it returns is handed to `accepted`, or to `dropped`
-            where the client could not be told. None rejects the goal.
+        admit: awaited with a goal request; what it returns is handed to `accepted`. None rejects
+            the goal.
         accepted: called with the goal when its client knows that it was accepted.
+        dropped: called with the goal's id where the client could not be told of that.
         cancel: called with a goal when its client asks for its cancel; it may come before
-            `accepted`.
+            `accepted` and `dropped`.
         keeps: seconds for which a result can be asked for.
     """
 
@@ -52,7 +53,7 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
         *,
         admit: Callable[[Any], Awaitable[Any]],
         accepted: Callable[[ServerGoalHandle, Any], None],
-        dropped: Callable[[Any], None],
+        dropped: Callable[[bytes], None],
         cancel: Callable[[ServerGoalHandle], None],
         keeps: int,
     ) -> None:
@@ -122,9 +123,10 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
         try:
             await super()._execute_goal_request(request_header_and_message)
         finally:
-            admitted = self._admitted.pop(id(request_header_and_message[1].goal), None)
-            if admitted is not None:
-                self._dropped(admitted)  # its client has gone away; rclpy says nothing of that
+            request = request_header_and_message[1]
+            if self._admitted.pop(id(request.goal), None) is not None:
+                # Its client has gone away; rclpy says nothing of that
+                self._dropped(bytes(request.goal_id.uuid))
 
     async def _on_goal(self, goal: Any) -> GoalResponse:
         admitted = await self._admit(goal)
