@@ -12,6 +12,7 @@ from py_trees.common import Status
 
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.ros.host import host as process
+from bt_actions.servers.presence import Server
 from tests.support.processes import Host, Journal
 from tests.support.reliability import Record, rounded
 from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, started, state, together
@@ -250,9 +251,12 @@ class TestABehaviourThatRaises:
         journal = serve("1:delay_accept=0.3")
         warm = MoveRobot("warm", 0.0, action_name=name)
         warm.setup(node=node)  # so that the server is known, and the first tick sends
-        until(warm._endpoint.transport.ready)
-        way = warm._endpoint.route  # nor is it in doubt since a stall in the tests before
-        way._long_stalls = process.stalls.long_times
+        now, at = (
+            process.steady,
+            warm._endpoint,
+        )  # nor is it in doubt since a stall in the tests before
+        at.route._long_stalls = process.stalls.long_times
+        until(lambda: at.recent_state(now()) is Server.READY and not at.holds_back(now()))
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(leaf, Raises("culprit", method), name="root")
         with TreeRunner(root, node=node) as runner:
