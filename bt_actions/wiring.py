@@ -40,13 +40,16 @@ def backend_of(node: Any) -> Backend:
         return NodeParticipant.of(node)
 
 
-def spinner(died: Callable[[], None], **given: Any) -> Spinner:
-    """Return a node that is spun: of all who give nothing it is one; see ros/spinning.py."""
+def spinner(died: Callable[[], None], *, may_share: bool, **given: Any) -> Spinner:
+    """Return a node that is spun: of all who may share and give nothing it is one.
+
+    See ros/spinning.py.
+    """
     from bt_actions.ros.spinning import Spinner
 
-    if any(each not in (None, "") for each in given.values()):
-        return Spinner(**given, died=died)
-    return Spinner.shared(died)
+    if may_share and all(each in (None, "") for each in given.values()):
+        return Spinner.shared(died)
+    return Spinner(**given, died=died)
 
 
 def ended_by_signals(

@@ -15,6 +15,7 @@ import py_trees
 import pytest
 import rclpy
 from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Running
 from py_trees.common import Status
 from rclpy.executors import SingleThreadedExecutor
 
@@ -218,11 +219,23 @@ class TestWithNothingSaid:
         self, domain: int, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with contextlib.ExitStack() as stack:
-            first = stack.enter_context(TreeRunner(Gate()))
-            named = stack.enter_context(TreeRunner(Gate(), name="named"))
+            first = stack.enter_context(TreeRunner(Running("r")))
+            named = stack.enter_context(TreeRunner(Running("r"), name="named"))
             monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
-            unseen = stack.enter_context(TreeRunner(Gate()))
+            unseen = stack.enter_context(TreeRunner(Running("r")))
             assert len({first.node, named.node, unseen.node}) == 3
+
+    def test_a_leaf_of_the_users_has_the_node_to_itself(self, domain: int) -> None:
+        class Declares(Behaviour):
+            def setup(self, node: Any, **_: Any) -> None:
+                node.declare_parameter("speed", 1.0)
+
+            def update(self) -> Status:
+                return Status.SUCCESS
+
+        trees = [in_sequence(Declares("d")) for _ in range(2)]
+        with TreeRunner(trees[0]) as one, TreeRunner(trees[1]) as other:
+            assert [one.run(9.0), other.run(9.0)] == [Status.SUCCESS] * 2
 
     def test_they_run_in_callbacks_of_the_executor_that_they_share(
         self, journal: Journal, name: str
@@ -230,12 +243,12 @@ class TestWithNothingSaid:
         """More of them than that has threads."""
         leaves = [MoveRobot(f"m{at}", 0.1, action_name=name, busy="wait") for at in range(4)]
         runners, statuses = [TreeRunner(leaf) for leaf in leaves], list[Status]()
-        with TreeRunner(Gate()) as outer:
+        with TreeRunner(Running("r")) as outer:
             outer.start()
             for each in runners:
                 outer.executor.create_task(lambda each=each: statuses.append(each.run(9.0)))
             until(lambda: len(statuses) == len(leaves), 20.0)
-            within = called(outer.executor, lambda: TreeRunner(Gate()))
+            within = called(outer.executor, lambda: TreeRunner(Running("r")))
             assert within.node is not outer.node, "who made it may wait for it"
             for runner in [*runners, within]:
                 runner.shutdown()

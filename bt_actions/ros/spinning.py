@@ -1,9 +1,9 @@
 """A node of our own and the thread that spins it, with the one order of shutdown that is clean.
 
 Other orders gave errors about invalid handles, segmentation faults, or leaked a thread pool:
-executor, spin thread, thread pool, clients, node, context. Users who say nothing share one: the
-first makes it, and it is stopped with the last. Nothing here knows of trees or goals beyond closing
-the node's traffic.
+executor, spin thread, thread pool, clients, node, context. Users who may, and say nothing, share
+one: the first makes it, and it is stopped with the last. Nothing here knows of trees or
+goals beyond closing the node's traffic.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class Spinner:
 
     @classmethod
     def shared(cls, died: Callable[[], None]) -> Spinner:
-        """Return the one of all who say nothing, as long as what ROS goes by is the same.
+        """Return the one of all who share, as long as what ROS goes by is the same.
 
         Another one where it cannot be used any more, and in a callback of its own: who made that
         may be waiting for it to end.
@@ -269,9 +269,11 @@ class Spinner:
                 self._close(before_nodes)
             elif before_nodes is not None:
                 was_spun = self._halt()
-                before_nodes()
-                if was_spun:
-                    self.start()
+                try:
+                    before_nodes()
+                finally:
+                    if was_spun:
+                        self.start()
 
     def _halt(self) -> bool:
         """End the spin thread; return whether there was one."""

@@ -24,7 +24,7 @@ from bt_actions.running.goals import RunGoals
 from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain, drain
-from bt_actions.utilities.places import culprit_of, path_of
+from bt_actions.utilities.places import culprit_of, path_of, root_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
 from bt_actions.wiring import backend_of
@@ -328,11 +328,14 @@ class TickLoop:
             del error
 
     def shutdown(self) -> None:
-        """Shut the tree down, if it was set up here: else another one may run it."""
+        """Shut down the tree, and what was pruned, if set up here: else another one may run it."""
         if not self._nodes:
             return
-        ours = [each for each in self.tree.root.iterate() if isinstance(each, ActionBehaviour)]
-        for shutdown in self.tree.shutdown, *(each.shutdown for each in ours):
+        nodes = list(self.tree.root.iterate())
+        ours = [each for each in nodes if isinstance(each, ActionBehaviour)]
+        left = {*self._nodes, *self._left}.difference(nodes)
+        pruned = [each for each in left if root_of(each) in left]  # and is in no other tree
+        for shutdown in self.tree.shutdown, *(each.shutdown for each in [*ours, *pruned]):
             try:  # ours must let go though another one raises
                 shutdown()
             except Exception as error:  # noqa: BLE001 - the user's: any

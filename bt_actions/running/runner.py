@@ -43,9 +43,10 @@ class TreeRunner:
 
     Args:
         root_or_behaviour_tree: what to run; of a BehaviourTree, handlers and visitors are called.
-        node: to send goals from; without one, context, node and spin thread are made here, once for
-            all runners that give neither this nor any of what follows but `heartbeat`. A node that
-            is in an executor is never spun here: its owner spins it.
+        node: to send goals from; without one, context, node and spin thread are made here. Runners
+            share them that give neither this nor any of what follows but `heartbeat`, and whose
+            trees have, when the runner is made, no class but those of bt_actions and py_trees. A
+            node that is in an executor is never spun here: its owner spins it.
         executor: "multi" (the default), "single", or an executor; one without nodes is spun here.
         heartbeat: seconds after which the tree is ticked though nothing has happened; 2 s or
             more where what it ticked waits for goals alone, as only others watch the clock.
@@ -84,6 +85,7 @@ class TreeRunner:
         self._pid = os.getpid()
         self._spinner = wiring.spinner(
             self._wake_up.set,
+            may_share=all(map(_is_known, [self.tree, *self.tree.root.iterate()])),
             node=node,
             executor=executor,
             name=name,
@@ -303,7 +305,7 @@ class TreeRunner:
     def shutdown(self) -> None:
         """End the run if there is one, and shut down the tree and all that was made here.
 
-        What runners share goes with the last of them.
+        What runners share goes with the last of them: what is put on their node stays until then.
         Returns at once where another thread is at it. What an exception cuts short waits no longer.
         Raises RuntimeError on a thread of an executor that is spun here, and within the run.
         """
@@ -385,6 +387,11 @@ class TreeRunner:
         self._spinner.check()
         if error := self._spinner.error:
             raise TreeError(f"the spin thread died: {raised(error)}") from error
+
+
+def _is_known(part: object) -> bool:
+    """Whether its class is not a user's, whose setup may leave anything on the node."""
+    return type(part).__module__.partition(".")[0] in ("bt_actions", "py_trees")
 
 
 def _waits_for_itself(call: str, instead: str) -> RuntimeError:
