@@ -128,20 +128,23 @@ class ChangeVisitor(VisitorBase):
         visited, stopped = self._visited, list[Behaviour]()
         is_as_before = visited == self._visited_before
         self._visited_before = visited
-        if not is_as_before:
+        if self._running and not is_as_before:
             seen = set(visited)
             stopped = [node for node in self._running if node not in seen]
-        changes = self._changes([*stopped, *visited])
+        changes = self._changes(stopped + visited)
         if changes or not is_as_before:
             self._running = [node for node in visited if node.status is Status.RUNNING]
-            dues = [getattr(node, "due_in", None) for node in self._running]
-            self.timed = [due for due in dues if callable(due)]
+            kinds = {type(node) for node in visited}
+            timed = {kind for kind in kinds if callable(getattr(kind, "due_in", None))}
+            running = self._running if timed else []
+            self.timed = [getattr(n, "due_in") for n in running if type(n) in timed]  # noqa: B009
             ours = ActionBehaviour.tick, ActionBehaviour.update
-            others = [n for n in visited if (type(n).tick, type(n).update) != ours]
-            self.watching = any(type(node) not in _PASS_ON for node in others)
+            others = {kind for kind in kinds if (kind.tick, kind.update) != ours}
+            self.watching = not others <= _PASS_ON
             self.may_go_on = self.watching or not all(
                 isinstance(node, composites.Sequence | composites.Selector) and node.memory
-                for node in others
+                for node in visited
+                if type(node) in others
             )
         return changes
 
