@@ -24,7 +24,7 @@ from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, Tre
 from bt_actions.ros import spinning
 from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
-from tests.support.trees import Gate, Raises, in_sequence, state, together
+from tests.support.trees import Gate, Raises, in_sequence, started, state, together
 from tests.support.waiting import until
 
 
@@ -93,8 +93,7 @@ class TestRun:
 
     def test_a_second_run_at_a_time_is_refused(self, node: Any) -> None:
         gate = Gate()
-        with TreeRunner(gate, node=node) as runner:
-            runner.start()
+        with started(gate, node=node) as runner:
             with pytest.raises(RuntimeError, match="running already"):
                 runner.run()
             with pytest.raises(RuntimeError, match="already"):
@@ -243,8 +242,7 @@ class TestWithNothingSaid:
         """More of them than that has threads."""
         leaves = [MoveRobot(f"m{at}", 0.1, action_name=name, busy="wait") for at in range(4)]
         runners, statuses = [TreeRunner(leaf) for leaf in leaves], list[Status]()
-        with TreeRunner(Running("r")) as outer:
-            outer.start()
+        with started(Running("r")) as outer:
             for each in runners:
                 outer.executor.create_task(lambda each=each: statuses.append(each.run(9.0)))
             until(lambda: len(statuses) == len(leaves), 20.0)
@@ -277,15 +275,13 @@ class TestFuture:
             assert told == [(Status.SUCCESS, False)]
 
     def test_has_what_the_run_raised(self, node: Any, capfd: pytest.CaptureFixture[str]) -> None:
-        with TreeRunner(Raises("culprit", "update"), node=node) as runner:
-            runner.start()
+        with started(Raises("culprit", "update"), node=node) as runner:
             assert isinstance(runner.future.exception(9.0), TreeError)
         assert "the tree that was started raised" not in capfd.readouterr().err
 
     def test_may_be_awaited(self, node: Any) -> None:
         async def awaits() -> Status:
-            with TreeRunner(py_trees.behaviours.Success("s"), node=node) as runner:
-                runner.start()
+            with started(py_trees.behaviours.Success("s"), node=node) as runner:
                 return await asyncio.wrap_future(runner.future)
 
         assert asyncio.run(awaits()) is Status.SUCCESS
@@ -332,8 +328,7 @@ class TestOneRunAtATime:
 
     def test_who_never_ran_a_tree_does_not_shut_it_down(self, node: Any) -> None:
         root = ShutsDown("root")
-        with TreeRunner(root, node=node) as runner:
-            runner.start()
+        with started(root, node=node) as runner:
             until(lambda: root.status is Status.RUNNING)
             TreeRunner(root).shutdown()
             assert not root.downs
@@ -374,8 +369,7 @@ class TestStuckInATick:
     ) -> None:
         leaf = MoveRobot("m", 30.0, action_name=name)
         stuck = Stuck(lambda: state(leaf) == "EXECUTING")
-        with TreeRunner(together(leaf, in_sequence(stuck, name="Look")), node=node) as runner:
-            runner.start()
+        with started(together(leaf, in_sequence(stuck, name="Look")), node=node) as runner:
             assert stuck.entered.wait(9.0)
             runner.interrupt()
             until(lambda: journal.ends() == ["canceled"], 9.0)
@@ -391,8 +385,7 @@ class TestInterrupt:
         self, journal: Journal, name: str, node: Any, executor: str
     ) -> None:
         leaf = MoveRobot("m", 9.0, action_name=name)
-        with TreeRunner(leaf, node=node, executor=executor) as runner:
-            runner.start()
+        with started(leaf, node=node, executor=executor) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             runner.interrupt()
             assert runner.wait(5.0) is Status.INVALID
@@ -429,8 +422,7 @@ class TestStart:
 
     def test_wait_gives_up_and_the_tree_goes_on(self, node: Any) -> None:
         gate = Gate()
-        with TreeRunner(gate, node=node) as runner:
-            runner.start()
+        with started(gate, node=node) as runner:
             with pytest.raises(TimeoutError, match=r"is still running after 0.05 s$"):
                 runner.wait(0.05)
             gate.passed = True
@@ -441,10 +433,9 @@ class TestStart:
             runner.wait()
 
     def test_wait_raises_what_run_would(self, node: Any) -> None:
-        with TreeRunner(Raises("culprit", "update"), node=node) as runner:
-            runner.start()
-            with pytest.raises(TreeError, match="culprit"):
-                runner.wait(5.0)
+        culprit = Raises("culprit", "update")
+        with started(culprit, node=node) as run, pytest.raises(TreeError, match="culprit"):
+            run.wait(5.0)
 
     @pytest.mark.parametrize("last", [GoalChanged, TreeFinished])
     def test_shutdown_by_an_observer_is_refused(
@@ -556,8 +547,7 @@ class TestWhoSpins:
         self, journal: Journal, name: str, executor: str, how: str
     ) -> None:
         leaf = MoveRobot("m", 9.0, action_name=name)
-        with TreeRunner(leaf, executor=executor) as runner:
-            runner.start()
+        with started(leaf, executor=executor) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             if how == "shut down":
                 runner.executor.shutdown()
@@ -574,8 +564,7 @@ class TestWhoSpins:
         self, journal: Journal, name: str, executor: str
     ) -> None:
         leaf = MoveRobot("m", 9.0, action_name=name, retry=3)
-        with TreeRunner(in_sequence(leaf, Gate()), executor=executor) as runner:
-            runner.start()
+        with started(in_sequence(leaf, Gate()), executor=executor) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             runner.node.context.shutdown()
             try:
@@ -697,8 +686,7 @@ class TestWhoWaits:
 def test_all_goals_end_of_a_node_that_ends_with_its_runner(journal: Journal, name: str) -> None:
     """A second runner on the node of the first, which is shut down under it."""
     leaf = MoveRobot("m", 9.0, action_name=name)
-    with TreeRunner(Gate()) as owner:
-        owner.start()
+    with started(Gate()) as owner:
         guest = TreeRunner(leaf, node=owner.node)
         guest.start()
         until(lambda: state(leaf) == "EXECUTING")

@@ -22,24 +22,29 @@ from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, toget
 
 
 class At(Behaviour):
-    """Succeeds at a moment, for which it asks to be ticked if it `is_due`."""
+    """Succeeds at a moment."""
 
-    def __init__(self, moment: float, *, is_due: bool) -> None:
+    def __init__(self, moment: float) -> None:
         super().__init__("at")
         self.moment, self.stepped = moment, Stepped(self, heartbeat=1.0)
-        if is_due:
-            self.due_in = lambda: self.moment - self.stepped.now
 
     def update(self) -> Status:
         return Status.SUCCESS if self.stepped.now >= self.moment else Status.RUNNING
 
 
+class DueAt(At):
+    """And asks to be ticked then."""
+
+    def due_in(self) -> float:
+        return self.moment - self.stepped.now
+
+
 class TestTicks:
-    @pytest.mark.parametrize(("is_due", "ends"), [(True, 2.5), (False, 3.0)])
+    @pytest.mark.parametrize(("kind", "ends"), [(DueAt, 2.5), (At, 3.0)])
     def test_come_at_each_heartbeat_and_when_a_behaviour_asks(
-        self, is_due: bool, ends: float
+        self, kind: type[At], ends: float
     ) -> None:
-        stepped = At(2.5, is_due=is_due).stepped
+        stepped = kind(2.5).stepped
         assert stepped.run() is Status.SUCCESS
         assert stepped.now == ends
 
