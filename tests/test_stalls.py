@@ -97,3 +97,13 @@ def test_stalls_in_a_row_are_borne_with_and_no_more_until_it_is_calm(
     calm = stand_still(stalls, moment + DOUBT_LASTS, seconds, 0.0)
     assert stalls.answers_take(calm)
     assert bool(stalls.servers_take(calm)) is is_long
+
+
+def test_who_looked_at_the_clock_before_a_stall_hears_of_it_as_of_now() -> None:
+    clock = [10.0]
+    stalls = Stalls(lambda _: clock[0], lambda _: clock[0])
+    stalls.lives(10.0)
+    stalls.sleeps(10.0, 10.2)
+    clock[0] = 14.2
+    assert stalls.answers_take(10.0)
+    assert stalls.servers_take(15.0)

@@ -33,7 +33,7 @@ class RosHost:
         self.log = log
         self.record = Record()
         """Replaced in wiring.py by one that is kept."""
-        self.stalls = Stalls(_idle)
+        self.stalls = Stalls(_idle, lambda _: time.monotonic())
         self.scheduler = Scheduler(
             self.steady,
             self.stalls,

@@ -49,14 +49,19 @@ class _Grace:
 class Stalls:
     """What is to be borne with, after stalls, at any moment (seconds of the steady clock)."""
 
-    def __init__(self, idle: Callable[[float], float] = lambda now: now) -> None:
+    def __init__(
+        self,
+        idle: Callable[[float], float] = lambda now: now,
+        clock: Callable[[float], float] = lambda now: now,
+    ) -> None:
         """`idle` returns the seconds in which this process did nothing, asleep or stopped.
 
+        `clock` returns the moment that it is: who asks may have looked at it before a stall.
         A garbage collection is no stall, as it is work: the middleware's own threads go on.
         """
         self.long_times = 0
         """How often this process stood still for so long that others may have lost sight of it."""
-        self._idle = idle
+        self._idle, self._clock = idle, clock
         self._due = math.inf  # by when, on the idle clock, it means to live again
         self._rests_since = math.inf
         self._answers = _Grace(ANSWERS_TAKE, calm=ANSWERS_TAKE)
@@ -64,6 +69,7 @@ class Stalls:
 
     def lives(self, now: float) -> float:
         """Take a sign of life; return for how many seconds it stood still, if it is borne with."""
+        now = self._clock(now)
         idle, borne = self._idle(now), 0.0
         if self._due == math.inf:
             self.long_times += now - self._rests_since > OUT_OF_SIGHT
