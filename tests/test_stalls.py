@@ -49,9 +49,7 @@ def test_servers_are_out_of_sight_where_a_lease_may_have_run_out(stalls: Stalls)
     assert not stalls.servers_take(end + BACK_IN_SIGHT)
 
 
-def test_after_a_rest_nobody_knows_whether_this_process_is_still_heard(
-    stalls: Stalls,
-) -> None:
+def test_after_a_rest_nobody_knows_whether_this_process_is_heard(stalls: Stalls) -> None:
     stalls.rests(10.0)
     stalls.lives(10.0 + OUT_OF_SIGHT)
     assert stalls.long_times == 0, "no lease is so short"

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from py_trees.common import Status
 
-from bt_actions import ActionBehaviour, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
+from bt_actions import ActionBehaviour, MoveRobot, Outcome, Retry, Timeouts
 from bt_actions.testing import VirtualBackend, VirtualNetwork
-from tests.support.trees import state, together
+from tests.support.trees import started, state, together
 from tests.support.waiting import until
 
 if TYPE_CHECKING:
@@ -153,8 +153,7 @@ def test_an_answer_that_cannot_be_taken_keeps_no_other_goal_from_being_canceled(
 
     journals = [host.open(f"{name}_{which}") for which in ("broken", "sound")]
     leaves = [MoveRobot(which, 9.0, action_name=f"{name}_{which}") for which in ("broken", "sound")]
-    with TreeRunner(together(*leaves), node=node) as runner:
-        runner.start()
+    with started(together(*leaves), node=node):
         until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
         monkeypatch.setattr(leaves[0]._endpoint.transport, "deliver_arrived", broken)
     assert [journal.ends() for journal in journals] == [["canceled"], ["canceled"]]

@@ -26,6 +26,7 @@ from std_msgs.msg import String
 
 from bt_actions import MoveRobot, TreeRunner
 from bt_actions.simulation import Script, ScriptedServer
+from tests.support.trees import started
 from tests.support.waiting import until
 
 NAME = "/cycles/move"
@@ -86,8 +87,7 @@ def on_a_node_of_its_own(cycle: int) -> None:
 def interrupted(cycle: int) -> None:
     """Interrupted before anything has begun; there is no server."""
     leaf = MoveRobot("move", 0.0, action_name=NAME)
-    with TreeRunner(leaf, executor="single" if cycle % 2 else "multi") as runner:
-        runner.start()
+    with started(leaf, executor="single" if cycle % 2 else "multi") as runner:
         runner.interrupt()
         check(runner.wait(20.0) is Status.INVALID, f"cycle {cycle}: {leaf.outcome}")
 
