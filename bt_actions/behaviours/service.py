@@ -52,7 +52,7 @@ class CallService(Connected[Service]):
         super().__init__(name)
         self.service_type = service_type
         self.retry = retry
-        self._name = service_name
+        self.service_name = service_name
         self._request = request
         self._timeout, self._patience = server, response
         self._read = read
@@ -60,7 +60,7 @@ class CallService(Connected[Service]):
     def _make(self, backend: Backend) -> Service:
         self._call = None
         self.service_type = interface(self.service_type, "srv")
-        return backend.service(self.service_type, self._name)
+        return backend.service(self.service_type, self.service_name)
 
     def initialise(self) -> None:
         self._tries = 0
