@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.connected import backend_in
+from bt_actions.behaviours.connected import Connected
 from bt_actions.behaviours.progress import Progress
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import register, resolve, variables_in
@@ -28,10 +27,11 @@ from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:
+    from bt_actions.traffic.endpoint import ActionEndpoint
     from bt_actions.traffic.handle import GoalHandle
 
 
-class ActionBehaviour(Behaviour):
+class ActionBehaviour(Connected["ActionEndpoint"]):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
     While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
@@ -59,8 +59,8 @@ class ActionBehaviour(Behaviour):
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
 
-    __slots__ = ("_attempts", "_backend", "_endpoint", "_handle", "_left_behind", "_outcome",
-                 "_reading", "_shown_feedback", "_started")  # fmt: skip
+    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading", "_shown_feedback",
+                 "_started")  # fmt: skip
 
     def __init__(
         self,
@@ -92,8 +92,6 @@ class ActionBehaviour(Behaviour):
         self.save = dict(save or {})
         self._reading = Reading(expect, self.save, self.retry.when, self.names)
         self._shown_feedback: tuple[Any, str] = (None, "")
-        self._backend: Backend | None = None
-        self._endpoint: Any = None
         self._handle: GoalHandle | None = None
         self._left_behind: list[GoalHandle] = []
         self._attempts = Attempts(self.retry, self._reading.when)
@@ -136,7 +134,7 @@ class ActionBehaviour(Behaviour):
     @property
     def server(self) -> str:
         """The action's fully qualified name once set up, and until then as it was given."""
-        return self._endpoint.name if self._endpoint is not None else self.action_name
+        return str(self._own.name) if self._own is not None else self.action_name
 
     def progress(self) -> Progress:
         """Return what the action is doing at this moment; safe to call from any thread."""
@@ -178,18 +176,17 @@ class ActionBehaviour(Behaviour):
         that its result has not; UnknownInterface (a LookupError) when the action type is not
         installed.
         """
-        backend = backend_in(kwargs, self)
         self.action_type = interface(self.action_type, "action")
         self._check_fields()
         register(self, self._variables(), self.save)
-        if backend is not self._backend:
-            self._leave_endpoint()
-            self._endpoint = backend.traffic.endpoint(self.action_type, self.action_name)
-            self._backend = backend
+        super().setup(**kwargs)
+
+    def _make(self, backend: Backend) -> ActionEndpoint:
+        return backend.traffic.endpoint(self.action_type, self.action_name)
 
     def initialise(self) -> None:
         """Begin a visit. What an earlier one left behind is drained beside it."""
-        backend = self._require_setup()
+        backend, _ = self._there()
         if self._handle is not None and not self._filed(self._handle):
             ActionBehaviour.terminate(self, Status.INVALID)  # the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._reading.when)
@@ -198,7 +195,7 @@ class ActionBehaviour(Behaviour):
 
     def update(self) -> Status:
         """Take the goal as far as it goes at this moment; begins one attempt at most."""
-        backend = self._require_setup()
+        backend, _ = self._there()
         if self._outcome is not None:
             self.initialise()  # shut down while RUNNING, and set up again: another visit
         traffic, handle = backend.traffic, self._handle
@@ -260,17 +257,16 @@ class ActionBehaviour(Behaviour):
             ActionBehaviour.terminate(leaf, Status.INVALID)
         drain(traffic.host, [handle for leaf in leaves for handle in leaf.open_handles()])
         for leaf in leaves:
-            leaf._leave_endpoint()  # noqa: SLF001 - of our own kind
+            leaf._let_go()  # noqa: SLF001 - of our own kind
 
     def open_handles(self) -> list[GoalHandle]:
         """Return the goals of this leaf that are not over, left behind ones too.
 
         Also those that a second server has taken when they had ended here.
         """
-        handles = [*self._left_behind, *([self._handle] if self._handle else [])]
-        if self._endpoint is not None:
-            handles += [handle for handle in self._endpoint.goals_of(self) if handle not in handles]
-        return [handle for handle in handles if not handle.is_over]
+        here = [] if self._own is None else self._own.goals_of(self)
+        ours = dict.fromkeys([*self._left_behind, self._handle, *here])
+        return [handle for handle in ours if handle is not None and not handle.is_over]
 
     # What a leaf for actions of one type may know better
 
@@ -293,16 +289,11 @@ class ActionBehaviour(Behaviour):
 
     # Within
 
-    def _require_setup(self) -> Backend:
-        if self._backend is None:
-            raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
-        return self._backend
-
     def _begin(self, backend: Backend) -> GoalHandle:
         self._left_behind = self.open_handles()
         self._started = backend.clock.now().ros
         self._handle = backend.traffic.begin(
-            self._endpoint,
+            self._own,
             self,
             self.timeouts,
             self.resources,
@@ -325,7 +316,7 @@ class ActionBehaviour(Behaviour):
     def _make_message(self) -> Any:
         action: Any = self.action_type
         data = self.goal() if callable(self.goal) else self.goal
-        return fill(action.Goal, resolve(data), now=self._require_setup().clock.stamp)
+        return fill(action.Goal, resolve(data), now=self._there()[0].clock.stamp)
 
     def _variables(self) -> set[str]:
         """The blackboard keys that a goal is made from."""
@@ -380,9 +371,9 @@ class ActionBehaviour(Behaviour):
         state = handle.goal.state.shown.lower().replace("_", " ")
         return f"{state}{tries}{self._shown_feedback[1]}"
 
-    def _leave_endpoint(self) -> None:
+    def _let_go(self) -> None:
         if self._backend is not None:
             open_here = self.open_handles()  # a second server's share, too
             self._left_behind = [each for each in open_here if each is not self._handle]
-            self._backend.traffic.leave(self._endpoint)
-        self._backend = self._endpoint = None
+            self._backend.traffic.leave(self._own)
+        self._backend = self._own = None

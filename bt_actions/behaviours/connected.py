@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from py_trees.behaviour import Behaviour
@@ -13,13 +13,43 @@ from py_trees.common import Status
 from bt_actions.traffic.backend import Backend
 from bt_actions.wiring import backend_of
 
+T = TypeVar("T")
 
-def backend_in(arguments: Mapping[str, Any], leaf: Behaviour) -> Backend:
-    """Return what the node among the arguments of `leaf.setup` gives. Raises TypeError without."""
-    node = arguments.get("node")
-    if node is None:
-        raise TypeError(f"{leaf.name}: setup needs a ROS node: tree.setup(node=node)")
-    return backend_of(node)
+
+class Connected(Behaviour, Generic[T]):
+    """A behaviour that cannot do without a node, and has one thing of its own there."""
+
+    _backend: Backend | None = None
+    _own: Any = None
+
+    def setup(self, **kwargs: Any) -> None:
+        """Connect to the node given as ``node=``; again for the same node: fine."""
+        node = kwargs.get("node")
+        if node is None:
+            raise TypeError(f"{self.name}: setup needs a ROS node: tree.setup(node=node)")
+        backend = backend_of(node)
+        if backend is not self._backend:
+            self._let_go()
+            self._own, self._backend = self._make(backend), backend
+
+    def _make(self, backend: Backend) -> T:
+        """Make what it needs there."""
+        raise NotImplementedError
+
+    def _there(self) -> tuple[Backend, T]:
+        """Return the node, and what it has there."""
+        if self._backend is None or self._own is None:
+            raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
+        return self._backend, self._own
+
+    def _let_go(self) -> None:
+        """Let go of both."""
+        if self._own is not None:
+            self._own.close()
+        self._own = self._backend = None
+
+    def shutdown(self) -> None:
+        self._let_go()
 
 
 class Stopwatch:
@@ -68,7 +98,15 @@ class Timed(Behaviour):
 
 
 class Leaf(Timed):
-    """A leaf that says in `do` what it does, and fails where that raises ValueError."""
+    """A leaf that says in `do` what it does, and fails where that raises ValueError.
+
+    Its time begins with each visit.
+    """
+
+    _timeout: float | None = None
+
+    def initialise(self) -> None:
+        self.give(self._timeout)
 
     def do(self) -> Status:
         """Do what a tick does; may raise ValueError (ExpressionError is one)."""
@@ -81,38 +119,3 @@ class Leaf(Timed):
         except ValueError as error:
             self.feedback_message = str(error)
             return Status.FAILURE
-
-
-T = TypeVar("T")
-
-
-class Connected(Leaf, Generic[T]):
-    """A leaf that cannot do without a node, and has one thing of its own there."""
-
-    _own: Any = None
-    _timeout: float | None = None
-
-    def initialise(self) -> None:
-        self.give(self._timeout)
-
-    def setup(self, **kwargs: Any) -> None:
-        """Connect to the node given as ``node=``; again for the same node: fine."""
-        backend = backend_in(kwargs, self)
-        if backend is not self._backend:
-            self.shutdown()
-            self._own, self._backend = self._make(backend), backend
-
-    def _make(self, backend: Backend) -> T:
-        """Make what it needs there."""
-        raise NotImplementedError
-
-    def _there(self) -> tuple[Backend, T]:
-        """Return the node, and what it has there."""
-        if self._backend is None or self._own is None:
-            raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
-        return self._backend, self._own
-
-    def shutdown(self) -> None:
-        if self._own is not None:
-            self._own.close()
-        self._own = self._backend = None

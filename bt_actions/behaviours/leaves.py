@@ -42,9 +42,6 @@ class WaitUntil(Leaf):
         self._condition = condition
         self._timeout = timeout
 
-    def initialise(self) -> None:
-        self.give(self._timeout)
-
     def do(self) -> Status:
         why = "not yet"
         try:

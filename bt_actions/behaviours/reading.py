@@ -7,7 +7,6 @@ variable on the blackboard, and ``result`` what the server gave.
 from __future__ import annotations
 
 import ast
-import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,28 +22,10 @@ Names = Callable[[Any], Mapping[str, object]]
 Given = Callable[[Any], Any] | str
 
 
-def function_of(given: Given, what: str, names: Names, *, condition: bool) -> Callable[[Any], Any]:
-    """Return what was given as a function of the result.
-
-    Raises ValueError for what is none, naming `what` it was given for. A function made from text
-    raises ExpressionError where it cannot be computed.
-    """
-    if callable(given):
-        return given
-    if not isinstance(given, str):
-        raise ValueError(f"{what} must be a callable on the result or an expression as text")
-    try:
-        expression = Expression(given, roots=names(None))
-    except ExpressionError as error:
-        raise ValueError(f"{what}: {error}") from error
-    compute = expression.holds if condition else expression.evaluate
-    return lambda result: compute(names(result), read)
-
-
 class Reading:
     """The `expect`, `save` and `retry.when` of an action; a result is read first, saved later."""
 
-    __slots__ = ("_expect", "_given", "_names", "_save", "_to_save", "when")
+    __slots__ = ("_expect", "_names", "_save", "_to_save", "_wanted", "_written", "when")
 
     def __init__(
         self,
@@ -55,26 +36,39 @@ class Reading:
     ) -> None:
         """Raises ValueError for what is neither a function nor an expression."""
         self._names = names
-        self._given = expect, when, save
-        condition = functools.partial(function_of, names=names, condition=True)
-        place_of = functools.partial(function_of, names=names, condition=False)
-        self._expect = None if expect is None else condition(expect, "expect")
-        self._save = {key(name): place_of(place, "save") for name, place in save.items()}
-        self.when = None if when is None else condition(when, "retry.when")
+        self._written: tuple[tuple[str, Expression], ...] = ()  # what was given as text
+        self._wanted = expect if isinstance(expect, str) else getattr(expect, "text", "")
+        self._expect = None if expect is None else self._function(expect, "expect")
+        self.when = None if when is None else self._function(when, "retry.when")
+        self._save = {key(name): self._function(place, "save") for name, place in save.items()}
         self._to_save: list[tuple[str, Any]] = []  # of the last result, by blackboard key
+
+    def _function(self, given: Given, what: str) -> Callable[[Any], Any]:
+        """Return what was given as a function of the result.
+
+        Raises ValueError for what is none, naming `what` it was given for. A function made from
+        text raises ExpressionError where it cannot be computed.
+        """
+        if callable(given):
+            return given
+        if not isinstance(given, str):
+            raise ValueError(f"{what} must be a callable on the result or an expression as text")
+        try:
+            expression = Expression(given, roots=self._names(None))
+        except ExpressionError as error:
+            raise ValueError(f"{what}: {error}") from error
+        self._written += ((what, expression),)
+        compute = expression.evaluate if what == "save" else expression.holds
+        return lambda result: compute(self._names(result), read)
 
     def unknown_field(self, result_type: Any) -> str:
         """Say which field one of them reads that a result of this type has not; or ""."""
-        fields = result_type.get_fields_and_field_types()
-        expect, when, save = self._given
-        saved = (("save", place) for place in save.values())
-        for what, text in (("expect", expect), ("retry.when", when), *saved):
-            tree = Expression(text, roots=self._names(None)).tree if isinstance(text, str) else None
-            for node in ast.walk(tree) if tree is not None else ():
+        for what, expression in self._written:
+            for node in ast.walk(expression.tree):
                 match node:
                     case ast.Attribute(value=ast.Name(id="result"), attr=name):
-                        if name not in fields and not hasattr(result_type, name):  # a constant
-                            hint = did_you_mean(name, fields)
+                        if not hasattr(result_type, name):  # nor a constant
+                            hint = did_you_mean(name, result_type.get_fields_and_field_types())
                             return f"{what}: result has no field {name!r}{hint}"
         return ""
 
@@ -82,9 +76,7 @@ class Reading:
         """Check the result and read from it what is to be saved; return what is wrong with it."""
         try:
             if self._expect is not None and not self._expect(result):
-                given = self._given[0]
-                wanted = given if isinstance(given, str) else getattr(given, "text", "")
-                wanted = wanted or "something else"
+                wanted = self._wanted or "something else"
                 return f"{wanted} was expected, but the result is: {shorten(result)}"
         except ExpressionError as error:
             return str(error)

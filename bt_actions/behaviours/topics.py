@@ -9,7 +9,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.connected import Connected, Stopwatch
+from bt_actions.behaviours.connected import Connected, Leaf, Stopwatch
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
@@ -134,7 +134,7 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
     behaviour.due_in = due  # type: ignore[attr-defined]
 
 
-class WaitForMessage(Connected[Latest]):
+class WaitForMessage(Connected[Latest], Leaf):
     """Succeeds with the first message, since it started, that is the one waited for.
 
     Args:
@@ -197,7 +197,7 @@ class WaitForMessage(Connected[Latest]):
             self._own.kept = deque(maxlen=0)
 
 
-class Publish(Connected[Publisher]):
+class Publish(Connected[Publisher], Leaf):
     """Publishes one message and succeeds; fails when the message cannot be built.
 
     Before it publishes it waits for who listens: for `subscribers` where given; without that only

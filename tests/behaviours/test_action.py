@@ -134,7 +134,7 @@ def test_a_loop_that_stands_still_is_not_told_of_another_type(
     host.open(name)
     leaf = MoveRobot("m", 1.0, action_name=name, timeout=Timeouts(server=0.5))
     leaf.setup(node=node)
-    until(leaf._endpoint.transport.ready)
+    until(leaf._own.transport.ready)
     leaf.initialise()  # and is not ticked until its deadline is over
     handle = leaf.open_handles()[0]
     until(lambda: handle.goal.outcome is not None)
@@ -155,7 +155,7 @@ def test_an_answer_that_cannot_be_taken_keeps_no_other_goal_from_being_canceled(
     leaves = [MoveRobot(which, 9.0, action_name=f"{name}_{which}") for which in ("broken", "sound")]
     with started(together(*leaves), node=node):
         until(lambda: all(state(leaf) == "EXECUTING" for leaf in leaves))
-        monkeypatch.setattr(leaves[0]._endpoint.transport, "deliver_arrived", broken)
+        monkeypatch.setattr(leaves[0]._own.transport, "deliver_arrived", broken)
     assert [journal.ends() for journal in journals] == [["canceled"], ["canceled"]]
     told: list[str] = []  # by the log's own thread
     until(lambda: "not be taken: RuntimeError: of a type" in "".join(told),

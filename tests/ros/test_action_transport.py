@@ -312,7 +312,7 @@ def test_a_relative_name_is_the_same_action_as_the_full_one(node: Node, name: st
     for leaf in leaves:
         leaf.setup(node=node)
     assert leaves[1].server == name
-    assert leaves[0]._endpoint is leaves[1]._endpoint
+    assert leaves[0]._own is leaves[1]._own
     for leaf in leaves:
         leaf.shutdown()
 

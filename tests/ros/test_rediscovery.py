@@ -32,7 +32,7 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
     """Make a leaf's node blind to its server, from now on, so that neither hears the other."""
 
     def blind(leaf: MoveRobot) -> None:
-        client = leaf._endpoint.transport
+        client = leaf._own.transport
         monkeypatch.setattr(client, "servers", frozenset)
         monkeypatch.setattr(client, "ready", lambda: False)
         client._on_close(client)  # nobody waits for it
@@ -98,7 +98,7 @@ def test_who_is_not_heard_after_a_stall_hears_of_its_goal_all_the_same(
     leaf = MoveRobot("m", 60.0 if canceled else 4.0, action_name=name, timeout=Timeouts(cancel=2.0))
     with started(leaf, node=node) as runner:
         until(lambda: leaf.progress().feedback is not None)
-        client = leaf._endpoint.transport
+        client = leaf._own.transport
         with process.lock:
             for request in ("cancel", "ask_result", "probe"):
                 monkeypatch.setattr(client, request, lambda *_: client.reachability.asked(now()))
@@ -110,7 +110,7 @@ def test_who_is_not_heard_after_a_stall_hears_of_its_goal_all_the_same(
             runner.interrupt()
         runner.wait(40.0)
         assert leaf.end is (End.CANCELED if canceled else End.SUCCEEDED)
-        assert leaf._endpoint.transport is not client
+        assert leaf._own.transport is not client
     assert journal.ends() == ["canceled" if canceled else "succeeded"]
     until(nobody_looks)
 
@@ -151,7 +151,7 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
     leaf.setup(node=secure)
     with process.lock:
-        leaf._endpoint.route.seek(now())
+        leaf._own.route.seek(now())
     sight = SecondParticipant(domain, enclaves[0])
     assert {enclave(secure), enclave(sight.node)} == {"/kitchen/robot"}
     sight.close()
@@ -178,10 +178,10 @@ def test_where_names_are_remapped_nobody_looks(
     monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name))
     monkeypatch.setattr(node_participant, "look_for", lambda *to, at_once: looked_for.append(to))
     with process.lock:
-        leaf._endpoint.route.seek(now())
+        leaf._own.route.seek(now())
         assert not looked_for
         monkeypatch.setattr(NodeParticipant, "_is_remapped", lambda *_: False)
-        leaf._endpoint.route.seek(now())
+        leaf._own.route.seek(now())
         assert looked_for
     leaf.shutdown()
     remapped.destroy_node()

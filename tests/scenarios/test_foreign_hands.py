@@ -483,8 +483,8 @@ def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_no
 
     def sees(leaf: MoveRobot) -> bool:
         with process.lock:
-            assert leaf._endpoint is not None
-            return leaf._endpoint.observe_and_tell(time.monotonic()) is Server.READY
+            assert leaf._own is not None
+            return leaf._own.observe_and_tell(time.monotonic()) is Server.READY
 
     def count(what: str) -> int:
         return [state(leaf) for leaf in leaves].count(what)

@@ -253,7 +253,7 @@ class TestABehaviourThatRaises:
         warm.setup(node=node)  # so that the server is known, and the first tick sends
         now, at = (
             process.steady,
-            warm._endpoint,
+            warm._own,
         )  # nor is it in doubt since a stall in the tests before
         at.route._long_stalls = process.stalls.long_times
         until(lambda: at.recent_state(now()) is Server.READY and not at.holds_back(now()))

@@ -65,7 +65,7 @@ def until_shown(node: Any, name: str, servers: int) -> None:
 def until_both_hear(leaf: MoveRobot, node: Any) -> None:
     """Set the leaf up, and wait until two servers answer its client, and so will hear it later."""
     leaf.setup(node=node)
-    endpoint = leaf._endpoint
+    endpoint = leaf._own
     assert endpoint is not None
 
     def state_now() -> Server:
@@ -79,7 +79,7 @@ def until_both_hear(leaf: MoveRobot, node: Any) -> None:
 def until_heard(leaf: MoveRobot, node: Any) -> None:
     """Set the leaf up, and wait until its server answers its client: so neither is in any doubt."""
     leaf.setup(node=node)
-    endpoint = leaf._endpoint
+    endpoint = leaf._own
     assert endpoint is not None
     asked_at = float("-inf")
 
@@ -582,7 +582,7 @@ class TestStopped:
         context.init(domain_id=domain)
         gone = Node("gone", context=context)
         first.setup(node=gone)
-        endpoint = first._endpoint
+        endpoint = first._own
         assert endpoint is not None
         ticking = lambda: (endpoint.deliver_arrived(), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
@@ -624,7 +624,7 @@ class TestStopped:
         context.init(domain_id=domain)
         gone = Node("gone", context=context)
         first.setup(node=gone)
-        endpoint = first._endpoint
+        endpoint = first._own
         assert endpoint is not None
         ticking = lambda: (endpoint.deliver_arrived(), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
