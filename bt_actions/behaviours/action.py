@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from bt_actions.traffic.handle import GoalHandle
 
 
-class ActionBehaviour(Connected["ActionEndpoint"]):
+class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
     While it runs, `feedback_message` has the goal's state and its latest feedback in short form.

@@ -16,9 +16,10 @@ from bt_actions.wiring import backend_of
 T = TypeVar("T")
 
 
-class Connected(Behaviour, Generic[T]):
-    """A behaviour that cannot do without a node, and has one thing of its own there."""
+class Connected(Generic[T]):
+    """Part of what cannot do without a node: it has one thing of its own there."""
 
+    name: str
     _backend: Backend | None = None
     _own: Any = None
 

@@ -13,9 +13,8 @@ from bt_actions.behaviours.connected import Connected, Leaf, Stopwatch
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
-from bt_actions.traffic.backend import Backend, Publisher
+from bt_actions.traffic.backend import Backend, Publisher, Subscription
 from bt_actions.traffic.begun import waker
-from bt_actions.wiring import backend_of
 
 LOOKS = 0.05
 """Seconds between two looks for somebody who listens, or serves: nothing announces that."""
@@ -23,38 +22,8 @@ KEPT = 100
 """Messages kept for who waits for one of them; older ones are dropped."""
 
 
-class Latest:
-    """The latest message of a topic, and what is kept of the others. Touches nothing of a tree."""
-
-    def __init__(self, backend: Backend, message_type: type | str, topic: str, qos: str) -> None:
-        self.backend = backend
-        self.came = 0
-        """How many messages have come."""
-        self.newest: tuple[Any, Stopwatch] | None = None
-        """The latest one, and how old it is on the node's clock."""
-        self.kept: deque[Any] = deque(maxlen=0)
-        self.wake: Callable[[], None] = waker()
-        """Whom each message wakes: who has set this up, or keeps its messages."""
-        kind = interface(message_type, "msg")
-        self.subscription = backend.subscription(kind, topic, qos, self._take)
-        self.close = self.subscription.close
-
-    def keep(self, *, with_newest: bool = False) -> None:
-        """From now on keep each message in `kept`, the newest hundred."""
-        self.kept, self.wake = deque(maxlen=KEPT), waker()
-        if with_newest and self.newest is not None:
-            self.kept.append(self.newest[0])  # twice, should it come at this moment
-
-    def _take(self, message: Any) -> None:
-        clock = self.backend.clock
-        self.newest = message, Stopwatch(lambda: clock.now().ros)
-        self.came += 1
-        self.kept.append(message)
-        self.wake()
-
-
-class TopicValue:
-    """A topic whose latest message a tree reads as a variable."""
+class TopicValue(Connected[Subscription]):
+    """A topic whose latest message a tree reads as a variable. It is in no tree itself."""
 
     def __init__(
         self, name: str, message_type: type | str, topic: str, qos: str, max_age: float | None
@@ -62,38 +31,37 @@ class TopicValue:
         self.name = name
         self._given = message_type, topic, qos
         self._max_age = max_age
-        self._latest: Latest | None = None
-        self._said = ""
         self._look_again_at = 0.0
+        self._newest: tuple[Any, Stopwatch] | None = None
+        """The latest message, and how old it is on the node's clock."""
 
-    def connect(self, node: Any) -> None:
-        """Subscribe on a node; not again for the same one."""
-        if node is None:
-            return
-        backend = backend_of(node)
-        if self._latest is None or self._latest.backend is not backend:
-            self.close()
-            self._latest = Latest(backend, *self._given)
-        self._latest.wake = waker()
+    def setup(self, **kwargs: Any) -> None:
+        """Subscribe where there is a node; not again for the same one."""
+        if kwargs.get("node") is not None:
+            self._wake = waker()
+            super().setup(**kwargs)
 
-    def close(self) -> None:
-        """Unsubscribe."""
-        if self._latest is not None:
-            self._latest.close()
-        self._latest = None
+    def _make(self, backend: Backend) -> Subscription:
+        def take(message: Any) -> None:
+            self._newest = message, Stopwatch(lambda: backend.clock.now().ros)
+            self._wake()
+
+        self._newest = None
+        message_type, topic, qos = self._given
+        return backend.subscription(interface(message_type, "msg"), topic, qos, take)
 
     def read(self) -> object:
         """The latest message. Raises ExpressionError when there is none, or it is too old."""
-        latest = self._latest
-        if latest is None:
+        if self._backend is None:
             raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
-        topic = latest.subscription.name
-        if latest.newest is None:
-            now = latest.backend.clock.now().steady
+        backend, subscription = self._there()
+        topic = subscription.name
+        if self._newest is None:
+            now = backend.clock.now().steady
             if now >= self._look_again_at:  # a tree may ask at each tick
-                self._said, self._look_again_at = latest.subscription.why_nobody(), now + 1.0
+                self._said, self._look_again_at = subscription.why_nobody(), now + 1.0
             raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._said}")
-        message, since = latest.newest
+        message, since = self._newest
         age = since.passed()
         if self._max_age is not None and age > self._max_age:
             raise ExpressionError(f"the last message on {topic} is {age:.1f} s old (${self.name})")
@@ -101,8 +69,7 @@ class TopicValue:
 
     def first_may_come(self) -> float:
         """Seconds for which the first message may be on its way; 0 afterwards."""
-        latest = self._latest
-        return 0.0 if latest is None or latest.came else latest.subscription.may_come()
+        return 0.0 if self._own is None or self._newest else float(self._own.may_come())
 
 
 def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
@@ -134,7 +101,7 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
     behaviour.due_in = due  # type: ignore[attr-defined]
 
 
-class WaitForMessage(Connected[Latest], Leaf):
+class WaitForMessage(Connected[Subscription], Leaf):
     """Succeeds with the first message, since it started, that is the one waited for.
 
     Args:
@@ -160,26 +127,33 @@ class WaitForMessage(Connected[Latest], Leaf):
         self._given = message_type, topic, qos
         self._timeout = timeout
         self._read = read
+        self._kept: deque[Any] = deque(maxlen=0)  # while it waits: those that were not read yet
 
-    def _make(self, backend: Backend) -> Latest:
-        latest = Latest(backend, *self._given)
-        if self.status is Status.RUNNING:  # shut down in its visit, and set up again
-            latest.keep()
-        return latest
+    def _make(self, backend: Backend) -> Subscription:
+        self._came, self._newest, self._wake = 0, list[Any](), waker()
+        message_type, topic, qos = self._given
+        return backend.subscription(interface(message_type, "msg"), topic, qos, self._take)
+
+    def _take(self, message: Any) -> None:
+        self._came += 1
+        self._newest = [message]
+        self._kept.append(message)
+        self._wake()
 
     def initialise(self) -> None:
         super().initialise()
-        _, latest = self._there()  # what a latched topic delivered before is as good as new
-        self._came_before = latest.came
-        latest.keep(with_newest=self._given[2] == "latched")
+        self._there()
+        self._came_before, self._wake = self._came, waker()
+        # What a latched topic delivered before is as good as new
+        self._kept = deque(self._newest if self._given[2] == "latched" else (), KEPT)
 
     def do(self) -> Status:
-        _, latest = self._there()
-        topic = latest.subscription.name
+        _, subscription = self._there()
+        topic = subscription.name
         self.feedback_message = f"waiting for a message on {topic}"
-        for _ in range(len(latest.kept)):  # not what comes meanwhile: a tick must end
+        for _ in range(len(self._kept)):  # not what comes meanwhile: a tick must end
             try:
-                self._read(latest.kept.popleft())
+                self._read(self._kept.popleft())
             except ValueError as error:  # ExpressionError is one
                 self.feedback_message = str(error)
             else:
@@ -187,14 +161,13 @@ class WaitForMessage(Connected[Latest], Leaf):
                 return Status.SUCCESS
         if self.left() > 0.0:
             return Status.RUNNING
-        why = "" if latest.came else latest.subscription.why_nobody()
+        why = "" if self._came else subscription.why_nobody()
         if self._came_before:
             why = f"; {self._came_before} came before it began"
         raise ValueError(f"no such message on {topic} within {self._timeout:g} s{why}")
 
     def terminate(self, new_status: Status) -> None:
-        if self._own is not None:
-            self._own.kept = deque(maxlen=0)
+        self._kept = deque(maxlen=0)
 
 
 class Publish(Connected[Publisher], Leaf):

@@ -8,7 +8,7 @@ import pytest
 from py_trees.common import Status
 from std_msgs.msg import Int32
 
-from bt_actions.behaviours.topics import KEPT, Latest, WaitForMessage
+from bt_actions.behaviours.topics import KEPT, WaitForMessage
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 
 Publish = Callable[[int], None]
@@ -53,13 +53,21 @@ def test_a_message_that_fits_is_found_though_others_follow_it_before_the_next_ti
 def test_the_newest_messages_are_kept_for_who_waits(
     backend: VirtualBackend, publish: Publish
 ) -> None:
-    seen = Latest(backend, Int32, "level", "default")
+    seen: list[int] = []
+
+    def read(message: Int32) -> None:
+        seen.append(message.data)
+        raise ValueError("another")
+
+    waits = WaitForMessage("w", Int32, "level", qos="default", timeout=None, read=read)
+    waits.setup(node=backend)
     publish(-1)
-    seen.keep()
+    waits.tick_once()
     for number in range(KEPT + 2):
         publish(number)
-    assert [message.data for message in seen.kept] == list(range(2, KEPT + 2))
-    seen.close()
+    waits.tick_once()
+    assert seen == list(range(2, KEPT + 2))
+    waits.shutdown()
 
 
 def test_messages_that_came_before_it_began_are_told(

@@ -79,12 +79,12 @@ def _connect(root: Behaviour, topics: list[TopicValue]) -> None:
     def setup(**kwargs: Any) -> None:
         set_up(**kwargs)  # which shuts a leaf down that was set up before
         for topic in topics:
-            topic.connect(kwargs.get("node"))
+            topic.setup(**kwargs)
 
     def shutdown() -> None:
         shut_down()
         for topic in topics:
-            topic.close()
+            topic.shutdown()
 
     root.setup = setup  # type: ignore[method-assign]
     root.shutdown = shutdown  # type: ignore[method-assign]
