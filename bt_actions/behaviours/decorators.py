@@ -180,7 +180,51 @@ class Subtree(Gate):
         return status
 
 
-class RetryChild(Timed, Gate):
+class Repeat(Timed, Gate):
+    """Ticks its child again when it has succeeded; fails as soon as it fails.
+
+    Args:
+        name: as in py_trees.
+        child: what to repeat.
+        times: how often in all; for ever where not given. May raise ValueError, which fails.
+    """
+
+    _again, _counts, _least = Status.SUCCESS, "times", 0
+    _pauses = Retry()
+
+    def __init__(self, name: str, child: Behaviour, times: Number) -> None:
+        super().__init__(name, child)
+        self._times = times
+
+    def begin(self) -> None:
+        self._done = 0
+        self.give(0.0)
+        self._limit, self._of = _whole(self._times, self._counts, self._least)
+
+    def gate(self) -> Status | None:
+        if self._limit == 0:
+            return Status.SUCCESS
+        return None if self.left() <= 0.0 else Status.RUNNING
+
+    def update(self) -> Status:
+        status: Status = self.decorated.status
+        return self.count() if status is self._again else status
+
+    def count(self) -> Status:
+        """Note that a round is done, and what that means."""
+        self._done += 1
+        self.feedback_message = f"{self._done}{self._of} done"
+        if self._done == self._limit:
+            return self._again
+        self.give(self._pauses.pause(self._done))
+        return Status.RUNNING
+
+    def due_in(self) -> float | None:
+        """Seconds until the child begins anew; None while it runs."""
+        return None if self.decorated.status is Status.RUNNING else self.left()
+
+
+class RetryChild(Repeat):
     """Ticks its child again when it has failed, after a pause.
 
     Args:
@@ -190,66 +234,21 @@ class RetryChild(Timed, Gate):
         retry: the pauses, on the node's clock.
     """
 
+    _again, _counts, _least = Status.FAILURE, "attempts", 1
+
     def __init__(self, name: str, child: Behaviour, attempts: Number, retry: Retry) -> None:
-        super().__init__(name, child)
-        self._attempts = attempts
+        super().__init__(name, child, attempts)
         self._pauses = retry
 
-    def begin(self) -> None:
-        self._failures = 0
-        self.give(0.0)
-        self._limit, self._of = _whole(self._attempts, "attempts", 1)
-
-    def gate(self) -> Status | None:
-        return None if self.left() <= 0.0 else Status.RUNNING
-
     def update(self) -> Status:
-        status: Status = self.decorated.status
-        if status is Status.SUCCESS and self._failures:
-            self.feedback_message = f"attempt {self._failures + 1}{self._of} succeeded"
-        if status is not Status.FAILURE:
-            return status
-        self._failures += 1
-        self.feedback_message = f"attempt {self._failures}{self._of} failed"
-        if self._failures == self._limit:
-            return Status.FAILURE
-        self.give(self._pauses.pause(self._failures))
-        return Status.RUNNING
-
-    def due_in(self) -> float | None:
-        """Seconds until the next try; None while one is under way."""
-        return None if self.decorated.status is Status.RUNNING else self.left()
-
-
-class Repeat(Gate):
-    """Ticks its child again when it has succeeded; fails as soon as it fails.
-
-    Args:
-        name: as in py_trees.
-        child: what to repeat.
-        times: how often in all; for ever where not given. May raise ValueError, which fails.
-    """
-
-    def __init__(self, name: str, child: Behaviour, times: Number) -> None:
-        super().__init__(name, child)
-        self._times = times
-
-    def begin(self) -> None:
-        self._done = 0
-        self._limit, self._of = _whole(self._times, "times", 0)
-
-    def gate(self) -> Status | None:
-        return Status.SUCCESS if self._limit == 0 else None
-
-    def update(self) -> Status:
-        status: Status = self.decorated.status
-        return self.count() if status is Status.SUCCESS else status
+        if self.decorated.status is Status.SUCCESS and self._done:
+            self.feedback_message = f"attempt {self._done + 1}{self._of} succeeded"
+        return super().update()
 
     def count(self) -> Status:
-        """Note that a round is done; SUCCESS after the last."""
-        self._done += 1
-        self.feedback_message = f"{self._done}{self._of} done"
-        return Status.SUCCESS if self._done == self._limit else Status.RUNNING
+        status = super().count()
+        self.feedback_message = f"attempt {self._done}{self._of} failed"
+        return status
 
 
 class ForEach(Repeat):
@@ -280,7 +279,8 @@ class ForEach(Repeat):
         self._keep_going = keep_going
 
     def begin(self) -> None:
-        self._done = self._failures = 0
+        super().begin()
+        self._failures = 0
         items = plain(self._get_items())
         if not isinstance(items, (list, tuple)):
             raise ValueError(f"a list is needed, not {shorten(items, 60)}")

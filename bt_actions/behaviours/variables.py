@@ -6,7 +6,7 @@ the blackboard is process-global and has no lock.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,25 +80,21 @@ def register(leaf: Behaviour, read: Iterable[str], written: Iterable[str]) -> No
             client.register_key(name, how)
 
 
-def resolve(data: Any) -> Any:
+def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:
     """Return plain data with every Var in it replaced by its value; raises MissingVariable."""
     if isinstance(data, Var):
-        return data.read()
+        return value_of(data)
     if isinstance(data, Mapping):
-        return {name: resolve(value) for name, value in data.items()}
+        return {name: resolve(value, value_of) for name, value in data.items()}
     if isinstance(data, list | tuple):
         if numbers_only(data):
             return [*data]
-        return [resolve(value) for value in data]
+        return [resolve(value, value_of) for value in data]
     return data
 
 
 def variables_in(data: Any) -> set[str]:
     """Return the blackboard keys that `resolve` would read."""
-    if isinstance(data, Var):
-        return {key(data.name)}
-    if isinstance(data, Mapping):
-        return set().union(*map(variables_in, data.values()))
-    if isinstance(data, list | tuple) and not numbers_only(data):
-        return set().union(*map(variables_in, data))
-    return set()
+    found = set[str]()
+    resolve(data, lambda variable: found.add(key(variable.name)))
+    return found
