@@ -16,6 +16,7 @@ from collections.abc import Callable
 from typing import Any
 
 from action_msgs.msg import GoalStatus, GoalStatusArray
+from rclpy.serialization import deserialize_message, serialize_message
 
 ID, ENTRY, STATUS = 16, 28, 24
 """Bytes of a goal's id, and of an entry (id, time, status, filled up); and where the status is."""
@@ -57,50 +58,19 @@ def by_objects(message: Any) -> dict[bytes, int]:
 
 @functools.cache
 def _fast_type() -> type | None:
-    """Return a stand-in for GoalStatusArray that rclpy takes for a message type; or None."""
-    support: Any = type(GoalStatusArray)
-    support.__import_type_support__()
-    try:
-        if not _reads_as_expected(support):
-            return None
-        capsule = _python(
-            "PyCapsule_New", ctypes.py_object, ctypes.c_void_p, *[ctypes.c_char_p] * 2
-        )
-        members = {
-            "_CREATE_ROS_MESSAGE": support._CREATE_ROS_MESSAGE,  # noqa: SLF001 - what rclpy reads
-            "_DESTROY_ROS_MESSAGE": support._DESTROY_ROS_MESSAGE,  # noqa: SLF001
-            "_CONVERT_TO_PY": capsule(ctypes.cast(_CONVERT, ctypes.c_void_p), None, None),
-        }
-    except (AttributeError, OSError, ValueError):
-        return None
-    stand_in: type = type("Meta", (type,), members)("Statuses", (), {})
-    return stand_in
+    """Return a stand-in for GoalStatusArray that rclpy takes for a message type; or None.
 
-
-def _reads_as_expected(support: Any) -> bool:
-    """Whether a message of two goals that rosidl has laid out is read as what it is."""
-    entries = [GoalStatus(status=2), GoalStatus(status=6)]
-    for number, entry in enumerate(entries, 1):
+    None where a message of two goals that rclpy has laid out is not read as what it is.
+    """
+    message = GoalStatusArray(status_list=[GoalStatus(status=2), GoalStatus(status=6)])
+    for number, entry in enumerate(message.status_list, 1):
         entry.goal_info.goal_id.uuid = [number] * ID
         entry.goal_info.stamp.sec, entry.goal_info.stamp.nanosec = -number, number
-    message = GoalStatusArray(status_list=entries)
-    create = ctypes.PYFUNCTYPE(ctypes.c_void_p)(_pointer(support._CREATE_ROS_MESSAGE))  # noqa: SLF001
-    destroy = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)(_pointer(support._DESTROY_ROS_MESSAGE))  # noqa: SLF001
-    fill = ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.py_object, ctypes.c_void_p)(
-        _pointer(support._CONVERT_FROM_PY)  # noqa: SLF001
+    laid_out = serialize_message(message)
+    # made anew, as the function of `pythonapi` is shared by all
+    capsule = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, *[ctypes.c_char_p] * 2)(
+        ("PyCapsule_New", ctypes.pythonapi)
     )
-    laid_out = create()
-    try:
-        return bool(fill(message, laid_out)) and _read(laid_out) == by_objects(message)
-    finally:
-        destroy(laid_out)
-
-
-def _pointer(capsule: Any) -> int:
-    get = _python("PyCapsule_GetPointer", ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)
-    return int(get(capsule, None))
-
-
-def _python(name: str, returns: Any, *takes: Any) -> Any:
-    """A function of Python's C interface; made anew, as the one of `pythonapi` is shared by all."""
-    return ctypes.PYFUNCTYPE(returns, *takes)((name, ctypes.pythonapi))
+    own = {"_CONVERT_TO_PY": capsule(ctypes.cast(_CONVERT, ctypes.c_void_p), None, None)}
+    stand_in: type = type("Meta", (type(GoalStatusArray),), own)("Statuses", (), {})
+    return stand_in if deserialize_message(laid_out, stand_in) == by_objects(message) else None
