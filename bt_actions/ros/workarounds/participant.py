@@ -19,7 +19,6 @@ from collections.abc import Callable
 
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.utilities import get_rmw_implementation_identifier
 
 LIMIT = 5
 """Seconds for what the listener is just being told, which takes well under a millisecond."""
@@ -61,14 +60,12 @@ def fall_silent(node: Node) -> bool:
 @functools.cache
 def _call() -> Callable[[int], bool] | None:
     """Return what takes the listener off, by the address of an rcl_node_t; None: there is none."""
-    if get_rmw_implementation_identifier() != "rmw_fastrtps_cpp":
-        return None
     loaded = os.RTLD_NOLOAD | os.RTLD_LAZY
     try:
         rmw_node_of = ctypes.CDLL("librcl.so", mode=loaded).rcl_node_get_rmw_handle
         rmw = ctypes.CDLL("librmw_fastrtps_cpp.so", mode=loaded)
         participant_of, set_listener = rmw[_PARTICIPANT_OF], rmw[_SET_LISTENER]
-    except (OSError, AttributeError):  # of another release, or linked in another way
+    except (OSError, AttributeError):  # another middleware, or another release of it
         return None
     for function in (rmw_node_of, participant_of):
         function.argtypes, function.restype = (ctypes.c_void_p,), ctypes.c_void_p
