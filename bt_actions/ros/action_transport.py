@@ -14,17 +14,19 @@ every answer to a question is told, with those before it.
 What is taken waits in one inbox and is delivered in its order by whoever comes first: the executor,
 or a call of `deliver_arrived`, after which nothing that had arrived before is still under way.
 
-It carries messages and decides nothing. It uses the low-level handle of rclpy's ActionClient, whose
-methods are checked for at construction; an executor waits for it through workarounds/one_waitable.
+It carries messages and decides nothing. It uses the low-level handle of rclpy's ActionClient; an
+executor waits for it through workarounds/one_waitable.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
+import itertools
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,7 +43,7 @@ from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds.statuses import status_reader
 from bt_actions.servers.reachability import Reachability
-from bt_actions.traffic.transport import GOALS_KEPT, Listener, nobodys
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, nobodys
 from bt_actions.utilities.plain_text import raised
 
 TAKE_AT_MOST = 200
@@ -53,19 +55,6 @@ ASKED_KEPT = 10
 """Questions of one kind about one goal whose answers are waited for: the newest."""
 ANSWERS_KEPT = 10
 """Answers to one question that are told: more servers of one name answer nothing new."""
-_USED_OF_HANDLE = (
-    "send_goal_request",
-    "send_result_request",
-    "send_cancel_request",
-    "take_goal_response",
-    "take_result_response",
-    "take_cancel_response",
-    "take_feedback",
-    "take_status",
-    "is_action_server_available",
-    "add_to_waitset",
-    "is_ready",
-)
 
 
 @dataclass(slots=True)
@@ -90,19 +79,17 @@ class RosTransport:
         seen_since: float = NEVER,
         on_close: Callable[[RosTransport], None] = lambda _: None,
     ) -> None:
-        """Create the client, which no executor knows of.
-
-        Raises RuntimeError when this rclpy's low-level client lacks a method that is needed.
-        """
+        """Create the client, which no executor knows of."""
         self._lock = threading.RLock()
         self._node, self._name, self._listener = node, action_name, listener
         self.seen_since = seen_since
         self._on_close = on_close
-        self._goal_requests: dict[int, _Question] = {}
-        self._past_requests: dict[int, _Question] = {}
-        self._result_requests: dict[int, _Question] = {}
-        self._cancel_requests: dict[int, _Question] = {}
-        self._inbox: deque[tuple[str, Any, Any]] = deque()
+        self._questions: dict[tuple[Request, int], _Question] = {}
+        """By their kind, and rclpy's number of each."""
+        self._past: dict[tuple[Request, int], _Question] = {}
+        """The goal requests of goals that were forgotten."""
+        self._inbox: deque[tuple[Callable[..., None], tuple[Any, ...], float | None]] = deque()
+        """Whom to tell what, and when that was asked for."""
         self.reachability = Reachability()
         """Under the one lock, as all requests."""
         self.on_trial = False
@@ -120,9 +107,6 @@ class RosTransport:
                 action_name,
                 *(profile.get_c_qos_profile() for profile in profiles),
             )
-        missing = [name for name in _USED_OF_HANDLE if not hasattr(self.handle, name)]
-        if missing:
-            raise RuntimeError(f"this rclpy's action client has no {', '.join(missing)}")
 
     # Requests; each raises what rclpy raises when the handle or the context is no longer valid
 
@@ -131,10 +115,7 @@ class RosTransport:
         request = self._impl.SendGoalService.Request()
         request.goal_id = UUID(uuid=list(goal_id))
         request.goal = goal
-        with self._lock:
-            number = self.handle.send_goal_request(request)
-            self._goal_requests[number] = question = _Question(goal_id)
-            self.reachability.asked(question.asked)
+        self.reachability.asked(self._ask("goal", request, goal_id))
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result, which the server answers when the goal has ended."""
@@ -144,10 +125,7 @@ class RosTransport:
         """Ask the server to cancel this goal, and no other."""
         request = CancelGoal.Request()
         request.goal_info.goal_id = UUID(uuid=list(goal_id))
-        with self._lock:
-            number = self.handle.send_cancel_request(request)
-            self._keep(self._cancel_requests, number, question := _Question(goal_id))
-            self.reachability.asked(question.asked)
+        self.reachability.asked(self._ask("cancel", request, goal_id))
 
     def probe(self, probe: int) -> None:
         """Ask for a goal that nobody knows: each live server answers once, with status 0."""
@@ -156,28 +134,27 @@ class RosTransport:
     def _ask_result(self, goal_id: bytes, about: bytes | int) -> float:
         request = self._impl.GetResultService.Request()
         request.goal_id = UUID(uuid=list(goal_id))
-        with self._lock:
-            number = self.handle.send_result_request(request)
-            self._keep(self._result_requests, number, question := _Question(about))
-        return question.asked
+        return self._ask("result", request, about)
 
-    @staticmethod
-    def _keep(filed: dict[int, _Question], number: int, question: _Question) -> None:
-        filed[number] = question
-        same = [other for other, asked in filed.items() if asked.about == question.about]
-        for oldest in same[:-ASKED_KEPT]:
-            del filed[oldest]
+    def _ask(self, kind: Request, request: Any, about: bytes | int) -> float:
+        """Send a request and file it, before its answer is taken; return when it was sent."""
+        with self._lock:
+            number = getattr(self.handle, f"send_{kind}_request")(request)
+            question = self._questions[kind, number] = _Question(about)
+            same = [key for key, asked in self._questions.items() if asked.about == about]
+            for oldest in [key for key in same if key[0] == kind][:-ASKED_KEPT]:
+                del self._questions[oldest]
+        return question.asked
 
     def forget(self, goal: bytes | int) -> None:
         """Drop what is still filed for a goal (its id) or a probe (its number)."""
         with self._lock:
-            for filed in (self._goal_requests, self._result_requests, self._cancel_requests):
-                for number in [number for number, asked in filed.items() if asked.about == goal]:
-                    question = filed.pop(number)
-                    if filed is self._goal_requests:
-                        self._past_requests[number] = question
-            while len(self._past_requests) > GOALS_KEPT:
-                del self._past_requests[next(iter(self._past_requests))]
+            for key in [key for key, asked in self._questions.items() if asked.about == goal]:
+                question = self._questions.pop(key)
+                if key[0] == "goal":
+                    self._past[key] = question
+            while len(self._past) > GOALS_KEPT:
+                del self._past[next(iter(self._past))]
 
     # Answers
 
@@ -188,85 +165,63 @@ class RosTransport:
 
     def take_data(self) -> None:
         """Take all that has arrived into the inbox."""
-        taken = self._inbox
-        status_type, read_statuses = status_reader()
         with self._lock:
             if self.closed:
                 return
-            with self.handle:
-                for _ in range(TAKE_AT_MOST):
-                    number, response = self.handle.take_goal_response(
-                        self._impl.SendGoalService.Response
-                    )
-                    if response is None:
-                        break
-                    question = self._goal_requests.get(number) or self._past_requests.get(number)
-                    self._file("goal", question, response.accepted)
-                for _ in range(TAKE_AT_MOST):
-                    feedback = self.handle.take_feedback(self._impl.FeedbackMessage)
-                    if feedback is None:
-                        break
-                    taken.append(("feedback", bytes(feedback.goal_id.uuid), feedback.feedback))
-                for _ in range(TAKE_AT_MOST):
-                    number, response = self.handle.take_cancel_response(CancelGoal.Response)
-                    if response is None:
-                        break
-                    question = self._cancel_requests.get(number)
-                    if question is not None:
-                        self._file("cancel", question, _cancel_code(response, question.about))
-                for _ in range(TAKE_AT_MOST):
-                    number, response = self.handle.take_result_response(
-                        self._impl.GetResultService.Response
-                    )
-                    if response is None:
-                        break
-                    status = response.status
-                    result = response.result if status else None
-                    self._file("result", self._result_requests.get(number), (status, result))
-                for _ in range(TAKE_AT_MOST):
-                    message = self.handle.take_status(status_type)
-                    if message is None:
-                        break
-                    taken.append(("status", read_statuses(message), None))
+            handle, impl, put = self.handle, self._impl, self._inbox.append
+            feedback_came, statuses_came = (
+                self._listener.feedback_came,
+                self._listener.statuses_came,
+            )
+            status_type, read_statuses = status_reader()
+            with handle:
+                for number, answer in _all(
+                    handle.take_goal_response, impl.SendGoalService.Response
+                ):
+                    self._file("goal", number, answer.accepted)
+                for message in _all(handle.take_feedback, impl.FeedbackMessage, None):
+                    put((feedback_came, (bytes(message.goal_id.uuid), message.feedback), None))
+                for number, answer in _all(handle.take_cancel_response, CancelGoal.Response):
+                    self._file("cancel", number, _cancel_code(answer))
+                for number, answer in _all(
+                    handle.take_result_response, impl.GetResultService.Response
+                ):
+                    result = answer.result if answer.status else None
+                    self._file("result", number, (answer.status, result))
+                for message in _all(handle.take_status, status_type, None):
+                    put((statuses_came, (read_statuses(message),), None))
 
-    def _file(self, kind: str, question: _Question | None, answer: Any) -> None:
+    def _file(self, kind: Request, number: int, answer: Any) -> None:
         """Put an answer into the inbox, with those before it; none that nobody waits for."""
+        key = kind, number
+        question = self._questions.get(key) or self._past.get(key)
         if question is None or len(question.answers) >= ANSWERS_KEPT:
             return
-        if isinstance(question.about, int):
-            self._inbox.append(("probe", question.about, (question.asked,)))
+        about, asked = question.about, question.asked
+        if isinstance(about, int):
+            self._inbox.append((self._listener.probe_answered, (about,), asked))
             return
         question.answers.append(answer)
-        self._inbox.append((kind, question.about, (question.asked, tuple(question.answers))))
+        told = kind, about, asked, tuple(question.answers)
+        self._inbox.append((self._listener.answered, told, asked))
 
     def deliver(self) -> None:
         """Deliver what has been taken."""
         with host.lock:
             any_came = bool(self._inbox)
             while self._inbox:
-                kind, about, detail = self._inbox.popleft()
+                tell, what, asked = self._inbox.popleft()
+                if asked is not None:
+                    self.reachability.answered(asked=asked)
+                if self.on_trial and tell != self._listener.statuses_came:
+                    continue
                 try:
-                    self._tell(kind, about, detail)
+                    tell(*what)
                 except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
-                    log.error(f"{self._name}: {kind} was not taken in: {raised(error)}")
+                    log.error(f"{self._name}: what came was not taken in: {raised(error)}")
             if any_came:
                 with contextlib.suppress(Exception):  # nothing was lost by that
                     self._listener.all_delivered()
-
-    def _tell(self, kind: Any, about: Any, detail: Any) -> None:
-        tell = self._listener
-        if kind not in ("feedback", "status"):
-            self.reachability.answered(asked=detail[0])
-        if self.on_trial and kind != "status":
-            return
-        if kind == "feedback":
-            tell.feedback_came(about, detail)
-        elif kind == "status":
-            tell.statuses_came(about)
-        elif kind == "probe":
-            tell.probe_answered(about)
-        else:
-            tell.answered(kind, about, *detail)
 
     @property
     def has_more(self) -> bool:
@@ -300,10 +255,14 @@ class RosTransport:
         self._on_close(self)
 
 
-def _cancel_code(response: Any, goal_id: bytes | int) -> int:
+def _all(take: Callable[[Any], Any], kind: Any, nothing: Any = (None, None)) -> Iterator[Any]:
+    """Take all that has come of a kind, but not too many at a time; `nothing` ends it."""
+    return itertools.islice(iter(functools.partial(take, kind), nothing), TAKE_AT_MOST)
+
+
+def _cancel_code(response: Any) -> int:
     """Return the code that is meant: rclpy's servers answer 0 with an empty list for a refusal."""
     code = int(response.return_code)
-    canceling = {bytes(goal.goal_id.uuid) for goal in response.goals_canceling}
-    if code == CancelGoal.Response.ERROR_NONE and goal_id not in canceling:
+    if code == CancelGoal.Response.ERROR_NONE and not response.goals_canceling:
         return int(CancelGoal.Response.ERROR_REJECTED)
     return code

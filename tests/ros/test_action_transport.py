@@ -15,7 +15,6 @@ from rclpy.node import Node
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import Gripper, MoveRobot
-from bt_actions.ros import action_transport
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.workarounds.one_waitable import OneWaitable
@@ -243,14 +242,6 @@ def test_a_destroyed_client_is_silent_and_refuses_to_send(
     assert not heard.results
     with pytest.raises(Exception, match=r"(?i)destroy|invalid|pointer"):
         request(client, "goal")
-
-
-def test_an_rclpy_without_the_methods_that_are_needed_is_named_at_once(
-    node: Node, name: str, heard: Heard, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(action_transport, "_USED_OF_HANDLE", ("send_goal_request", "send_smoke"))
-    with pytest.raises(RuntimeError, match="no send_smoke"):
-        RosTransport(node, MoveRobotAction, name, heard)
 
 
 @pytest.mark.parametrize("moment", ["__enter__", "get_num_entities", "add_to_wait_set", "is_ready"])
