@@ -26,7 +26,7 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.in_sight import without_service, without_topic
 from bt_actions.ros.workarounds.closable import closable
 from bt_actions.traffic.backend import Call
-from bt_actions.traffic.begun import waker
+from bt_actions.traffic.handle import waker
 
 DISCOVERS = 3.5
 """Seconds that a new participant takes, at most, to discover who was there before it.

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.terms import State
-from bt_actions.traffic.begun import begun_in
-from bt_actions.traffic.handle import Change, GoalHandle, Run
+from bt_actions.traffic.handle import GoalHandle, Run, begun_in
 
 T = TypeVar("T")
 
@@ -46,7 +45,7 @@ class RunGoals:
         """
         self._emit, self._wake, self._changed = emit, wake, changed
         self._run = Run(self._note)
-        self._changes: deque[Change] = deque()
+        self._changes: deque[tuple[GoalHandle, tuple[Any, ...]]] = deque()
         self._handles: dict[GoalHandle, None] = {}  # in the order in which they began
         self.run_goes_on = False
         """Between two runs only what earlier ones have left is of interest."""
@@ -89,16 +88,18 @@ class RunGoals:
 
     def close(self) -> None:
         """Take note of nothing any more."""
-        self._run.tell = lambda change: None
+        self._run.tell = lambda handle: None
 
-    def _note(self, change: Change | None) -> None:
-        if change is not None:
-            is_news = change.handle in self._handles  # else its leaf is just beginning it
-            self._handles[change.handle] = None
-            self._changes.append(change)
+    def _note(self, handle: GoalHandle | None) -> None:
+        if handle is not None:
+            goal = handle.goal
+            is_news = handle in self._handles  # else its leaf is just beginning it
+            self._handles[handle] = None
+            said = goal.state.shown, handle.attempt, goal.outcome, goal.end, goal.reason
+            self._changes.append((handle, (*said, goal.id.hex())))
             self._changed()
-            may_be_sent = is_news and change.state is State.WAITING_FOR_SERVER
-            if not (self.is_watched or may_be_sent or change.outcome is not None):
+            may_be_sent = is_news and goal.state is State.WAITING_FOR_SERVER
+            if not (self.is_watched or may_be_sent or goal.outcome is not None):
                 return  # its leaf would do nothing
         elif not self.run_goes_on:
             return
@@ -109,20 +110,8 @@ class RunGoals:
         if not self._changes:
             return
         while self._changes:
-            change = self._changes.popleft()
-            handle = change.handle
+            handle, change = self._changes.popleft()
             if handle.owner is not None:  # else its leaf was thrown away since
-                self._emit(
-                    GoalChanged(
-                        now,
-                        handle.owner,
-                        change.state.shown,
-                        handle.attempt,
-                        change.outcome,
-                        change.end,
-                        change.reason,
-                        handle.goal.id.hex(),
-                    )
-                )
+                self._emit(GoalChanged(now, handle.owner, *change))
         for done in [each for each in list(self._handles) if each.is_over]:
             del self._handles[done]

@@ -13,7 +13,7 @@ from bt_actions.goals.terms import Now
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic.begun import waker
+from bt_actions.traffic.handle import waker
 from bt_actions.traffic.traffic import Traffic
 
 

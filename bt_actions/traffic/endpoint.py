@@ -10,30 +10,21 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from functools import partial
 from typing import Any
 
-from bt_actions.goals.goal import Goal
-from bt_actions.goals.policy import Busy, End, Outcome
-from bt_actions.goals.terms import (
-    STATUS_SUCCEEDED,
-    Event,
-    Now,
-    State,
-)
+from bt_actions.goals.policy import End
+from bt_actions.goals.terms import STATUS_SUCCEEDED, Event, State
 from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
-from bt_actions.servers.replies import DENIALS, Told
-from bt_actions.traffic.begun import wake
+from bt_actions.servers.replies import DENIALS
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.effect_runner import EffectRunner
-from bt_actions.traffic.effects import what_follows
+from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.handle import GoalHandle, NodeTraffic
+from bt_actions.traffic.handle import GoalHandle, NodeTraffic, wake
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import Predecessors
 from bt_actions.traffic.route import Route
 from bt_actions.traffic.transport import ActionTransport, Participant, Request
-from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING, Watcher
+from bt_actions.traffic.watcher import Watcher
 from bt_actions.utilities.plain_text import raised
 
 
@@ -70,7 +61,6 @@ class ActionEndpoint:
         self._probes = itertools.count(1)
         self._warned_of: set[str] = set()
         self._ended = EndedGoals(self, host)
-        self._effect_runner = EffectRunner(self, host, domain, self._warn_once)
         self._predecessors = Predecessors(name, host.log)
         self.transport = participant.open_transport(action_type, name, self)
         self.route = Route(self, host, domain)
@@ -78,7 +68,10 @@ class ActionEndpoint:
         self.in_doubt, self.holds_back = self.route.in_doubt, self.route.holds_back
         self.observe, self.observe_and_tell = self.watcher.observe, self.watcher.observe_and_tell
         self.recent_state = self.watcher.recent_state
-        self.run_due, self.ask_to_cancel = self.watcher.run_due, self._effect_runner.ask_to_cancel
+        self.run_due = self.watcher.run_due
+        self.driver = driver = Driver(self, host, domain, traffic, self._warn_once)
+        self.tell, self.pass_on = driver.tell, driver.pass_on
+        self.apply_deadlines, self.ask_to_cancel = driver.apply_deadlines, driver.ask_to_cancel
 
     def __repr__(self) -> str:
         return f"<ActionEndpoint {self.name}, {len(self.goals)} goals>"
@@ -150,23 +143,6 @@ class ActionEndpoint:
                 self.observe()
         return handle
 
-    def pass_on(self, handle: GoalHandle, told: Told) -> None:
-        """Tell a goal what is believed of what was said of it."""
-        if told is None:
-            return
-        event, detail = told
-        if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(handle):
-            self.tell(handle, Event.REPLACED)  # this has overtaken the rival's acceptance
-        self.tell(handle, event, detail)
-        if event is Event.SERVER_AMBIGUOUS and detail is not None:  # both have told how it ended
-            self.tell(handle, Event.RESULT, detail)
-
-    def _rival_sent(self, handle: GoalHandle) -> bool:
-        """Whether a newer goal that replaces this one is on its way, or has arrived."""
-        holders = self.domain.resources.holders(handle.goal.resources)
-        newer = holders[holders.index(handle) + 1 :] if handle in holders else []
-        return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
-
     # What the goals want
 
     @property
@@ -183,78 +159,6 @@ class ActionEndpoint:
     def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
         return any(not handle.goal.sent for handle in self.handles)
-
-    def tell(
-        self, handle: GoalHandle, event: Event, detail: Any = None, message: Any = None
-    ) -> None:
-        """Tell a goal what happened and do what it says; `message` is the goal to be sent."""
-        with self._host.lock:
-            if self.is_parents:
-                return
-            self._apply(handle, event, self.participant.now(), detail, message)
-
-    def apply_deadlines(self, handle: GoalHandle) -> None:
-        """Let the goal's deadlines take effect, unless its tree is paused before sending.
-
-        What has arrived by now is taken in first: an answer that came in time is in time, though
-        the executor was too busy to look. Where this whole process stood still, it may be about to
-        arrive. One moment decides whether to do so, and what is due. What fails in it stops
-        nothing.
-        """
-        with self._host.lock:
-            try:
-                goal, now = handle.goal, self.participant.now()
-                if self.is_parents:
-                    return
-                self._give_back_time(handle, now.steady)
-                if handle.paused:
-                    return
-                due = goal.due_in(now)
-                if due == 0.0:
-                    self.deliver_arrived()
-                    now = self.participant.now()
-                    self._suspend_after_stall(goal, now)
-                    due = goal.due_in(now)
-                self._host.trace.shows_time(handle)
-                for event in goal.due(now):
-                    self._apply(handle, event, now)
-                if due:
-                    self._host.scheduler.wake_by(now.steady + due)
-            except Exception as error:  # noqa: BLE001 - a mistake of ours: any
-                self._warn_once("a deadline could not be applied", error)
-
-    def _give_back_time(self, handle: GoalHandle, now: float) -> None:
-        """See to it that no deadline counts the time in which a goal is not sent on our account."""
-        if handle.held_back_since is not None:
-            handle.goal.postpone(now - handle.held_back_since)
-        waits = handle.goal.state is State.WAITING_FOR_SERVER
-        held_back = handle.paused or (waits and self.holds_back(now))
-        handle.held_back_since = now if held_back else None
-
-    def _suspend_after_stall(self, goal: Goal, now: Now) -> None:
-        """Suspend deadlines that have passed while a stall may be why nothing has come in."""
-        stalls = self._host.stalls
-        waits = goal.state is State.WAITING_FOR_SERVER
-        open_question = self.holds_back if waits else self.in_doubt
-        in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
-        servers = stalls.servers_take(now.steady) if waits or goal.lost else 0.0
-        goal.deadlines.suspend(max(stalls.answers_take(now.steady), servers, in_doubt), now)
-
-    def _apply(
-        self, handle: GoalHandle, event: Event, now: Now, detail: Any = None, message: Any = None
-    ) -> None:
-        goal, trace = handle.goal, self._host.trace
-        waited = goal.state in (State.QUEUED, State.WAITING_FOR_SERVER)
-        trace.tells(handle, event)
-        commands = goal.on(event, now, detail)
-        trace.told(handle, event, detail, commands)
-        if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
-            goal.reason += self._traffic.why_not(handle)
-        for do in what_follows(handle, commands):
-            self.domain.effects.put(partial(self._effect_runner.carry_out, do, handle, message))
-        if (due := goal.due_in(now)) is not None:
-            self._host.scheduler.wake_by(now.steady + due)
-        self.domain.effects.run_all()
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""

@@ -1,4 +1,4 @@
-"""A goal on its way, with what its owner and its server need to know; and whom it belongs to.
+"""A goal on its way, with what its owner and its server need to know; and which run it belongs to.
 
 Values, and the protocols by which the parts of traffic/ know each other.
 """
@@ -6,7 +6,8 @@ Values, and the protocols by which the parts of traffic/ know each other.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -68,9 +69,7 @@ class Endpoint(Listener, Scheduled, Protocol):
     def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
 
-    def tell(
-        self, handle: GoalHandle, event: Event, detail: Any = None, message: Any = None
-    ) -> None:
+    def tell(self, handle: GoalHandle, event: Event, detail: Any = None) -> None:
         """Tell a goal what happened and do what it says."""
 
     def pass_on(self, handle: GoalHandle, told: Told) -> None:
@@ -128,6 +127,8 @@ class GoalHandle:
     """Which run it belongs to: the last one that ticked its leaf; None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
+    message: Any = None
+    """What is to be sent, until it is."""
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     replies: Replies = field(init=False)
     told: End | None = None
@@ -175,46 +176,51 @@ class GoalHandle:
 class Standing(NamedTuple):
     """What of a goal matters for what follows from a step."""
 
+    state: State
     shown: tuple[str, Outcome | None, End]
     in_the_way: tuple[bool, ...]
     """What others may wait for: room at its server, or its end."""
-    accepted: bool
-    lost: bool
     answered: bool
     """Whether it need not be on record any more: whoever got it shows it, or will not run it.
 
     One that two servers got is accepted by one of them first. And a server that has gone may only
     stand still, for longer than this process is there."""
-    done: bool
 
     @classmethod
     def of(cls, handle: GoalHandle) -> Standing:
         """Return it as it is now."""
         goal = handle.goal
-        state, accepted, lost = goal.state, goal.accepted, goal.lost
         pending = goal.in_flight, goal.request_pending
-        in_the_way = *pending, goal.outstanding, lost, goal.claims_resources
-        answered = (accepted and len(handle.replies.sent_to) <= 1) or (
+        in_the_way = *pending, goal.outstanding, goal.lost, goal.claims_resources
+        answered = (goal.accepted and len(handle.replies.sent_to) <= 1) or (
             handle.accounted_for and goal.end is not End.SERVER_GONE
         )
-        shown = state.shown, goal.outcome, goal.end
-        return cls(shown, in_the_way, accepted, lost, answered, state is State.DONE)
-
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """What a run is told: a goal of its has a new state, outcome or end."""
-
-    handle: GoalHandle
-    state: State
-    outcome: Outcome | None
-    end: End
-    reason: str
+        shown = goal.state.shown, goal.outcome, goal.end
+        return cls(goal.state, shown, in_the_way, answered)
 
 
 @dataclass(eq=False)
 class Run:
     """Who runs a tree, as its goals know it, which outlive both."""
 
-    tell: Callable[[Change | None], None]
-    """Takes note, on any thread, of a change, under the lock; of None: there is reason to tick."""
+    tell: Callable[[GoalHandle | None], None]
+    """Takes note, on any thread and under the lock, of a goal of its that has a new state, outcome
+    or end; of None: there is reason to tick."""
+
+
+begun_in: ContextVar[Run | None] = ContextVar("begun_in", default=None)
+"""Which run sets up, or ticks, a tree on this thread; None where nobody has said it, as in a loop
+of the user's."""
+
+
+def waker() -> Callable[[], None]:
+    """Return what has the run of this thread tick soon; that may be called on any thread."""
+    run = begun_in.get()
+    return (lambda: None) if run is None else (lambda: run.tell(None))
+
+
+def wake(handles: Iterable[GoalHandle]) -> None:
+    """Have the runs of these goals tick: something may be sent, or can be read."""
+    for run in {handle.begun_in: None for handle in handles}:
+        if run is not None:
+            run.tell(None)

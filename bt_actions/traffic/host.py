@@ -13,7 +13,6 @@ from typing import Any, Protocol
 from bt_actions.goals.terms import Command, Event
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.effects import Do
 from bt_actions.traffic.handle import GoalHandle
 from bt_actions.traffic.scheduler import Scheduler
 
@@ -92,9 +91,6 @@ class Trace:
         self, handle: GoalHandle, event: Event, detail: Any, commands: tuple[Command, ...]
     ) -> None:
         """A goal was told what happened, and returned these commands."""
-
-    def does(self, do: Do | Command) -> None:
-        """What a goal has decided is about to be done."""
 
     def shows_time(self, handle: GoalHandle) -> None:
         """A goal is about to be shown the time."""

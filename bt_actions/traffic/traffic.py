@@ -20,10 +20,9 @@ from bt_actions.goals.terms import Event, Now, State
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
 from bt_actions.traffic.admission import Admission
-from bt_actions.traffic.begun import begun_in, note
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.handle import Endpoint, GoalHandle, begun_in
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.transport import Participant
 from bt_actions.utilities.plain_text import in_words
@@ -122,7 +121,7 @@ class Traffic:
             endpoint.take_in(handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
             if answer is None:
-                note(self.host, handle)
+                endpoint.driver.note(handle)
             else:
                 endpoint.tell(handle, answer)
             return handle
@@ -164,7 +163,8 @@ class Traffic:
             return
         with self.host.lock:
             if self._admission.may_send(handle):
-                endpoint.tell(handle, Event.SERVER_READY, message=message)
+                handle.message = message
+                endpoint.tell(handle, Event.SERVER_READY)
 
     def is_decided(self, handle: GoalHandle) -> bool:
         """Whether its outcome is decided, and its end and result are set as they are known then."""

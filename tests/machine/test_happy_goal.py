@@ -8,17 +8,16 @@ from typing import Any
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, State
 from bt_actions.traffic import handle as traffic
-from bt_actions.traffic.effects import Do
 from tests.machine.histories import Play
 from tests.machine.production import Witness
 
 
 class Steps(Witness):
-    """Takes note of what is told, and of what is done."""
+    """Takes note of what is told, and of what a goal commands."""
 
     def __init__(self, caller: Any) -> None:
         super().__init__(caller)
-        self.steps: list[tuple[Event, list[Do | Command]]] = []
+        self.steps: list[tuple[Event, tuple[Command, ...]]] = []
 
     def told(
         self,
@@ -28,10 +27,7 @@ class Steps(Witness):
         commands: tuple[Command, ...],
     ) -> None:
         super().told(handle, event, detail, commands)
-        self.steps.append((event, []))
-
-    def does(self, do: Do | Command) -> None:
-        self.steps[-1][1].append(do)
+        self.steps.append((event, commands))
 
 
 def test_each_message_enters_once_the_graph_is_asked_once_and_there_is_one_goal() -> None:
@@ -56,12 +52,12 @@ def test_each_message_enters_once_the_graph_is_asked_once_and_there_is_one_goal(
         looks = caller.looks
         caller.tick(leaf)
     assert trace.steps == [
-        (Event.GRANTED, [Do.NOTE]),
-        (Event.SERVER_READY, [Do.NOTE, Do.WAKE_WAITING, Command.SEND]),
-        (Event.ACCEPTED, [Do.NOTE, Do.WAKE_WAITING, Command.ASK_RESULT, Do.STRIKE]),
-        (Event.STATUS, []),
-        (Event.STATUS, []),
-        (Event.RESULT, [Do.NOTE, Do.WAKE_WAITING, Command.RELEASE, Do.RETIRE]),
+        (Event.GRANTED, ()),
+        (Event.SERVER_READY, (Command.SEND,)),
+        (Event.ACCEPTED, (Command.ASK_RESULT,)),
+        (Event.STATUS, ()),
+        (Event.STATUS, ()),
+        (Event.RESULT, (Command.RELEASE,)),
     ]
     # After it is sent: who has opened by then gets it, too
     assert (goal.state, looks) == (State.DONE, 1)

@@ -26,6 +26,7 @@ from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import handover
 from bt_actions.traffic.admission import Admission
 from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.handle import GoalHandle
@@ -290,7 +291,7 @@ def runs_on_beside_the_goal_that_replaced_it(patch: Patch) -> None:
 
 @mutation
 def takes_preemption_for_a_failure(patch: Patch) -> None:
-    patch.setattr(ActionEndpoint, "_rival_sent", lambda self, handle: False)
+    patch.setattr(Driver, "_rival_sent", lambda self, handle: False)
 
 
 @mutation

@@ -12,8 +12,7 @@ from std_srvs.srv import SetBool
 
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
-from bt_actions.traffic.begun import begun_in
-from bt_actions.traffic.handle import Run
+from bt_actions.traffic.handle import Run, begun_in
 from bt_actions.wiring import backend_of
 from tests.support.waiting import until
 
