@@ -88,7 +88,7 @@ class TickLoop:
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
         self._left = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
-        self._with_children: list[tuple[Behaviour, list[Behaviour]]] = []  # as found, root last
+        self._with_children = dict[Behaviour, list[Behaviour]]()  # as they were set up
         self._doing = "setup"
         self._stop_wanted = self._abandoned = self._pause_wanted = self._paused = False
         self._timeout: float | None = None
@@ -194,32 +194,34 @@ class TickLoop:
     def _set_up_missing(self) -> None:
         """Set up what was not yet: the tree, in the first run, or what is new in it."""
         tree = self.tree
-        by_itself = type(tree).setup is not BehaviourTree.setup and not self._nodes
         while not self._is_as_found():
-            nodes = list(tree.root.iterate())
             self._doing = "setup"
-            children = [
-                (node, list(node.children))
-                for node in nodes
-                if node.children or hasattr(node, "add_child") or node is tree.root
-            ]
+            nodes, found = list[Behaviour](), dict[Behaviour, list[Behaviour]]()
+            waiting = [tree.root]
+            while waiting:
+                node = waiting.pop()
+                nodes.append(node)
+                if node.children or hasattr(node, "add_child") or node is tree.root:
+                    found[node] = list(node.children)
+                    waiting += node.children
+            by_itself = type(tree).setup is not BehaviourTree.setup and not self._nodes
             if by_itself:
                 tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
             done = self._nodes | set(self._left)
-            for node in [each for each in nodes if each not in done]:
-                if not by_itself:
-                    node.setup(node=self._node)
-                self._nodes.add(node)
-            by_itself, now = False, set(nodes)
+            for node in reversed(nodes):  # children before their parents, as `iterate` has them
+                if node not in done:
+                    if not by_itself:
+                        node.setup(node=self._node)
+                    self._nodes.add(node)
+            now = set(nodes)
             self._left.update(self._nodes - now)
             self._visitor.forget_others(now)
-            self._nodes, self._with_children, self._doing = now, children, "tick"
+            self._nodes, self._with_children, self._doing = now, found, "tick"
 
     def _is_as_found(self) -> bool:
         """Whether the tree is as it was set up; takes about 10 ns a behaviour."""
         found = self._with_children
-        same_root = bool(found) and found[-1][0] is self.tree.root
-        return same_root and all(node.children == children for node, children in found)
+        return self.tree.root in found and all(n.children == had for n, had in found.items())
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
@@ -349,8 +351,8 @@ class TickLoop:
 
     # Who is told
 
-    def _tell(self, changes: list[tuple[Behaviour, Status]]) -> None:
-        for node, status in changes if self._observers else ():
+    def _tell(self, changes: dict[Behaviour, Status]) -> None:
+        for node, status in changes.items() if self._observers else ():
             message = node.feedback_message
             self._emit(NodeChanged(self._now, path_of(node), node, status, message))
 

@@ -74,16 +74,10 @@ class ChangeVisitor(VisitorBase):
         `after_each` is called when a behaviour has ticked, and what it returns is its misbehaviour.
         """
         super().__init__(full=False)
-        self._running: list[Behaviour] = []
-        self.timed: list[Callable[[], object]] = []
-        """`due_in` of those that run and have one (ActionBehaviour.due_in)."""
-        self.watching = True
-        """Whether any that was ticked may watch what tells nobody, as the clock or a variable."""
-        self.may_go_on = True
-        """Whether another tick, at once, may do more: an action's leaf waits for what comes."""
         self._before, self._after_each = before, after_each
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
+        self._kinds = {Behaviour}  # of what was visited: anything, for a tree that shows nothing
         self._known: dict[Behaviour, Status] = {}
 
     def initialise(self) -> None:
@@ -123,37 +117,44 @@ class ChangeVisitor(VisitorBase):
             if node in tree or status is Status.RUNNING
         }
 
-    def finish(self) -> list[tuple[Behaviour, Status]]:
+    def finish(self) -> dict[Behaviour, Status]:
         """Return the changes of a tick, also of one that raised: what it visited and stopped."""
-        visited, stopped = self._visited, list[Behaviour]()
-        is_as_before = visited == self._visited_before
-        self._visited_before = visited
-        if self._running and not is_as_before:
-            seen = set(visited)
-            stopped = [node for node in self._running if node not in seen]
-        changes = self._changes(stopped + visited)
-        if changes or not is_as_before:
-            self._running = [node for node in visited if node.status is Status.RUNNING]
-            kinds = {type(node) for node in visited}
-            timed = {kind for kind in kinds if callable(getattr(kind, "due_in", None))}
-            running = self._running if timed else []
-            self.timed = [getattr(n, "due_in") for n in running if type(n) in timed]  # noqa: B009
-            ours = ActionBehaviour.tick, ActionBehaviour.update
-            others = {kind for kind in kinds if (kind.tick, kind.update) != ours}
-            self.watching = not others <= _PASS_ON
-            self.may_go_on = self.watching or not all(
-                isinstance(node, composites.Sequence | composites.Selector) and node.memory
-                for node in visited
-                if type(node) in others
-            )
-        return changes
+        visited, before = self._visited, self._visited_before
+        stopped: list[Behaviour] = []
+        if visited != before:
+            seen, known = set(visited), self._known
+            stopped = [n for n in before if known.get(n) is Status.RUNNING and n not in seen]
+            self._kinds = {type(node) for node in visited}
+            self._visited_before = visited
+        return self._changes(stopped + visited)
 
-    def stopped(self) -> list[tuple[Behaviour, Status]]:
+    def stopped(self) -> dict[Behaviour, Status]:
         """Return the changes of what was last known to run."""
         return self._changes([n for n, s in self._known.items() if s is Status.RUNNING])
 
-    def _changes(self, nodes: list[Behaviour]) -> list[tuple[Behaviour, Status]]:
+    def _changes(self, nodes: list[Behaviour]) -> dict[Behaviour, Status]:
         known = self._known
-        changes = [(node, node.status) for node in nodes if known.get(node) is not node.status]
-        known.update(changes)
+        changes = {node: node.status for node in nodes if known.get(node) is not node.status}
+        known |= changes
         return changes
+
+    @property
+    def watching(self) -> bool:
+        """Whether any that was ticked may watch what tells nobody, as the clock or a variable."""
+        ours = ActionBehaviour.tick, ActionBehaviour.update
+        return any((kind.tick, kind.update) != ours for kind in self._kinds - _PASS_ON)
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether another tick, at once, may do more: an action's leaf waits for what comes."""
+        return self.watching or not all(
+            isinstance(node, ActionBehaviour) or getattr(node, "memory", False)
+            for node in self._visited
+        )
+
+    @property
+    def timed(self) -> list[Callable[[], object]]:
+        """`due_in` of those that run and have one (ActionBehaviour.due_in)."""
+        timed = {kind for kind in self._kinds if callable(getattr(kind, "due_in", None))}
+        running = (n for n in self._visited if n.status is Status.RUNNING) if timed else ()
+        return [getattr(n, "due_in") for n in running if type(n) in timed]  # noqa: B009
