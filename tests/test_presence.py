@@ -154,8 +154,7 @@ def test_one_that_is_not_ready_is_asked_and_is_not_gone_while_it_speaks(watch: S
     assert not watch.wants_probe(1.0), "nothing runs there"
     assert watch.wants_probe(1.0, runs=True)
     assert not watch.wants_probe(1.0, runs=True)
-    watch.probe_sent(1.0, 1)
-    watch.probe_answered(1.5, 1)
+    watch.heard_at = 1.5
     assert not watch.gone(1.4 + NOT_READY_FOR, gids(OLD))
     assert watch.gone(1.5 + NOT_READY_FOR, gids(OLD))
     watch.heard_at = 3.0

@@ -43,7 +43,7 @@ from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds.statuses import status_reader
 from bt_actions.servers.reachability import Reachability
-from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, nobodys
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request
 from bt_actions.utilities.plain_text import raised
 
 TAKE_AT_MOST = 200
@@ -61,8 +61,7 @@ ANSWERS_KEPT = 10
 class _Question:
     """A request that was sent, and what came back."""
 
-    about: bytes | int
-    """A goal's id, or a probe's number."""
+    goal_id: bytes
     asked: float = field(default_factory=time.monotonic)
     answers: list[Any] = field(default_factory=list)
 
@@ -119,7 +118,9 @@ class RosTransport:
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result, which the server answers when the goal has ended."""
-        self._ask_result(goal_id, goal_id)
+        request = self._impl.GetResultService.Request()
+        request.goal_id = UUID(uuid=list(goal_id))
+        self._ask("result", request, goal_id)
 
     def cancel(self, goal_id: bytes) -> None:
         """Ask the server to cancel this goal, and no other."""
@@ -127,29 +128,20 @@ class RosTransport:
         request.goal_info.goal_id = UUID(uuid=list(goal_id))
         self.reachability.asked(self._ask("cancel", request, goal_id))
 
-    def probe(self, probe: int) -> None:
-        """Ask for a goal that nobody knows: each live server answers once, with status 0."""
-        self.reachability.asked(self._ask_result(nobodys(probe), probe))
-
-    def _ask_result(self, goal_id: bytes, about: bytes | int) -> float:
-        request = self._impl.GetResultService.Request()
-        request.goal_id = UUID(uuid=list(goal_id))
-        return self._ask("result", request, about)
-
-    def _ask(self, kind: Request, request: Any, about: bytes | int) -> float:
+    def _ask(self, kind: Request, request: Any, goal_id: bytes) -> float:
         """Send a request and file it, before its answer is taken; return when it was sent."""
         with self._lock:
             number = getattr(self.handle, f"send_{kind}_request")(request)
-            question = self._questions[kind, number] = _Question(about)
-            same = [key for key, asked in self._questions.items() if asked.about == about]
+            question = self._questions[kind, number] = _Question(goal_id)
+            same = [key for key, asked in self._questions.items() if asked.goal_id == goal_id]
             for oldest in [key for key in same if key[0] == kind][:-ASKED_KEPT]:
                 del self._questions[oldest]
         return question.asked
 
-    def forget(self, goal: bytes | int) -> None:
-        """Drop what is still filed for a goal (its id) or a probe (its number)."""
+    def forget(self, goal_id: bytes) -> None:
+        """Drop what is still filed for a goal."""
         with self._lock:
-            for key in [key for key, asked in self._questions.items() if asked.about == goal]:
+            for key in [key for key, asked in self._questions.items() if asked.goal_id == goal_id]:
                 question = self._questions.pop(key)
                 if key[0] == "goal":
                     self._past[key] = question
@@ -197,13 +189,9 @@ class RosTransport:
         question = self._questions.get(key) or self._past.get(key)
         if question is None or len(question.answers) >= ANSWERS_KEPT:
             return
-        about, asked = question.about, question.asked
-        if isinstance(about, int):
-            self._inbox.append((self._listener.probe_answered, (about,), asked))
-            return
         question.answers.append(answer)
-        told = kind, about, asked, tuple(question.answers)
-        self._inbox.append((self._listener.answered, told, asked))
+        told = kind, question.goal_id, question.asked, tuple(question.answers)
+        self._inbox.append((self._listener.answered, told, question.asked))
 
     def deliver(self) -> None:
         """Deliver what has been taken."""

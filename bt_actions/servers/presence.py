@@ -64,7 +64,7 @@ class ServerWatch:
         self._crowded_since: float | None = None
         self._not_alone_before = NEVER
         self._probed_at = NEVER
-        self._probes: dict[int, _Probe] = {}  # by their numbers
+        self._probes: dict[bytes, _Probe] = {}  # by the ids that they ask for
         self.heard_at = NEVER
         """When any word of a server came: whoever speaks is there."""
         self._most_answers = 0  # to one question
@@ -118,23 +118,23 @@ class ServerWatch:
         """
         return self.state(now) is Server.READY and self.alone and self._answered_once(now, moment)
 
-    def probe_sent(self, now: float, probe: int) -> None:
-        """Take note that a probe with this number goes out."""
+    def probe_sent(self, now: float, probe: bytes) -> None:
+        """Take note that a probe goes out, which asks for a goal of this id."""
         self._probes[probe] = _Probe(now)
         if len(self._probes) > PROBES_KEPT:
             del self._probes[next(iter(self._probes))]
 
-    def probe_answered(self, now: float, number: int) -> None:
-        """Take one answer to a probe; none counts that is older than who is shown now."""
-        self.heard_at = now
-        probe = self._probes.get(number)
+    def probe_answered(self, now: float, goal_id: bytes) -> bool:
+        """Take one answer, if it is to a probe that is no older than who is shown; return that."""
+        probe = self._probes.get(goal_id)
         if probe is None:
-            return
+            return False
         probe.answers += 1
         if probe.answers == 1:
             probe.first = now
         else:
             self.two_answered(probe.answers)
+        return True
 
     def two_answered(self, answers: int = 2) -> None:
         """Take note that two, or more, have answered one question, a probe or another."""

@@ -15,7 +15,7 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.servers.presence import GID
 from bt_actions.servers.reachability import Reachability
 from bt_actions.testing.medium import Medium, Served, VirtualRequest
-from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, Seeker, nobodys
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, Seeker
 from bt_actions.utilities.suggest import did_you_mean
 
 LONG_AGO = float("-inf")
@@ -24,8 +24,7 @@ LONG_AGO = float("-inf")
 @dataclass(slots=True, eq=False)
 class _Question:
     kind: Request
-    about: bytes | int
-    """A goal's id, or a probe's number."""
+    goal_id: bytes
     asked: float
     answers: list[Any] = field(default_factory=list)
 
@@ -58,23 +57,21 @@ class VirtualTransport:
 
     def send(self, goal_id: bytes, goal: Any) -> None:
         """Send the goal request."""
-        self._ask(_Question("goal", goal_id, self._now), goal_id, goal)
+        self.reachability.asked(self._now)
+        self._ask("goal", goal_id, goal)
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result."""
-        self._ask(_Question("result", goal_id, self._now), goal_id)
+        self._ask("result", goal_id)
 
     def cancel(self, goal_id: bytes) -> None:
         """Ask to cancel this goal."""
-        self._ask(_Question("cancel", goal_id, self._now), goal_id)
+        self.reachability.asked(self._now)
+        self._ask("cancel", goal_id)
 
-    def probe(self, probe: int) -> None:
-        """Ask for a goal that nobody knows."""
-        self._ask(_Question("result", probe, self._now), nobodys(probe))
-
-    def forget(self, goal: bytes | int) -> None:
+    def forget(self, goal_id: bytes) -> None:
         """Tell no more answers, but for further acceptances of the newest goals."""
-        about = [question for question in self._questions if question.about == goal]
+        about = [question for question in self._questions if question.goal_id == goal_id]
         for question in about:
             del self._questions[question]
         self._past += [question for question in about if question.kind == "goal"]
@@ -84,14 +81,13 @@ class VirtualTransport:
     def _now(self) -> float:
         return self._medium.timeline.now
 
-    def _ask(self, question: _Question, goal_id: bytes, goal: Any = None) -> None:
+    def _ask(self, kind: Request, goal_id: bytes, goal: Any = None) -> None:
         if self.closed or not self._participant.alive():
             raise RuntimeError(f"{self.name}: this transport, or its participant, was closed")
+        question = _Question(kind, goal_id, self._now)
         self._questions[question] = None
-        if question.kind != "result" or isinstance(question.about, int):
-            self.reachability.asked(question.asked)
         reply = partial(self._medium.soon, self._answered, question)
-        request = VirtualRequest(question.kind, goal_id.hex(), goal, reply)
+        request = VirtualRequest(kind, goal_id.hex(), goal, reply)
         for server in self._shown():
             self._medium.soon(server.receive, request)
 
@@ -103,15 +99,12 @@ class VirtualTransport:
     def _answered(self, question: _Question, answer: Any) -> None:
         if self.closed or not (question in self._questions or question in self._past):
             return
-        tell, about = self._listener, question.about
+        tell = self._listener
         self.reachability.answered(question.asked)
         question.answers.append(answer)
         if self.on_trial:
             return
-        if isinstance(about, int):
-            tell.probe_answered(about)
-        else:
-            tell.answered(question.kind, about, question.asked, tuple(question.answers))
+        tell.answered(question.kind, question.goal_id, question.asked, tuple(question.answers))
         tell.all_delivered()
 
     def hear_feedback(self, goal_id: bytes, feedback: Any) -> None:

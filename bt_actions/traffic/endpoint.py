@@ -23,7 +23,7 @@ from bt_actions.traffic.handle import GoalHandle, NodeTraffic, wake
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import Predecessors
 from bt_actions.traffic.route import Route
-from bt_actions.traffic.transport import ActionTransport, Participant, Request
+from bt_actions.traffic.transport import ActionTransport, Participant, Request, nobodys, probe
 from bt_actions.traffic.watcher import Watcher
 from bt_actions.utilities.plain_text import raised
 
@@ -58,7 +58,7 @@ class ActionEndpoint:
         self.cancels = domain.cancels[self.action]
         self.orphaned = False
         self.in_sight_since = self.heard_at = host.steady()
-        self._probes = itertools.count(1)
+        self._probes = itertools.count(PROBES_KEPT)
         self._warned_of: set[str] = set()
         self._ended = EndedGoals(self, host)
         self._predecessors = Predecessors(name, host.log)
@@ -84,15 +84,17 @@ class ActionEndpoint:
         """Pass on an answer about a goal; see to one that has ended, and may run again."""
         if self.is_parents:
             return
-        now = self._host.steady()
+        now = self.watch.heard_at = self._host.steady()
         if request == "cancel":
             self.cancels.answered(goal_id, now)
         handle = self._heard_of(goal_id, denies=answers[-1] in DENIALS)
-        if handle is None:
-            self._ended.answered(request, goal_id, asked, answers)
-        else:
+        if handle is not None:
             told = handle.replies.answered(request, self.watch, now, asked, answers)
             self.pass_on(handle, told)
+        elif self.watch.probe_answered(now, goal_id):
+            wake(self.handles)
+        else:
+            self._ended.answered(request, goal_id, asked, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
@@ -117,13 +119,9 @@ class ActionEndpoint:
                     self._ended.runs(goal_id)
                     running.append(goal_id)
             elif status > 0 and (handle := self._heard_of(goal_id)) is not None:
-                self.pass_on(handle, handle.replies.shown(self.watch, self._host.steady(), status))
+                now = self.watch.heard_at = self._host.steady()
+                self.pass_on(handle, handle.replies.shown(self.watch, now, status))
         self._predecessors.see(running)
-
-    def probe_answered(self, probe: int) -> None:
-        """Pass on the answer to a probe."""
-        self.watch.probe_answered(self._host.steady(), probe)
-        wake(self.handles)
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
@@ -136,7 +134,6 @@ class ActionEndpoint:
         """
         handle = self.goals.get(goal_id)
         if handle is not None:
-            self.watch.heard_at = self._host.steady()
             if not (denies and self.watch.changed(handle.replies.sent_to)):
                 self.heard_at = self._host.steady()
             if len(handle.replies.sent_to) > 1:
@@ -162,11 +159,11 @@ class ActionEndpoint:
 
     def probe(self) -> None:
         """Ask the server just in order to be answered."""
-        probe = next(self._probes)
-        self.watch.probe_sent(self._host.steady(), probe)
-        self.transport.forget(probe - PROBES_KEPT)
+        number, now = next(self._probes), self._host.steady()
+        self.watch.probe_sent(now, nobodys(number))
+        self.transport.forget(nobodys(number - PROBES_KEPT))
         with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
-            self.transport.probe(probe)
+            probe(self.transport, number, now)
 
     def deliver_arrived(self) -> None:
         """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""

@@ -17,7 +17,7 @@ from bt_actions.servers.stalls import ANSWERS_TAKE
 from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
-from bt_actions.traffic.transport import ActionTransport, Opener
+from bt_actions.traffic.transport import ActionTransport, Opener, probe
 
 LAST_WORD = 0.5
 """Seconds within which a server that is not busy answers."""
@@ -147,7 +147,7 @@ class Route:
         if not transport.reachability.heard:
             if transport.reachability.take_question(now):
                 with contextlib.suppress(Exception):
-                    transport.probe(ON_TRIAL)
+                    probe(transport, ON_TRIAL, now)
             return False
         if self._last_question_at == NEVER:
             self._last_question_at = now

@@ -25,6 +25,12 @@ def nobodys(probe: int) -> bytes:
     return b"bt_probe" + probe.to_bytes(8, "big")
 
 
+def probe(transport: ActionTransport, number: int, now: float) -> None:
+    """Ask for a goal that nobody knows: each live server answers at once, with status 0."""
+    transport.ask_result(nobodys(number))
+    transport.reachability.asked(now)
+
+
 class Listener(Protocol):
     """Who is told what the servers say: under the host's lock, from whichever thread delivers."""
 
@@ -45,9 +51,6 @@ class Listener(Protocol):
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         """The server published the status of its goals."""
 
-    def probe_answered(self, probe: int) -> None:
-        """A server answered the probe of this number; each live server answers once."""
-
     def all_delivered(self) -> None:
         """Nothing that has been taken waits any more."""
 
@@ -66,7 +69,10 @@ class ActionTransport(Protocol):
     """Since when its participant sees others (seconds, steady clock)."""
 
     reachability: Reachability
-    """What is known of whether a server hears these requests; told of each, and of answers."""
+    """What is known of whether a server hears these requests.
+
+    It is told of all answers, and of each request that is answered at once (of others, by whoever
+    asks)."""
 
     def send(self, goal_id: bytes, goal: Any) -> None:
         """Send the goal request."""
@@ -77,11 +83,8 @@ class ActionTransport(Protocol):
     def cancel(self, goal_id: bytes) -> None:
         """Ask to cancel this goal, and no other."""
 
-    def probe(self, probe: int) -> None:
-        """Ask for a goal that nobody knows: each live server answers once, with status 0."""
-
-    def forget(self, goal: bytes | int) -> None:
-        """Tell no more answers about a goal (its id) or a probe (its number).
+    def forget(self, goal_id: bytes) -> None:
+        """Tell no more answers about a goal.
 
         But for further acceptances of the newest `GOALS_KEPT` goals.
         """

@@ -67,24 +67,21 @@ class ModelTransport:
         for newcomer in ("opens_meanwhile", "another_opens_meanwhile"):
             if caller.takes(newcomer):
                 caller.world.start(self._name)
-        caller.judge.sent(caller.seen[goal_id], self._ask("goal", goal_id, goal_id))
+        caller.judge.sent(caller.seen[goal_id], self._ask("goal", goal_id))
 
     def cancel(self, goal_id: bytes) -> None:
-        self._ask("cancel", goal_id, goal_id)
+        self._ask("cancel", goal_id)
 
     def ask_result(self, goal_id: bytes) -> None:
-        self._ask("result", goal_id, goal_id)
+        self._ask("result" if goal_id in self._caller.seen else "probe", goal_id)
 
-    def probe(self, probe: int) -> None:
-        self._ask("probe", probe, b"")
-
-    def _ask(self, kind: str, about: Any, goal_id: bytes) -> int:
+    def _ask(self, kind: str, goal_id: bytes) -> int:
         if self.closed:
             raise RuntimeError("the transport is closed")
         caller = self._caller
         number = caller.file(self)
-        self._asked[number] = (kind, about, caller.moment(), {})
-        if kind != "result":
+        self._asked[number] = (kind, goal_id, caller.moment(), {})
+        if kind not in ("result", "probe"):
             self.reachability.asked(caller.moment())
         handle = caller.seen.get(goal_id)
         name = "" if handle is None else handle.name
@@ -115,7 +112,7 @@ class ModelTransport:
         kind, about, asked, by_server = question
         self.reachability.answered(asked)
         if kind == "probe":
-            self._listener.probe_answered(about)
+            self._listener.answered("result", about, asked, ((0, None),))
             return
         if message.server.gid in by_server:
             return

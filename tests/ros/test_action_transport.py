@@ -35,7 +35,6 @@ class Heard:
         self.cancels: list[tuple[bytes, int]] = []
         self.feedback: list[tuple[bytes, Any]] = []
         self.statuses: list[dict[bytes, int]] = []
-        self.probes: list[int] = []
         self.so_far: tuple[Any, ...] = ()
 
     def answered(
@@ -50,9 +49,6 @@ class Heard:
 
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
         self.statuses.append(statuses)
-
-    def probe_answered(self, probe: int) -> None:
-        self.probes.append(probe)
 
     def all_delivered(self) -> None: ...
 

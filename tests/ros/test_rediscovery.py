@@ -100,7 +100,7 @@ def test_who_is_not_heard_after_a_stall_hears_of_its_goal_all_the_same(
         until(lambda: leaf.progress().feedback is not None)
         client = leaf._own.transport
         with process.lock:
-            for request in ("cancel", "ask_result", "probe"):
+            for request in ("cancel", "ask_result"):
                 monkeypatch.setattr(client, request, lambda *_: client.reachability.asked(now()))
             monkeypatch.setattr(client, "take_data", lambda: None)
             client._on_close(client)  # nobody waits for it

@@ -23,7 +23,7 @@ from bt_actions.goals.terms import (
 from bt_actions.simulation import Script, ScriptedServer
 from bt_actions.testing import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic.transport import ActionTransport, Participant, Request
+from bt_actions.traffic.transport import ActionTransport, Participant, Request, nobodys, probe
 from tests.support.waiting import until
 
 NUMBERS = itertools.count(1)
@@ -109,9 +109,6 @@ class Heard:
         if request == "result":
             answers = tuple(status for status, _ in answers)
         self.told.append((request, goal_id, answers))
-
-    def probe_answered(self, probe: int) -> None:
-        self.told.append(("probe", probe))
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         self.feedback.append((goal_id, feedback))
@@ -216,8 +213,8 @@ def test_an_answer_to_a_cancel_says_what_was_meant(side: Side, fault: str, code:
 def test_each_of_two_servers_answers_and_the_answers_add_up(side: Side) -> None:
     side.serve()
     side.serve()
-    side.transport.probe(7)
-    side.until_told(("probe", 7), ("probe", 7))
+    probe(side.transport, 7, 0.0)
+    side.until_told(("result", nobodys(7), (0,)), ("result", nobodys(7), (0, 0)))
     side.heard.told.clear()
     goal_id = side.send()
     side.until_told(("goal", goal_id, (True,)), ("goal", goal_id, (True, True)))
@@ -226,10 +223,10 @@ def test_each_of_two_servers_answers_and_the_answers_add_up(side: Side) -> None:
 def test_of_what_is_forgotten_only_a_further_acceptance_is_told(side: Side) -> None:
     side.serve("1:delay_accept=0.3")
     goal_id = side.send()
-    side.transport.probe(7)
+    probe(side.transport, 7, 0.0)
     side.transport.cancel(goal_id)
     side.transport.forget(goal_id)
-    side.transport.forget(7)
+    side.transport.forget(nobodys(7))
     side.until_told(("goal", goal_id, (True,)))
 
 
@@ -263,6 +260,6 @@ def test_what_is_closed_tells_nothing(side: Side) -> None:
     closed.close()
     closed.close()
     assert closed.closed
-    side.transport.probe(1)
-    side.until_told(("probe", 1))
+    probe(side.transport, 1, 0.0)
+    side.until_told(("result", nobodys(1), (0,)))
     assert heard.told == []
