@@ -42,6 +42,8 @@ RESULT_TIMEOUT = 60
 """Seconds for which an ended goal's result can be asked for; each one kept makes a goal slower."""
 _LAST_WORDS = 2.0
 """Seconds for the last results to be sent when the server is closed."""
+_LINGER = 0.25
+"""Seconds for who has just heard that its goal was accepted to ask for the result."""
 
 
 class _Admitted(NamedTuple):
@@ -148,8 +150,8 @@ class TreeServer:
         if self.lifecycle is not None:
             self.lifecycle.stop()
         self.halt(Ending.DEACTIVATED)
-        self._endpoints.off.wait(_LAST_WORDS)
-        self._action.flush()
+        self._endpoints.settle(_LAST_WORDS)
+        time.sleep(_LINGER)
         self._is_drained = True
 
     def close(self) -> None:
@@ -253,7 +255,7 @@ class TreeServer:
             self.node,
             ended=lambda outcome: self._ended(goal, outcome),
             begins=lambda actions: self._underway.begins(
-                goal.id, {self._endpoints.full_name(each) for each in actions}
+                goal.id, {self.node.resolve_topic_name(each, only_expand=True) for each in actions}
             ),
         )
         goal = Goal(client, run, admitted.name)

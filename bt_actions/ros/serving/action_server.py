@@ -8,7 +8,6 @@ ended. Decides nothing.
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -24,10 +23,6 @@ from rclpy.action.server import (
 
 from bt_actions.ros.serving.endpoints import Endpoints
 
-_SENT = 0.25
-"""Seconds in which an executor that is spun sends a result."""
-_NUDGE = 0.01
-"""Seconds between two tasks of an executor that is to send one."""
 _GRANTED = 2.0
 """Seconds for the executor to say that a cancel is granted."""
 
@@ -108,14 +103,13 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
         )
         self._result_futures[bytes(goal.goal_id.uuid)].set_result(response)
 
-    def flush(self) -> None:
-        """Wait until the executor has sent the answers."""
-        executor = self._node.executor
-        until = time.monotonic() + _SENT
-        while executor is not None and time.monotonic() < until:
-            done = threading.Event()
-            executor.create_task(done.set)
-            done.wait(_NUDGE)
+    # rclpy would have the executor send a result; so it is sent by whoever answers, or asks for it.
+
+    def add_future(self, future: Any) -> None:
+        """Do nothing: a result is not the executor's."""
+
+    def remove_future(self, future: Any) -> None:
+        """Do nothing, as `add_future`."""
 
     # Requests; on the executor's threads
 

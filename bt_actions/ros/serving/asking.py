@@ -54,20 +54,18 @@ def answers(service_type: Any, namespace: str) -> dict[str, Any]:
     below = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
     clients: dict[str, Any] = {}
     futures: dict[str, Any] = {}
-    answered: dict[str, Any] = {}
     begun = time.monotonic()
     with _asking() as (node, spin):
         while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if clients else 0.0):
-            if now < DISCOVERS or not clients:
-                for name, types in node.get_service_names_and_types():
-                    fits = interface_name(service_type) in types and name.startswith(below)
-                    if fits and name not in clients:
-                        clients[name] = node.create_client(service_type, name)
+            for name, types in node.get_service_names_and_types():
+                fits = interface_name(service_type) in types and name.startswith(below)
+                if fits and name not in clients:
+                    clients[name] = node.create_client(service_type, name)
             for name, client in clients.items():
                 if name not in futures and client.service_is_ready():
                     futures[name] = client.call_async(service_type.Request())
-            answered = {name: each.result() for name, each in futures.items() if each.done()}
-            if clients and len(answered) == len(clients) and now >= DISCOVERS:
+            all_called = 0 < len(futures) == len(clients)
+            if now >= DISCOVERS and all_called and all(each.done() for each in futures.values()):
                 break
             spin()
-    return {name: answered.get(name) for name in sorted(clients)}
+    return {name: futures[name].result() if name in futures else None for name in sorted(clients)}

@@ -8,6 +8,7 @@ it.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -15,7 +16,6 @@ from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
@@ -31,19 +31,21 @@ def kept(depth: int) -> QoSProfile:
     return QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class OffTheExecutor:
-    """What callbacks await that is done on other threads; who closes waits until it is answered."""
+class Endpoints:
+    """Makes them, and takes them away."""
 
     def __init__(self, node: Node) -> None:
-        self._node = node
-        self._awaited = 0
-        self._fewer = threading.Condition()
+        self.node = node
+        self.group = ReentrantCallbackGroup()
+        self._awaited: list[threading.Event] = []
+        """What callbacks await; set when they have it."""
+        self._made = contextlib.ExitStack()
 
-    async def __call__(
+    async def off(
         self, submit: Callable[[Callable[[], None]], Any], work: Callable[[], Any]
     ) -> Any:
-        """Await what `work` returns or raises; `submit` has it done on another thread."""
-        executor: Any = self._node.executor
+        """Await in a callback what `work` returns or raises; `submit` has another thread do it."""
+        executor: Any = self.node.executor
         future, taken = Future(executor=executor), threading.Event()
 
         def do() -> None:
@@ -56,41 +58,29 @@ class OffTheExecutor:
             while executor.context.ok() and time.monotonic() < until and not taken.wait(_NUDGE):
                 executor.wake()
 
-        with self._fewer:
-            self._awaited += 1
+        self._awaited.append(taken)
         try:
             submit(do)
             return await future
         finally:
             taken.set()
-            with self._fewer:
-                self._awaited -= 1
-                self._fewer.notify_all()
+            self._awaited.remove(taken)
 
-    def wait(self, patience: float) -> None:
+    def settle(self, patience: float) -> None:
         """Wait until nothing is awaited any more, for so many seconds at most."""
-        with self._fewer:
-            self._fewer.wait_for(lambda: not self._awaited, patience)
-
-
-class Endpoints:
-    """Makes them, and takes them away."""
-
-    def __init__(self, node: Node) -> None:
-        self.node = node
-        self.group = ReentrantCallbackGroup()
-        self.off = OffTheExecutor(node)
-        self._destroy: list[Callable[[], object]] = []
+        until = time.monotonic() + patience
+        for each in list(self._awaited):
+            each.wait(until - time.monotonic())
 
     def service(self, kind: type, name: str, callback: Callable[..., Any]) -> None:
         """Offer a service; the callback may be a coroutine."""
         service = self.node.create_service(kind, name, callback, callback_group=self.group)
-        self._destroy.append(lambda: self.node.destroy_service(service))
+        self._made.callback(self.node.destroy_service, service)
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile | int) -> Any:
         """Return a publisher."""
         publisher = self.node.create_publisher(kind, topic, qos)
-        self._destroy.append(lambda: self.node.destroy_publisher(publisher))
+        self._made.callback(self.node.destroy_publisher, publisher)
         return publisher
 
     def timer(self, period: float, callback: Callable[[], None], *, autostart: bool = True) -> Any:
@@ -102,14 +92,9 @@ class Endpoints:
             clock=Clock(clock_type=ClockType.STEADY_TIME),
             autostart=autostart,
         )
-        self._destroy.append(lambda: self.node.destroy_timer(timer))
+        self._made.callback(self.node.destroy_timer, timer)
         return timer
-
-    def full_name(self, name: str) -> str:
-        """Return the full name of what the node calls by this name."""
-        return str(expand_topic_name(name, self.node.get_name(), self.node.get_namespace()))
 
     def close(self) -> None:
         """Destroy them all, the latest first."""
-        while self._destroy:
-            self._destroy.pop()()
+        self._made.close()

@@ -13,7 +13,6 @@ from typing import Any
 
 from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
-from rclpy.action.server import RCLError
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from bt_actions.ros.log import log
@@ -36,13 +35,13 @@ class Lifecycle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
         self._events = endpoints.publisher(TransitionEvent, "~/transition_event", 10)
         endpoints.service(ChangeState, "~/change_state", self._on_change)
-        for name, kind, field in (
+        for name, kind, what in (
             ("get_state", GetState, "current_state"),
             ("get_available_states", GetAvailableStates, "available_states"),
             ("get_available_transitions", GetAvailableTransitions, "available_transitions"),
             ("get_transition_graph", GetAvailableTransitions, "transition_graph"),
         ):
-            endpoints.service(kind, f"~/{name}", functools.partial(self._tell, field))
+            endpoints.service(kind, f"~/{name}", functools.partial(self._tell, what))
 
     @property
     def state(self) -> str:
@@ -54,9 +53,7 @@ class Lifecycle:
         if not self._changes.acquire(blocking=False):
             return False
         try:
-            if isinstance(transition, str):
-                transition = int(self._machine.get_transition_by_label(transition))
-            self._trigger(self._machine.trigger_transition_by_id, transition)
+            self._trigger(transition)
             state = self.state
             log.info(f"{self._node.get_name()}: {state}")
             try:
@@ -65,8 +62,8 @@ class Lifecycle:
             except Exception as error:  # noqa: BLE001 - it is told, and the state is as before
                 log.error(f"{self._node.get_name()}: {state} failed: {in_words(error)}")
                 how = "failure"
-            self._trigger(self._machine.trigger_transition_by_label, f"transition_{how}")
-        except RCLError:
+            self._trigger(f"transition_{how}")
+        except KeyError:
             return False
         finally:
             self._changes.release()
@@ -80,19 +77,12 @@ class Lifecycle:
         """Be gone, after `stop`, and after its endpoints."""
         self._machine.destroy_when_not_in_use()
 
-    def _trigger(self, trigger: Callable[[Any, bool], None], transition: Any) -> None:
-        start = _state(*self._machine.current_state)
-        possible = self._machine.available_transitions
-        trigger(transition, False)  # raises RCLError for one that is not possible
-        number, label = next(each[:2] for each in possible if transition in each[:2])
-        self._events.publish(
-            TransitionEvent(
-                timestamp=self._node.get_clock().now().nanoseconds,
-                transition=Transition(id=number, label=label),
-                start_state=start,
-                goal_state=_state(*self._machine.current_state),
-            )
-        )
+    def _trigger(self, wanted: str | int) -> None:
+        """Go to the next state, and tell of it; KeyError: there is no such way from here."""
+        possible = {key: each for each in self._machine.available_transitions for key in each[:2]}
+        self._machine.trigger_transition_by_id(possible[wanted][0], False)
+        now = self._node.get_clock().now().nanoseconds
+        self._events.publish(TransitionEvent(timestamp=now, **_described(*possible[wanted])))
 
     def _tell(self, what: str, _request: Any, response: Any) -> Any:
         found = getattr(self._machine, what)
@@ -102,12 +92,7 @@ class Lifecycle:
             response.available_states = [_state(*each) for each in found]
         else:
             response.available_transitions = [
-                TransitionDescription(
-                    transition=Transition(id=number, label=label),
-                    start_state=_state(*ends[:2]),
-                    goal_state=_state(*ends[2:]),
-                )
-                for number, label, *ends in found
+                TransitionDescription(**_described(*each)) for each in found
             ]
         return response
 
@@ -124,3 +109,12 @@ class Lifecycle:
 
 def _state(number: int, label: str) -> State:
     return State(id=number, label=label)
+
+
+def _described(number: int, label: str, *ends: Any) -> dict[str, Any]:
+    """What messages tell of a transition; `ends` are the ids and labels of its two states."""
+    return {
+        "transition": Transition(id=number, label=label),
+        "start_state": _state(*ends[:2]),
+        "goal_state": _state(*ends[2:]),
+    }
