@@ -9,43 +9,23 @@ import contextlib
 from typing import Literal
 
 from rcl_interfaces.msg import Log
-from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
 
-LINGER = 0.5
-"""Seconds, at most, for the last line to be acknowledged by those who listen."""
-
 
 class Rosout:
-    """Publishes on `/rosout` for one node, on any thread; never raises."""
+    """Publishes on `/rosout` for one node, on any thread; to be closed before the node is gone."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._name = node.get_logger().name
-        self._publisher = node.create_publisher(
-            Log,
-            "/rosout",
-            QoSProfile(  # rosout's own
-                depth=1000,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-                lifespan=Duration(seconds=10),
-            ),
-        )
+        publisher = NodeParticipant.of(node).publisher(Log, "/rosout", "rosout")
+        self._publish, self.close = publisher.publish, publisher.close
 
     def say(self, level: Literal["info", "error"], text: str) -> None:
-        """Say something; an error needs attention."""
+        """Say something, and never raise; an error needs attention."""
         with contextlib.suppress(Exception):  # its node is gone, say: the log has it as well
-            stamp = self._node.get_clock().now().to_msg()
-            said = Log(stamp=stamp, level=LEVELS[level], name=self._name, msg=clean_lines(text))
-            self._publisher.publish(said)
-
-    def close(self) -> None:
-        """Be gone, before the node is, and when those in sight have what was said; not for long."""
-        with contextlib.suppress(Exception):
-            self._publisher.wait_for_all_acked(Duration(seconds=LINGER))
-        with contextlib.suppress(Exception):
-            self._node.destroy_publisher(self._publisher)
+            stamp, name = self._node.get_clock().now().to_msg(), self._node.get_logger().name
+            self._publish(Log(stamp=stamp, level=LEVELS[level], name=name, msg=clean_lines(text)))
