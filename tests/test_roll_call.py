@@ -21,7 +21,7 @@ class Roll(RollCall):
     def __init__(self) -> None:
         self.now = 100.0
         self._numbers: Iterator[int] = iter(range(1000))
-        super().__init__()
+        super().__init__("/move")
 
     def shows(self, *shown: bytes) -> None:
         self.sees(frozenset(shown), self.now)

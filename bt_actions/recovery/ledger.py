@@ -107,12 +107,10 @@ class Ledger(Record):
         self._paths.clear()
 
 
-def left_behind(
-    failed: Callable[[OSError], None], passed_over: Collection[Path] = ()
-) -> Iterator[Sent]:
+def left_behind(passed_over: Collection[Path] = ()) -> Iterator[Sent | OSError]:
     """Find what this user's processes have left on record that are dead, or elsewhere.
 
-    Files in `passed_over` are not read. `failed` is called with what cannot be read.
+    Files in `passed_over` are not read. What cannot be read is told by an OSError in its place.
     """
     try:
         home = directory(make=False)
@@ -120,7 +118,7 @@ def left_behind(
     except FileNotFoundError:
         return
     except OSError as error:
-        failed(error)
+        yield error
         return
     for path in paths:
         author = None if path in passed_over else _gone_author(path)
@@ -132,7 +130,7 @@ def left_behind(
             try:
                 yield _read(path, author)
             except OSError as error:
-                failed(error)
+                yield error
 
 
 def directory(*, make: bool = True) -> Path:

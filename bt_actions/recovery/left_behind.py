@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.policy import End
-from bt_actions.recovery.roll_call import Answers
+from bt_actions.recovery.roll_call import Answers, RollCall
 
 GONE = "its server is gone"
 
@@ -15,15 +15,15 @@ GONE = "its server is gone"
 class LeftBehind:
     """A goal whose orchestrator is dead. `end` is UNKNOWN until the server tells.
 
-    Where `servers` of one name were in sight, and not one, it stays UNKNOWN: either may run it, and
-    a status does not tell whose it is.
+    Where two servers of one name were in sight it stays UNKNOWN: either may run it, and a status
+    does not tell whose it is.
     """
 
-    action: str
+    call: RollCall
+    """The servers of its action."""
     goal_id: bytes
     pid: int
     shown: End = End.UNKNOWN
-    servers: int = 1
     asked_at: float = float("-inf")
     takes: float = DENIED_FOR_GOOD
     """Seconds for which it has to be denied until it will not turn up any more."""
@@ -36,7 +36,7 @@ class LeftBehind:
     @property
     def end(self) -> End:
         """How it ended, as far as is known."""
-        return self.shown if self.servers <= 1 else End.UNKNOWN
+        return self.shown if len(self.call.servers) <= 1 else End.UNKNOWN
 
     @property
     def is_over(self) -> bool:

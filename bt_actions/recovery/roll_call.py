@@ -69,7 +69,8 @@ class Answers:
 class RollCall:
     """The servers of one action, told apart by GID, in one participant after another."""
 
-    def __init__(self) -> None:
+    def __init__(self, action: str) -> None:
+        self.action = action
         self.servers: frozenset[bytes] = frozenset()
         """All that were ever in sight."""
         self._settled: frozenset[bytes] = frozenset()  # those that had the time

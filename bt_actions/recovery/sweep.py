@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -63,18 +63,9 @@ class Swept:
     nobody here can tell whether they are alive: the action of each."""
 
 
-def cleanup(
-    *,
-    look: float = 5.0,
-    patience: float = 5.0,
-    accept: float = 0.0,
-    found: Callable[[LeftBehind], None] = lambda left: None,
-    wanted: Collection[str] | None = None,
-    namespace: str = "",
-    waits: Callable[[list[str]], None] = lambda actions: None,
-    stopped: Callable[[], bool] = lambda: False,
-) -> Swept:
-    """Cancel what dead orchestrators of this machine left; return it with its ends.
+@dataclass(kw_only=True)
+class Cleanup:
+    """Cancels what dead orchestrators of this machine left; `run` returns it with its ends.
 
     Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
     canceled to end. `found` is called with each at once, and again where it was `awaited` when it
@@ -91,72 +82,73 @@ def cleanup(
     be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
     with a new one, twice at most.
 
-    Raises CannotStart, if nothing has been looked at yet; ValueError for seconds that are negative
-    or no number.
+    Raises ValueError for seconds that are negative or no number.
     """
-    if not (look >= 0.0 and patience >= 0.0 and accept >= 0.0):
-        given = f"look {look}, patience {patience}, accept {accept}"
-        raise ValueError(f"{given}: seconds are 0 or more")
-    sweep = _Sweep(look, patience, accept, found, waits, stopped)
-    for tries_before in range(3):
-        still = Stalls()
-        still.lives(time.monotonic())  # it counts from when the participant is made
-        try:
-            with onlooker(namespace) as sight:
-                sweep.begin(sight, wanted)
-                if sweep.goes_through(still, breaks_off=tries_before < 2):
-                    break
-        except CannotStart:
-            if not tries_before:
-                raise
-            break
-    return sweep.ends()
 
-
-@dataclass
-class _Sweep:
-    """What was found, in one participant after another."""
-
-    _look: float
-    _patience: float
-    _accept: float
-    _found: Callable[[LeftBehind], None]
-    _waits: Callable[[list[str]], None]
-    _stopped: Callable[[], bool]
+    look: float = 5.0
+    patience: float = 5.0
+    accept: float = 0.0
+    found: Callable[[LeftBehind], None] = lambda left: None
+    wanted: Collection[str] | None = None
+    namespace: str = ""
+    waits: Callable[[list[str]], None] = lambda actions: None
+    stopped: Callable[[], bool] = lambda: False
 
     def __post_init__(self) -> None:
-        self._deadline = time.monotonic() + max(self._look, LOOK_LONGEST)
+        look, patience, accept = self.look, self.patience, self.accept
+        if not (look >= 0.0 and patience >= 0.0 and accept >= 0.0):
+            given = f"look {look}, patience {patience}, accept {accept}"
+            raise ValueError(f"{given}: seconds are 0 or more")
+        self._deadline = time.monotonic() + max(look, LOOK_LONGEST)
         self._has_waited = False
-        self._calls = defaultdict[str, RollCall](RollCall)
+        self._calls: dict[str, RollCall] = {}  # by action, as long as this goes on
         self._elsewhere: dict[bytes, str] = {}
-        self._of_others: dict[bytes, tuple[str, Author]] = {}  # whose author is alive, or was
+        self._of_others: dict[bytes, tuple[RollCall, Author]] = {}  # whose author is alive, or was
         self._left: dict[bytes, LeftBehind] = {}
         self._sent: dict[bytes, Sent] = {}  # by the dead of here, and not answered
         self._read_before: set[Path] = set()
         self._trouble: OSError | None = None
 
-    def begin(self, sight: Onlooker, wanted: Collection[str] | None) -> None:
-        """Go on with what is seen here."""
+    def run(self) -> Swept:
+        """Do it. Raises CannotStart, if nothing has been looked at yet."""
+        for tries_before in range(3):
+            still = Stalls()
+            still.lives(time.monotonic())  # it counts from when the participant is made
+            try:
+                with onlooker(self.namespace) as sight:
+                    self._begin(sight)
+                    if self._goes_through(still, breaks_off=tries_before < 2):
+                        break
+            except CannotStart:
+                if not tries_before:
+                    raise
+                break
+        return self._ends()
+
+    def _begin(self, sight: Onlooker) -> None:
+        """Go on with what is seen in this participant."""
         self._sight = sight
-        self._wanted = None if wanted is None else {sight.full_name(name) for name in wanted}
-        self._views: dict[str, ActionView] = {}
-        self._questions: dict[tuple[str, int], LeftBehind] = {}
-        for name in self._wanted or ():
-            self._calls[name]  # looked for from now on
+        self._views: dict[RollCall, ActionView] = {}
+        self._questions: dict[tuple[RollCall, int], LeftBehind] = {}
+        self._wanted = {self._call(sight.full_name(name)) for name in self.wanted or ()}
         for call in self._calls.values():
             call.begin()
         for left in self._left.values():
             left.denials.begin()
         self._find()  # before the first status: one that tells an end comes once
 
-    def goes_through(self, still: Stalls, *, breaks_off: bool) -> bool:
+    def _call(self, action: str) -> RollCall:
+        """Return what is known of an action's servers; it is looked for from now on."""
+        return self._calls.setdefault(action, RollCall(action))
+
+    def _goes_through(self, still: Stalls, *, breaks_off: bool) -> bool:
         """Look, cancel, and wait; return False where it `breaks_off`, for another participant.
 
         Because of a stall, or of a server in sight that does not answer.
         """
         began = looked = time.monotonic()
-        until = began + self._look
-        while not self._stopped():
+        until = began + self.look
+        while not self.stopped():
             now = time.monotonic()
             self._deadline += still.lives(now)
             if still.long_times and breaks_off:
@@ -168,36 +160,34 @@ class _Sweep:
             looking = now < self._deadline and (now < until or bool(lacks))
             if looking or self._awaits(now):
                 looked = now
-            elif now >= looked + self._patience or all(
-                left.is_over for left in self._left.values()
-            ):
+            elif now >= looked + self.patience or all(left.is_over for left in self._left.values()):
                 break
-            overdue = [name for name in lacks if looking and self._calls[name].overdue(now)]
-            if overdue and now >= until and not self._has_waited:
-                self._has_waited = True
-                self._waits(overdue)
-            silent = any(self._calls[name].servers for name in overdue)
-            if silent and breaks_off and now >= min(until, began + LOOK_AGAIN):
-                return False  # it may not hear this participant
+            overdue = [call for call in lacks if looking and call.overdue(now)]
+            if overdue and now >= min(until, began + LOOK_AGAIN):
+                if not self._has_waited:
+                    self._has_waited = True
+                    self.waits([call.action for call in overdue])
+                if breaks_off and any(call.servers for call in overdue):
+                    return False  # it may not hear this participant
             time.sleep(TURN)
         return True
 
-    def ends(self) -> Swept:
+    def _ends(self) -> Swept:
         """Return all that was seen, and put it on record."""
         self._keep_record()
         lacks = self._lacks()
-        calls = sorted(self._calls.items())
+        calls = [call for _, call in sorted(self._calls.items())]
         return Swept(
             left=list(self._left.values()),
-            known=[name for name, call in calls if call.known],
+            known=[call.action for call in calls if call.known],
             unknown={
-                name: call.trouble
-                for name, call in calls
-                if not call.known and (call.servers or name in lacks)
+                call.action: call.trouble
+                for call in calls
+                if not call.known and (call.servers or call in lacks)
             },
             domain=self._sight.domain,
             trouble=self._trouble,
-            missing=lacks,
+            missing=[call.action for call in lacks],
             elsewhere=self._elsewhere,
         )
 
@@ -213,52 +203,53 @@ class _Sweep:
             if left is None:
                 continue
             if left.awaited:
-                if was_looked_for and not self._calls[sent.action].servers:
+                if was_looked_for and not left.call.servers:
                     sent.mark_lost()
             elif left.nothing_left == GONE:
                 sent.mark_lost()
             elif len(sent.servers) <= 1 or left.nothing_left:  # another may not have decided
                 sent.strike()
 
-    def _lacks(self) -> list[str]:
+    def _lacks(self) -> list[RollCall]:
         """Return the actions that are looked for, and not known."""
-        required = {left.action for left in self._left.values()} | (self._wanted or set())
+        required = {left.call for left in self._left.values()} | self._wanted
         return [
-            action
-            for action, call in sorted(self._calls.items())
-            if not call.known and (action in required or (self._wanted is None and call.servers))
+            call
+            for _, call in sorted(self._calls.items())
+            if not call.known and (call in required or (self.wanted is None and call.servers))
         ]
 
     def _awaits(self, now: float) -> bool:
         """Whether a goal may turn up yet at a server in sight."""
         return any(
-            left.awaited
-            and self._calls[left.action].servers
-            and now < self._deadline + left.takes + AWAIT_LONGER
+            left.awaited and left.call.servers and now < self._deadline + left.takes + AWAIT_LONGER
             for left in self._left.values()
         )
 
     def _turn(self, still: Stalls) -> None:
         """Take all that has come in, then look around, and ask."""
-        for action, view in self._views.items():
-            self._hear(action, view)  # first: what was told before an answer is read
+        for call, view in self._views.items():
+            self._hear(call, view)  # first: what was told before an answer is read
             for message in view.statuses():
-                self._read(action, message)
+                self._read(call, message)
                 still.lives(time.monotonic())  # there may be many, each of thousands of goals
         now = time.monotonic()
-        self._glance(now)
+        for call in map(self._call, self._sight.actions()):
+            if call not in self._views:
+                self._views[call] = self._sight.view(call.action)
+        for call, view in self._views.items():
+            call.sees(view.servers(), now)
         self._find()
-        for action, view in self._views.items():
-            call = self._calls[action]
+        for call, view in self._views.items():
             # of a goal that is nobody's: any answer shows that a server lives
             if call.due(now) and (question := view.cancel(uuid.uuid4().bytes)) is not None:
                 call.asked(question, now)
         self._cancel(now)
 
-    def _hear(self, action: str, view: ActionView) -> None:
+    def _hear(self, call: RollCall, view: ActionView) -> None:
         for number, code in view.answers():
-            self._calls[action].answered(number, time.monotonic())
-            left = self._questions.get((action, number))
+            call.answered(number, time.monotonic())
+            left = self._questions.get((call, number))
             if left is None:
                 continue
             if code in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
@@ -266,16 +257,8 @@ class _Sweep:
             else:
                 self._turns_up(left)
 
-    def _glance(self, now: float) -> None:
-        """See which actions are in sight, and how many servers each has."""
-        for action in self._sight.actions():
-            if action not in self._views:
-                self._views[action] = self._sight.view(action)
-        for action, view in self._views.items():
-            self._calls[action].sees(view.servers(), now)
-
-    def _read(self, action: str, message: Any) -> None:
-        one_server = len(self._calls[action].servers) <= 1  # or else another may run what has ended
+    def _read(self, call: RollCall, message: Any) -> None:
+        one_server = len(call.servers) <= 1  # or else another may run what has ended
         for entry in message.status_list:
             goal_id, ended = bytes(entry.goal_info.goal_id.uuid), entry.status in ENDS
             left = self._left.get(goal_id)
@@ -287,38 +270,39 @@ class _Sweep:
                     self._of_others.pop(goal_id, None)
             elif (author := author_of(goal_id)) is not None:
                 if author.here:
-                    self._of_others[goal_id] = action, author
+                    self._of_others[goal_id] = call, author
                 else:
-                    self._elsewhere[goal_id] = action
+                    self._elsewhere[goal_id] = call.action
 
     def _find(self) -> None:
         """See who of those that left goals is dead by now: a status comes at a change only."""
         alive = {author: author.alive for author in {by for _, by in self._of_others.values()}}
-        for goal_id, (action, author) in list(self._of_others.items()):
+        for goal_id, (call, author) in list(self._of_others.items()):
             if not alive[author]:
                 del self._of_others[goal_id]
-                self._is_left(LeftBehind(action, goal_id, author.pid))
+                self._is_left(LeftBehind(call, goal_id, author.pid))
         self._read_records()
         for goal_id, sent in self._sent.items():
-            call = self._calls[sent.action]
+            call = self._call(sent.action)
             gone = bool(sent.servers) and not sent.servers & call.servers
             if goal_id in self._left:
                 self._left[goal_id].judge(known=call.known, gone=gone)
             elif not (sent.lost and gone):
-                takes = max(DENIED_FOR_GOOD, self._accept, sent.accept)
+                takes = max(DENIED_FOR_GOOD, self.accept, sent.accept)
                 pid = sent.author.pid
-                self._is_left(LeftBehind(sent.action, goal_id, pid, takes=takes, awaited=True))
-        for left in self._left.values():
-            left.servers = len(self._calls[left.action].servers)
+                self._is_left(LeftBehind(call, goal_id, pid, takes=takes, awaited=True))
 
     def _is_left(self, left: LeftBehind) -> None:
         self._left[left.goal_id] = left
-        self._found(left)
+        self.found(left)
 
     def _read_records(self) -> None:
         """Read what those have on record that have died since."""
-        troubles: list[OSError] = []
-        for sent in left_behind(troubles.append, self._read_before):
+        self._trouble = None
+        for sent in left_behind(self._read_before):
+            if isinstance(sent, OSError):
+                self._trouble = sent
+                continue
             self._read_before.add(sent.path)
             if sent.domain != self._sight.domain:
                 continue
@@ -326,27 +310,27 @@ class _Sweep:
                 self._sent[sent.goal_id] = sent
             else:
                 self._elsewhere[sent.goal_id] = sent.action
-        self._trouble = troubles[0] if troubles else None
 
     def _turns_up(self, left: LeftBehind) -> None:
         """A server has it: it tells the end in a status."""
         if left.awaited or left.nothing_left:
             left.awaited, left.nothing_left, left.asked_at = False, "", float("-inf")
             if left.end is End.UNKNOWN:
-                self._found(left)
+                self.found(left)
 
     def _cancel(self, now: float) -> None:
         """Ask the servers to cancel what has not ended, again every second."""
-        asked = Counter[str]()
+        asked = Counter[RollCall]()
         for left in sorted(self._left.values(), key=lambda goal: goal.asked_at):
-            view = self._views.get(left.action)
+            call = left.call
+            view = self._views.get(call)
             if view is None or left.is_over or now - left.asked_at < ASK_AGAIN:
                 continue
-            asked[left.action] += 1
-            if asked[left.action] > CANCELS_A_TURN:
+            asked[call] += 1
+            if asked[call] > CANCELS_A_TURN:
                 continue
             if (question := view.cancel(left.goal_id)) is not None:
                 left.asked_at = now
                 if left.awaited:
-                    self._questions[left.action, question] = left
-                    left.denials.asked(question, self._calls[left.action].servers, now)
+                    self._questions[call, question] = left
+                    left.denials.asked(question, call.servers, now)

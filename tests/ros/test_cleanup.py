@@ -13,7 +13,7 @@ from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.left_behind import LeftBehind
-from bt_actions.recovery.sweep import Swept, cleanup
+from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros import onlooker as sight
 from bt_actions.ros.onlooker import CannotStart
 from tests.support.processes import HostFactory, Journal, Process
@@ -46,7 +46,7 @@ def left(start_program: Callable[..., Process], serve: Callable[..., Journal], n
 
 def sweep(wanted: Collection[str], **more: Any) -> Swept:
     """Clean up; return what came of it."""
-    return cleanup(**{"look": 1.0, "patience": 1.0, "wanted": wanted, **more})
+    return Cleanup(**{"look": 1.0, "patience": 1.0, "wanted": wanted, **more}).run()
 
 
 @pytest.mark.parametrize("wrong", [{"look": -1.0}, {"patience": math.nan}, {"accept": -1.0}])
@@ -101,7 +101,7 @@ def test_the_end_of_a_goal_is_nobodys_where_a_second_server_was_in_sight(
         found=found.append,
         stopped=lambda: any(goal.shown is End.CANCELED for goal in found),
     )
-    assert [(goal.goal_id.hex(), goal.servers, goal.end) for goal in swept.left] == [
+    assert [(goal.goal_id.hex(), len(goal.call.servers), goal.end) for goal in swept.left] == [
         (left, 2, End.UNKNOWN)
     ]
     assert name in swept.unknown
@@ -111,7 +111,7 @@ def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
     left: str, name: str, domain: int
 ) -> None:
     found: list[LeftBehind] = []
-    swept = cleanup(look=60.0, found=found.append, stopped=lambda: bool(found))
+    swept = Cleanup(look=60.0, found=found.append, stopped=lambda: bool(found)).run()
     assert [goal.goal_id.hex() for goal in swept.left] == [left]
 
 
@@ -120,7 +120,7 @@ def test_a_domain_that_is_none_is_refused(
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "none")
     with pytest.raises(CannotStart):
-        cleanup()
+        Cleanup().run()
 
 
 def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
@@ -130,7 +130,7 @@ def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
     monkeypatch.setattr(module, "LOOK_LONGEST", 0.2)
     told = list[list[str]]()
     monkeypatch.setattr("sys.argv", ["", "--ros-args", "-r", "__ns:=/r1"])
-    swept = cleanup(look=0.1, patience=0.1, wanted={"move", "/r2/move"}, waits=told.append)
+    swept = sweep({"move", "/r2/move"}, look=0.1, patience=0.1, waits=told.append)
     assert told == [swept.missing] == [["/r1/move", "/r2/move"]]
     assert swept.domain == domain, "the one in force"
 
@@ -145,7 +145,7 @@ def test_cleanup_does_not_take_silence_for_nothing(
     when_sighted(name, monkeypatch, lambda: host.send(signal.SIGSTOP))
 
     def look(wanted: list[str] | None) -> Swept:
-        swept = cleanup(look=1.0, waits=told.append, wanted=wanted)
+        swept = Cleanup(look=1.0, waits=told.append, wanted=wanted).run()
         host.send(signal.SIGCONT)
         return swept
 
@@ -161,7 +161,7 @@ def test_cleanup_sees_no_server_where_there_is_a_client_only(
 ) -> None:
     leaf = MoveRobot("client", 1.0, action_name=name)
     leaf.setup(node=node)
-    swept = cleanup(look=1.0)
+    swept = Cleanup(look=1.0).run()
     assert swept.left == []
     assert name not in [*swept.known, *swept.unknown]
     leaf.shutdown()

@@ -14,7 +14,7 @@ from std_msgs.msg import String
 from test_msgs.action import Fibonacci
 
 from bt_actions import TreeRunner
-from bt_actions.recovery.sweep import cleanup
+from bt_actions.recovery.sweep import Cleanup
 from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.parameters import parameters_in
 from bt_actions.ros.rediscovery import SecondParticipant
@@ -79,7 +79,7 @@ def of_a_rediscovery(domain: int) -> None:
     [
         (of_a_runner, "bt_actions_"),
         (of_a_rediscovery, "bt_actions_rediscovery_"),
-        (lambda _: cleanup(look=0.1, patience=0.1, wanted=[]), "bt_actions_cleanup"),
+        (lambda _: Cleanup(look=0.1, patience=0.1, wanted=[]).run(), "bt_actions_cleanup"),
         (lambda _: parameters_in(["-p", "a:=1"]), "bt_actions_"),
     ],
     ids=["runner", "rediscovery", "cleanup", "parameters"],

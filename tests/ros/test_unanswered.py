@@ -14,7 +14,8 @@ from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.ledger import Sent
 from bt_actions.recovery.left_behind import LeftBehind
-from bt_actions.recovery.sweep import Swept, cleanup
+from bt_actions.recovery.roll_call import RollCall
+from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros.onlooker import CannotStart
 from tests.support.processes import Journal, Process
 
@@ -87,7 +88,7 @@ def sweep(**more: Any) -> tuple[Swept, list[str]]:
     def note(left: LeftBehind) -> None:
         found.append(f"{'awaited' if left.awaited else 'shown'} {left.goal_id.hex()}")
 
-    return cleanup(look=1.0, patience=5.0, found=note, **more), found
+    return Cleanup(look=1.0, patience=5.0, found=note, **more).run(), found
 
 
 def test_what_is_on_record_and_in_a_status_is_one_goal(
@@ -138,14 +139,14 @@ def test_one_that_was_not_looked_for_to_the_end_stays_on_record(
         def no_more(*_: Any, **__: Any) -> None:
             raise CannotStart("no descriptors")
 
-        monkeypatch.setattr(module._Sweep, "goes_through", lambda *_, **__: False)
-        begin = module._Sweep.begin
+        monkeypatch.setattr(Cleanup, "_goes_through", lambda *_, **__: False)
+        begin = Cleanup._begin
 
         def once(self: Any, *given: Any) -> None:
             begin(self, *given)
             monkeypatch.setattr(module, "onlooker", no_more)
 
-        monkeypatch.setattr(module._Sweep, "begin", once)
+        monkeypatch.setattr(Cleanup, "_begin", once)
         sweep()
     assert len(list(records.iterdir())) == 1
 
@@ -162,7 +163,7 @@ def test_records_that_cannot_be_read_are_told(
 
 
 def test_one_whose_server_comes_in_sight_after_all_is_awaited_again() -> None:
-    left = LeftBehind("/move", b"goal", 1, awaited=True)
+    left = LeftBehind(RollCall("/move"), b"goal", 1, awaited=True)
     left.judge(known=False, gone=True)
     assert left.awaited, "it may come in sight yet"
     left.judge(known=True, gone=True)
@@ -178,8 +179,8 @@ def test_what_one_of_two_servers_shows_stays_on_record(
     author = Author(here=True, pid=2**22 + 1, started=b"ab")
     path = tmp_path / "x"
     sent = Sent("/move", 0, frozenset(servers), goal_id=b"goal", author=author, path=path)
-    left = LeftBehind("/move", b"goal", 1, shown=End.CANCELED)
-    over = module._Sweep(1.0, 1.0, 1.0, lambda _: None, lambda _: None, lambda: True)
+    left = LeftBehind(RollCall("/move"), b"goal", 1, shown=End.CANCELED)
+    over = Cleanup()
     over._sent[b"goal"], over._left[b"goal"] = sent, left
     path.touch()
     over._keep_record()

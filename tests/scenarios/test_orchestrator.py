@@ -672,7 +672,7 @@ def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """SIGKILL to the orchestrator; SIGSTOP to the server when cleanup sees it; SIGCONT after 8 s"""
-    from bt_actions.recovery.sweep import cleanup
+    from bt_actions.recovery.sweep import Cleanup
     from bt_actions.ros import onlooker
 
     host = new_host(short_lease=False)
@@ -692,9 +692,9 @@ def test_cleanup_waits_for_a_server_that_is_stopped_when_it_comes_in_sight(
         return shown
 
     monkeypatch.setattr(onlooker, "servers", seen)
-    left = cleanup(look=3.0).left
+    left = Cleanup(look=3.0).run().left
     goes_on.join()
-    assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
+    assert [(goal.call.action, goal.end) for goal in left] == [(name, End.CANCELED)]
     assert journal.ends() == ["canceled"]
     record.outcome = "CANCELED"
 
@@ -705,14 +705,14 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
 ) -> None:
     """SIGKILL to the orchestrator while cleanup looks, and has seen its goal"""
     from bt_actions.recovery.left_behind import LeftBehind
-    from bt_actions.recovery.sweep import cleanup
+    from bt_actions.recovery.sweep import Cleanup
 
     journal = serve("1:slow=10")
     run = launch("run", str(tree(name, distance=9.0)))
     run.line("executing on")
     goal = journal.wait_for("accepted").goal
     left = list[LeftBehind]()
-    sweeps = threading.Thread(target=lambda: left.extend(cleanup(look=8.0).left))
+    sweeps = threading.Thread(target=lambda: left.extend(Cleanup(look=8.0).run().left))
     sweeps.start()
     until(lambda: "bt_actions_cleanup" in node.get_node_names(), within=6.0)
     asked = ("cancel_requested", goal)  # nobody's goals, which show that a server lives, are too
@@ -722,7 +722,7 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     run.send(signal.SIGKILL)
     run.wait()
     sweeps.join()
-    assert [(goal.action, goal.end) for goal in left] == [(name, End.CANCELED)]
+    assert [(goal.call.action, goal.end) for goal in left] == [(name, End.CANCELED)]
     record.outcome = "CANCELED"
 
 

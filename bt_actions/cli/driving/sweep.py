@@ -73,7 +73,7 @@ def _sweep(
 ) -> Swept:
     """Look, and cancel; return what was seen."""
     with importing_ros():
-        from bt_actions.recovery.sweep import cleanup
+        from bt_actions.recovery.sweep import Cleanup
         from bt_actions.ros.onlooker import CannotStart
 
     refuse_domain()
@@ -82,13 +82,13 @@ def _sweep(
         stop.leaves_a_goal = True
         if left.awaited:
             note(
-                f"dead process {left.pid} sent a goal to {left.action} that was not answered: "
+                f"dead process {left.pid} sent a goal to {left.call.action} that was not answered: "
                 f"waiting for {left.takes:g} s or more, to cancel it should it be accepted: "
                 f"{left.goal_id.hex()}"
             )
         else:
             note(
-                f"canceling a goal of dead process {left.pid} on {left.action}: "
+                f"canceling a goal of dead process {left.pid} on {left.call.action}: "
                 f"{left.goal_id.hex()}"
             )
 
@@ -96,7 +96,7 @@ def _sweep(
         note(f"waiting for {listing(names)}, where something may have been left")
 
     try:
-        return cleanup(
+        return Cleanup(
             look=look,
             patience=patience,
             accept=accept,
@@ -105,7 +105,7 @@ def _sweep(
             namespace=namespace,
             waits=waits,
             stopped=lambda: stop.signal is not None,
-        )
+        ).run()
     except CannotStart as error:
         raise BadInput(f"ROS 2 cannot start: {error}") from error
 
@@ -142,10 +142,10 @@ def _tell_what_is_open(
 
 
 def _line(goal: LeftBehind) -> str:
-    crowd = f": {goal.servers} servers of this name, and each may run it"
-    told = crowd if goal.servers > 1 else ""
+    servers = len(goal.call.servers)
+    told = f": {servers} servers of this name, and each may run it" if servers > 1 else ""
     end = goal.nothing_left or f"{goal.end}{told}"
-    return f"{goal.action}  {goal.goal_id.hex()}  {end}\n"
+    return f"{goal.call.action}  {goal.goal_id.hex()}  {end}\n"
 
 
 def _nothing(swept: Swept) -> str:
