@@ -21,10 +21,6 @@ _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
 ANGLES = ("roll", "pitch", "yaw")
 
 
-class UnknownClass(ValueError):
-    """What stands before a constant's name is no message class."""
-
-
 def time_of(value: object, now: Callable[[], int]) -> object:
     """``now``, or seconds since the epoch, as the fields of a builtin_interfaces/Time."""
     if value == "now":
@@ -76,7 +72,7 @@ def constant(text: str, owner: type | None) -> object:
     ``STATUS_MOVING`` is looked up in `owner`; ``MoveRobot.Feedback.STATUS_MOVING``,
     ``Feedback.STATUS_MOVING`` and ``sensor_msgs/msg/BatteryState.POWER_SUPPLY_STATUS_FULL`` in the
     class they name: beside `owner` unless a package is given, else in the one installed package
-    that has it.
+    that has it. Raises UnknownInterface for what is no class, and ValueError for no constant of it.
     """
     match = _CONSTANT.fullmatch(text)
     if match is None or (match[1] is None and owner is None):
@@ -101,15 +97,11 @@ def _class(path: str, owner: type | None) -> type:
     if owner is not None and not slash:
         with contextlib.suppress(UnknownInterface):
             found = interface(f"{owner.__module__.split('.')[0]}/{names[0]}", kind)
-    try:
-        found = found or called(f"{place}{slash}{names[0]}", kind)
-    except UnknownInterface as error:
-        raise UnknownClass(str(error)) from None
+    found = found or called(f"{place}{slash}{names[0]}", kind)
     for name in names[1:]:
         parts = [part for part in PARTS if hasattr(found, part)]
         if name not in parts:
             near = did_you_mean(name, parts)
-            raise UnknownClass(f"no message class {path!r} is known here{near}")
+            raise UnknownInterface(f"no message class {path!r} is known here{near}")
         found = getattr(found, name)
-    assert found is not None
     return found

@@ -34,8 +34,9 @@ from bt_actions.utilities.units import parse_angle
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")
-_CODES = MappingProxyType(dict(zip([*INTEGERS, *FLOATS], "bhiqBHIQBfd", strict=True)))
-"""How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code."""
+_CODES = MappingProxyType(dict(zip([*FLOATS, *INTEGERS], "fdbhiqBHIQ", strict=False)))
+"""How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code. Those
+of the last type, `byte`, it keeps in a list."""
 _NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")
 
 _NO_TEXT = re.compile(r"[\0\ud800-\udfff]")
@@ -78,7 +79,7 @@ def fill_value(kind: FieldType, data: object) -> object:
     Raises MessageError.
     """
     value = _filled(kind, data, time.time_ns)
-    return value if isinstance(value, array.array) else plain(value)
+    return value if isinstance(data, array.array) else plain(value)
 
 
 def _filled(kind: FieldType, data: object, now: Callable[[], int]) -> Any:
@@ -197,9 +198,7 @@ class _Filler:
             items = items.tolist()  # numpy's, too
         if not isinstance(items, (list, tuple, array.array)):
             raise ValueError(f"a list of {name} is needed, not {show(value)}")
-        converted: Any = None
-        if self._hole is None:  # there may be millions
-            converted = items if isinstance(items, array.array) else _numbers(name, items)
+        converted: Any = None if self._hole else _numbers(name, items)  # there may be millions
         if converted is None:
             converted = [self.convert(kind.item, each, (*path, n)) for n, each in enumerate(items)]
         if kind.size is not None and len(items) != kind.size:
@@ -212,8 +211,8 @@ class _Filler:
         if isinstance(value, str) and kind.name not in ("string", "wstring"):
             value = constant(value, self._owner)
         if kind.name in FLOATS or kind.name in INTEGERS:
-            _check_number(kind.name, value)
-        elif kind.name == "bool":
+            return _number(kind.name, value)
+        if kind.name == "bool":
             if not isinstance(value, bool):
                 raise ValueError(f"true or false is needed, not {show(value)}")
         elif not isinstance(value, str):
@@ -222,27 +221,22 @@ class _Filler:
             raise ValueError(f"at most {kind.limit} characters fit, not {len(value)}")
         elif _NO_TEXT.search(value):
             raise ValueError("this text holds characters that no ROS string can carry")
-        if kind.name in FLOATS:
-            return float(value)
-        return bytes([value]) if kind.name == "byte" else value
+        return value
 
 
-def _numbers(name: str, items: Sequence[Any]) -> list[Any] | None:
-    """A list of a numeric type, checked without a loop of Python's; None for what needs one."""
+def _numbers(name: str, items: Any) -> array.array[Any] | None:
+    """Numbers as rosidl keeps them, checked without a loop of Python's; None for what needs one."""
+    if isinstance(items, array.array):
+        return items
     kinds = set(map(type, items))
-    if name in FLOATS and kinds <= {int, float}:
+    if name in _CODES and (kinds == {int} or (name in FLOATS and kinds <= {int, float})):
         with contextlib.suppress(OverflowError):
-            floats = [*map(float, items)]
-            if name == "float64" or max(map(abs, floats), default=0.0) <= FLOATS[name]:
-                return floats
-    elif name in _CODES and kinds == {int}:
-        least, greatest = INTEGERS[name]
-        if least <= min(items) and max(items) <= greatest:
-            return [*items]
+            if name != "float32" or max(map(abs, items), default=0.0) <= FLOATS[name]:
+                return array.array(_CODES[name], items)
     return None
 
 
-def _check_number(name: str, value: Any) -> None:
+def _number(name: str, value: Any) -> object:
     whole = name in INTEGERS
     if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
         what, hint = "a whole number" if whole else "a number", ""
@@ -255,10 +249,10 @@ def _check_number(name: str, value: Any) -> None:
         if not least <= value <= greatest:
             a = "an" if name.startswith("i") else "a"
             raise ValueError(f"{show(value)} does not fit {a} {name}: {least} to {greatest}")
-        return
+        return bytes([int(value)]) if name == "byte" else value
     with contextlib.suppress(OverflowError):
         if not FLOATS[name] < abs(float(value)) < math.inf:
-            return
+            return float(value)
     raise ValueError(f"{show(value)} does not fit a {name}")
 
 

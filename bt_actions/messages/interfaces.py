@@ -25,7 +25,7 @@ _PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
-class UnknownInterface(LookupError):
+class UnknownInterface(LookupError, ValueError):
     """No such interface is installed; the text says which package is missing or what it has."""
 
 
@@ -45,12 +45,12 @@ def interface(name: str | type, kind: Kind) -> type:
     known = next(filter(None, map(_listed, folders)), None)
     if known is None:
         text = f"package {package!r} is not installed here, or has no {_WORDS[kind]}s"
-        near = did_you_mean(package, packages(kind), cutoff=0.8)  # most end in _msgs
+        packages = {each.partition("/")[0] for each in installed(kind)}
+        near = did_you_mean(package, packages, cutoff=0.8)  # most end in _msgs
         where = ": install it, or source the workspace it is built in"
         raise UnknownInterface(text + (near or where))
-    found = getattr(importlib.import_module(f"{package}.{kind}"), short, None)
-    wanted = {"action": "Goal", "srv": "Request", "msg": "get_fields_and_field_types"}[kind]
-    if isinstance(found, type) and hasattr(found, wanted):
+    if short in known:
+        found: type = getattr(importlib.import_module(f"{package}.{kind}"), short)
         return found
     near = what_it_has(short, known)
     raise UnknownInterface(f"package {package!r} has no {_WORDS[kind]} {short!r}{near}")
@@ -77,23 +77,14 @@ def called(short: str, kind: Kind) -> type:
     raise UnknownInterface(f"no installed package has the {word} {short!r}{near}")
 
 
-def packages(kind: Kind) -> dict[str, Path]:
-    """The packages that hold interfaces of a kind, with the folder of their Python classes."""
-    found: dict[str, Path] = {}
-    for entry in sys.path:
-        for file in sorted(Path(entry or ".").glob(f"*/{kind}/__init__.py")):
-            if _listed(file.parent):
-                found.setdefault(file.parent.parent.name, file.parent)
-    return found
-
-
 def installed(kind: Kind) -> list[str]:
     """The full names of all installed interfaces of a kind."""
-    return sorted(
-        f"{package}/{kind}/{short}"
-        for package, folder in packages(kind).items()
-        for short in _listed(folder)
-    )
+    found: dict[str, tuple[str, ...]] = {}  # by package, as the first on the path has them
+    for entry in sys.path:
+        for file in Path(entry or ".").glob(f"*/{kind}/__init__.py"):
+            package = file.parent.parent.name
+            found[package] = found.get(package) or _listed(file.parent)
+    return sorted(f"{package}/{kind}/{short}" for package in found for short in found[package])
 
 
 @lru_cache(maxsize=4096)

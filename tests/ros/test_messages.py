@@ -149,6 +149,7 @@ def test_arrays_of_messages_and_bytes_are_filled() -> None:
         {"basic_types_values": [{"int8_value": 1}, msg.BasicTypes()], "byte_values": [1, 255]},
     )
     assert arrays.basic_types_values[0].int8_value == 1
+    assert arrays.byte_values == [b"\x01", b"\xff"], "as they are sent"
     assert to_plain(arrays)["byte_values"] == [1, 255]
     covariance = fill(PoseWithCovariance, {"covariance": [0.5] * 36})
     assert to_plain(covariance)["covariance"] == [0.5] * 36

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from bt_actions.document.language.types import Either, Record
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.values import BINARY, LENGTHS, bounded, number, reason
-from bt_actions.messages.conveniences import UnknownClass
 from bt_actions.messages.fields import (
     FLOATS,
     INTEGERS,
@@ -23,6 +22,7 @@ from bt_actions.messages.fields import (
     describe,
     no_field,
 )
+from bt_actions.messages.interfaces import UnknownInterface
 from bt_actions.utilities.suggest import what_it_has
 
 __all__ = [
@@ -189,7 +189,7 @@ class _Inference:
             return None
         try:
             return type_of_literal(self._expression.form.constant(name))
-        except UnknownClass as error:
+        except UnknownInterface as error:
             self._report("BT203", str(error), *self._expression.span(node.value))
         except ValueError as error:
             self._wrong(node, str(error), "BT203")
