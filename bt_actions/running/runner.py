@@ -23,8 +23,7 @@ from bt_actions import wiring
 from bt_actions.events import Observer
 from bt_actions.running.goals import GoalReport
 from bt_actions.running.loop import TickLoop, TreeError, check_seconds
-from bt_actions.running.started import StartedRun
-from bt_actions.running.wakeup import WakeUp
+from bt_actions.running.threads import StartedRun, WakeUp
 from bt_actions.utilities.places import path_of, root_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done
@@ -35,7 +34,7 @@ PATIENCE_AT_EXIT = 30.0
 
 _runs: set[TreeRunner] = set()
 """All that go on in this process; a list of them can be made in a signal handler."""
-_beginning = threading.Lock()
+_runs_change = threading.Condition()
 
 
 class TreeRunner:
@@ -77,7 +76,6 @@ class TreeRunner:
         self._wake_up = WakeUp()
         self._on_close: list[Callable[[], None]] = []
         self._started: StartedRun | None = None
-        self._running = threading.Lock()
         self._runs_on: int | None = None
         self._closed = False  # no run begins any more
         self._shutting_down = threading.Lock()
@@ -123,7 +121,7 @@ class TreeRunner:
     @property
     def running(self) -> bool:
         """Whether a run goes on, the drain of its goals included."""
-        return self._running.locked()
+        return self in _runs
 
     @property
     def future(self) -> futures.Future[Status]:
@@ -135,7 +133,6 @@ class TreeRunner:
         """
         if self._started is None:
             raise RuntimeError("there is no future: the tree has not been started")
-        self._started.is_heard = True
         return self._started.future
 
     def observe(self, callback: Observer) -> None:
@@ -186,15 +183,14 @@ class TreeRunner:
 
     def _begin(self) -> None:
         """Take the tree for a run; raises RuntimeError where it is in one."""
-        if not self._running.acquire(blocking=False):
-            raise RuntimeError("this tree is running already")
         root = root_of(self.tree.root)
-        with _beginning:
-            others = [each for each in list(_runs) if root_of(each.tree.root) is root]
+        with _runs_change:
+            if self.running:
+                raise RuntimeError("this tree is running already")
+            others = [each for each in _runs if root_of(each.tree.root) is root]
             if not others:
                 _runs.add(self)
                 return
-        self._running.release()
         here, there = (each.node.get_fully_qualified_name() for each in (self, others[0]))
         raise RuntimeError(
             f"{'/'.join(path_of(self.tree.root))} cannot run in the runner on node {here}: "
@@ -225,11 +221,10 @@ class TreeRunner:
         A signal that ends the process while neither `wait` nor `shutdown` is on the main thread
         ends it at once, as it does any program, and its goals run on: only SIGINT, which Python
         turns into an exception, and what ends the main thread in good order, drains them.
+        What it raises is logged, too.
         """
         self._begin()
         before, self._started = self._started, StartedRun(self._run_and_release)
-        if before is not None:
-            before.tell_unheard(self._log.error)
         try:
             self._started.start()
         except RuntimeError:  # there can be no more threads
@@ -240,13 +235,17 @@ class TreeRunner:
     def _run_and_release(self) -> Status:
         try:
             return self._run(None)
+        except BaseException as error:
+            self._log.error(f"the tree that was started raised {raised(error)}")
+            raise
         finally:
             self._release()
 
     def _release(self) -> None:
         self._runs_on = None
-        _runs.discard(self)
-        self._running.release()
+        with _runs_change:
+            _runs.discard(self)
+            _runs_change.notify_all()
 
     def wait(self, timeout: float | None = None) -> Status:
         """Wait for a tree that was started, and return or raise what `run` would.
@@ -257,10 +256,9 @@ class TreeRunner:
         without a `timeout`, where `run` does because of the thread.
         """
         check_seconds(timeout)
-        started = self._started
-        if started is None:
+        if self._started is None:
             raise RuntimeError("nothing to wait for: the tree has not been started")
-        future = started.future
+        future = self._started.future
         if self._runs_on == threading.get_ident():
             raise RuntimeError("wait() within the run would wait for itself")
         if timeout is None and not future.done() and self._spinner.is_here():
@@ -274,7 +272,6 @@ class TreeRunner:
             ]
             what = f"; {', '.join(goals)}" if goals else ""
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s{what}")
-        started.is_heard = True
         return future.result()
 
     def pause(self) -> None:
@@ -318,7 +315,7 @@ class TreeRunner:
         if self._runs_on == threading.get_ident():
             raise RuntimeError("shutdown() within a run would wait for itself; use interrupt()")
         with self._hear_signals():
-            self._shut_down(patience=-1.0)
+            self._shut_down(patience=None)
         if self._is_down:
             self._loop.raise_what_ended_it()
 
@@ -326,7 +323,7 @@ class TreeRunner:
         with contextlib.suppress(KeyboardInterrupt), wiring.ended_by_signals(self._signalled):
             self._shut_down(PATIENCE_AT_EXIT)
 
-    def _shut_down(self, patience: float) -> None:
+    def _shut_down(self, patience: float | None) -> None:
         """Shut down; where a run does not end within `patience` seconds, leave all as it is."""
         if os.getpid() != self._pid:
             return  # the child of a fork: all of this is the parent's
@@ -335,11 +332,11 @@ class TreeRunner:
         if not self._shutting_down.acquire(blocking=False):
             return  # somebody else is at it
         try:
-            if self._running.locked():
+            if self.running:
                 self.interrupt()
-            if not self._running.acquire(timeout=patience):
-                return
-            self._running.release()
+            with _runs_change:
+                if not _runs_change.wait_for(lambda: not self.running, patience):
+                    return
             self._is_down = True
             self._take_down()
             self._log.flush()  # what was said is written, whatever becomes of the process
@@ -347,10 +344,8 @@ class TreeRunner:
             self._shutting_down.release()
 
     def _take_down(self) -> None:
-        if self._started is not None:
-            if self._started is not threading.current_thread():  # as in a done callback
-                self._started.join()
-            self._started.tell_unheard(self._log.error)
+        if self._started not in (None, threading.current_thread()):  # as in a done callback
+            self._started.join()
         guests = self._close_guests if self._on_close else None
         with contextlib.ExitStack() as last:
             last.callback(lambda: self._loop.close(time.monotonic()))
