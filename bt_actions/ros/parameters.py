@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -71,62 +71,46 @@ def declare_input(node: Node, name: str, kind: FieldType, value: object, descrip
     Arrays of messages, and integers beyond int64, are texts, in YAML. False where the node has a
     parameter of that name already: then nothing is shown.
     """
-    shown = list(_shown(name, kind, to_plain(value)))
-    if any(node.has_parameter(each.name) for _, each in shown):
+    shown = list(_shown(name, kind, to_plain(value), description))
+    if any(node.has_parameter(each.name) for each, _ in shown):
         return False
-    for its_kind, each in shown:
+    for each, descriptor in shown:
         node.declare_parameter(each.name, each.type_, ignore_override=True)
         node.set_parameters([each])  # so a list may be empty
-        node.set_descriptor(each.name, _descriptor(its_kind, each.type_, description))
+        node.set_descriptor(each.name, descriptor)
     return True
 
 
-def _shown(name: str, kind: FieldType, value: Any) -> Iterator[tuple[FieldType, Parameter]]:
-    """The parameters that an input is, and what they are to a tree."""
+def _shown(
+    name: str, kind: FieldType, value: Any, description: str
+) -> Iterator[tuple[Parameter, ParameterDescriptor]]:
+    """The parameters that an input is."""
     if isinstance(kind, Message):
         for field, its_kind in describe(kind.cls).items():
-            yield from _shown(f"{name}.{field}", its_kind, value[field])
+            yield from _shown(f"{name}.{field}", its_kind, value[field], description)
         return
-    its_type = _type(kind, value)
-    if its_type is Parameter.Type.STRING and not isinstance(value, str):
+    item, values, ending = kind, [value], ""
+    if isinstance(kind, Listing):
+        item, values, ending = kind.item, value, "_ARRAY"
+    scalar = item.name if isinstance(item, Scalar) else ""
+    limits = INTEGERS.get(scalar)
+    its_type = Parameter.Type[_SINGLE.get(scalar, "STRING") + ending]
+    if not scalar or (limits and max(values, default=0) > _MOST):
+        limits, its_type = None, Parameter.Type.STRING
         value = as_json(value)  # which is YAML, and quick for many points
-    yield kind, Parameter(name, its_type, value)
-
-
-def _type(kind: FieldType, value: Any) -> Parameter.Type:
-    if isinstance(kind, Listing) and isinstance(kind.item, Scalar):
-        single = _type(kind.item, 0)
-        if all(_type(kind.item, item) is single for item in value):
-            return Parameter.Type[f"{single.name}_ARRAY"]
-    if isinstance(kind, Scalar):
-        if kind.name in FLOATS:
-            return Parameter.Type.DOUBLE
-        if kind.name in INTEGERS and value <= _MOST:
-            return Parameter.Type.INTEGER
-        if kind.name == "bool":
-            return Parameter.Type.BOOL
-    return Parameter.Type.STRING
-
-
-def _descriptor(kind: FieldType, its_type: Parameter.Type, description: str) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(
         type=its_type.value,
         description=description,
         additional_constraints=f"{kind}; fixed while the tree runs",
         read_only=True,
     )
-    item = kind.item if isinstance(kind, Listing) else kind
-    if isinstance(item, Scalar) and its_type is not Parameter.Type.STRING:
-        if item.name in INTEGERS:
-            least, most = INTEGERS[item.name]
-            descriptor.integer_range = [IntegerRange(from_value=least, to_value=min(most, _MOST))]
-        elif item.name == "float32":
-            limit = FLOATS[item.name]
-            descriptor.floating_point_range = [
-                FloatingPointRange(from_value=-limit, to_value=limit)
-            ]
-    return descriptor
+    if limits:
+        least, most = limits[0], min(limits[1], _MOST)
+        descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]
+    yield Parameter(name, its_type, value), descriptor
 
 
 _MOST = INTEGERS["int64"][1]
 """The greatest integer that a parameter holds."""
+_SINGLE = {**dict.fromkeys(INTEGERS, "INTEGER"), **dict.fromkeys(FLOATS, "DOUBLE"), "bool": "BOOL"}
+"""What the types of fields are as parameters; any other is a text."""
