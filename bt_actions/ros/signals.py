@@ -20,9 +20,6 @@ from rclpy.signals import (
     install_signal_handlers,
     uninstall_signal_handlers,
 )
-from rclpy.utilities import get_default_context
-
-from bt_actions.ros.alive import is_open
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _BITS: dict[int, int] = {
@@ -83,7 +80,6 @@ class _Watch:
         self._interrupts: list[Interrupt] = []
         self._before: dict[int, Any] = {}  # what signal.getsignal returns
         self._rclpys = _rclpys()
-        self._had_context = is_open(get_default_context())
         self._is_over = False
 
     def put_on(self) -> None:
@@ -97,8 +93,6 @@ class _Watch:
 
     def take_off(self) -> None:
         """Put all back: SIGINT's handler last of Python's, as KeyboardInterrupt is back with it."""
-        if self._had_context and not is_open(get_default_context()):
-            self._rclpys = 0  # rclpy.shutdown() would have taken them off
         meanwhile = _rclpys()  # what an rclpy.init() has put on
         if meanwhile:
             uninstall_signal_handlers()
