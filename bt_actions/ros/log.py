@@ -133,8 +133,7 @@ def _has_room() -> None:
 
 def _fit(text: str) -> str:
     """What a line takes of a text."""
-    whole = clean_lines(text[: LONGEST + 1]).encode()
-    return whole.decode() if len(whole) <= LONGEST else whole[:LONGEST].decode(errors="ignore")
+    return clean_lines(text[:LONGEST]).encode()[:LONGEST].decode(errors="ignore")
 
 
 log = Log("bt_actions")

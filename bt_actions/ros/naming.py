@@ -27,15 +27,9 @@ def node_name(tree: str) -> str:
 
     Letters with marks lose them; others become ``u`` and their code point, as in ``u90e8``.
     """
-    plain = unicodedata.normalize("NFKD", tree)
-    letters = (_letter(char) for char in plain if not unicodedata.combining(char))
-    return f"bt_actions_{''.join(letters)}"[:LONGEST]
-
-
-def _letter(char: str) -> str:
-    if re.match(r"\w", char, re.ASCII):
-        return char
-    return f"u{ord(char):x}" if char.isalnum() else "_"
+    chars = itertools.filterfalse(unicodedata.combining, unicodedata.normalize("NFKD", tree))
+    plain = (f"u{ord(each):x}" if each.isalnum() and not each.isascii() else each for each in chars)
+    return re.sub(r"\W", "_", f"bt_actions_{''.join(plain)}")[:LONGEST]
 
 
 def own_node(

@@ -15,7 +15,7 @@ import contextlib
 import ctypes
 import functools
 import os
-from collections.abc import Callable
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.node import Node
@@ -46,35 +46,26 @@ def close(node: Node, context: Context) -> None:
 
 def fall_silent(node: Node) -> bool:
     """Have the participant of a node take note of no discovery any more; say whether it could."""
-    set_no_listener = _call()
-    if set_no_listener is None:
-        return False
     try:
+        rmw_node_of, participant_of, set_listener = _functions()
         with node.handle:
-            address = int(node.handle.pointer)
-            return any(set_no_listener(address) for _ in range(TRIES))
-    except Exception:  # noqa: BLE001 - InvalidHandle: it was destroyed
+            participant = participant_of(rmw_node_of(node.handle.pointer))
+            if participant is None:
+                return False
+            return any(set_listener(participant, None, LIMIT) == 0 for _ in range(TRIES))
+    except Exception:  # noqa: BLE001 - it was destroyed; or of another middleware, or release of it
         return False
 
 
 @functools.cache
-def _call() -> Callable[[int], bool] | None:
-    """Return what takes the listener off, by the address of an rcl_node_t; None: there is none."""
+def _functions() -> tuple[Any, Any, Any]:
+    """Return what leads from an rcl_node_t to its participant, and takes the listener off that."""
     loaded = os.RTLD_NOLOAD | os.RTLD_LAZY
-    try:
-        rmw_node_of = ctypes.CDLL("librcl.so", mode=loaded).rcl_node_get_rmw_handle
-        rmw = ctypes.CDLL("librmw_fastrtps_cpp.so", mode=loaded)
-        participant_of, set_listener = rmw[_PARTICIPANT_OF], rmw[_SET_LISTENER]
-    except (OSError, AttributeError):  # another middleware, or another release of it
-        return None
+    rmw_node_of = ctypes.CDLL("librcl.so", mode=loaded).rcl_node_get_rmw_handle
+    rmw = ctypes.CDLL("librmw_fastrtps_cpp.so", mode=loaded)
+    participant_of, set_listener = rmw[_PARTICIPANT_OF], rmw[_SET_LISTENER]
     for function in (rmw_node_of, participant_of):
         function.argtypes, function.restype = (ctypes.c_void_p,), ctypes.c_void_p
     set_listener.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
     set_listener.restype = ctypes.c_uint32
-
-    def take_off(rcl_node: int) -> bool:
-        rmw_node = rmw_node_of(rcl_node)
-        participant = participant_of(rmw_node) if rmw_node else None
-        return bool(participant) and set_listener(participant, None, LIMIT) == 0
-
-    return take_off
+    return rmw_node_of, participant_of, set_listener
