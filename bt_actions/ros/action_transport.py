@@ -33,7 +33,7 @@ from typing import Any
 from action_msgs.srv import CancelGoal
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_action_status_default
+from rclpy.qos import QoSProfile, qos_profile_action_status_default
 from rclpy.type_support import check_for_type_support
 from unique_identifier_msgs.msg import UUID
 
@@ -96,8 +96,7 @@ class RosTransport:
         self.closed = False
         check_for_type_support(action_type)
         self._impl = action_type.Impl
-        services = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
-        feedback = QoSProfile(depth=DEPTH)
+        services = feedback = QoSProfile(depth=DEPTH)
         profiles = services, services, services, feedback, qos_profile_action_status_default
         with node.handle:
             self.handle = rclpy_implementation.ActionClient(
@@ -160,11 +159,8 @@ class RosTransport:
         with self._lock:
             if self.closed:
                 return
-            handle, impl, put = self.handle, self._impl, self._inbox.append
-            feedback_came, statuses_came = (
-                self._listener.feedback_came,
-                self._listener.statuses_came,
-            )
+            handle, impl = self.handle, self._impl
+            put, tell = self._inbox.append, self._listener
             status_type, read_statuses = status_reader()
             with handle:
                 for number, answer in _all(
@@ -172,7 +168,7 @@ class RosTransport:
                 ):
                     self._file("goal", number, answer.accepted)
                 for message in _all(handle.take_feedback, impl.FeedbackMessage, None):
-                    put((feedback_came, (bytes(message.goal_id.uuid), message.feedback), None))
+                    put((tell.feedback_came, (bytes(message.goal_id.uuid), message.feedback), None))
                 for number, answer in _all(handle.take_cancel_response, CancelGoal.Response):
                     self._file("cancel", number, _cancel_code(answer))
                 for number, answer in _all(
@@ -181,7 +177,7 @@ class RosTransport:
                     result = answer.result if answer.status else None
                     self._file("result", number, (answer.status, result))
                 for message in _all(handle.take_status, status_type, None):
-                    put((statuses_came, (read_statuses(message),), None))
+                    put((tell.statuses_came, (read_statuses(message),), None))
 
     def _file(self, kind: Request, number: int, answer: Any) -> None:
         """Put an answer into the inbox, with those before it; none that nobody waits for."""

@@ -81,14 +81,14 @@ class SecondParticipant:
         participant.close(self.node, self.node.context)
 
 
-def look_for(seeker: Seeker, action: str, domain: int, enclave: str, *, at_once: bool) -> None:
+def look_for(seeker: Seeker, action: str, domain: int, enclave: str) -> None:
     """Look for the servers that it misses, until it misses none; the caller holds the lock.
 
     In the enclave of its node, which may be allowed to look where others are not.
-    With `at_once`, whatever pause between two looks for others has been reached begins anew.
+    Whatever pause between two looks for others has been reached begins anew.
     """
     rediscovery = _by_domain.setdefault((domain, enclave), Rediscovery(domain, enclave))
-    rediscovery.add(seeker, action, at_once=at_once)
+    rediscovery.add(seeker, action)
 
 
 class Rediscovery:
@@ -107,14 +107,13 @@ class Rediscovery:
         self._waiting: set[Seeker] = set()
         self._pause = FIRST_AFTER
         self._look_at = math.inf
-        self._is_urgent = True
-        self._told = False
+        self._is_urgent = False
 
-    def add(self, seeker: Seeker, action: str, *, at_once: bool) -> None:
+    def add(self, seeker: Seeker, action: str) -> None:
         """Look for what this one misses, too."""
         if seeker not in self._missing:
             self._missing[seeker] = action
-            self._is_urgent |= at_once
+            self._is_urgent = True
             _bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             thread = threading.Thread(target=self._run, name="bt_actions-rediscovery", daemon=True)
@@ -136,9 +135,7 @@ class Rediscovery:
                     found = self._look()
                 except Exception as error:  # noqa: BLE001 - no resources, no permission, rclpy's
                     found = False
-                    if not self._told:
-                        self._told = True
-                        log.warning(f"no second look for lost servers: {raised(error)}")
+                    log.warning(f"no second look for lost servers: {raised(error)}")
                 self._pause = FIRST_AFTER if found else min(2 * self._pause, LONGEST_PAUSE)
                 self._look_at = time.monotonic() + self._pause
             with host.lock:
@@ -152,7 +149,7 @@ class Rediscovery:
         with host.lock:
             while not (_closing or self._unused()):
                 if not self._still_missing():
-                    self._look_at, self._is_urgent = math.inf, True
+                    self._look_at = math.inf
                     _bell.wait()
                     continue
                 waiting = {seeker for seeker in self._missing if seeker.has_unsent}

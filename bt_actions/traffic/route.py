@@ -76,11 +76,10 @@ class Route:
             reachability.doubt(now)
         return reachability
 
-    def seek(self, now: float) -> None:
+    def seek(self) -> None:
         """Have another way looked for, where this one fails."""
         if self.misses():
-            endpoint, at_once = self._endpoint, self.in_doubt(now) > 0.0
-            endpoint.participant.seek(self, endpoint.name, at_once=at_once)
+            self._endpoint.participant.seek(self, self._endpoint.name)
 
     # What whoever looks for it asks, and does
 

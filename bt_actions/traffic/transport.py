@@ -172,8 +172,8 @@ class Participant(Opener, Protocol):
     def instead(self, action_type: Any, name: str) -> str:
         """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
 
-    def seek(self, seeker: Seeker, name: str, *, at_once: bool) -> None:
-        """Have another participant look for what is missed; `at_once`: without waiting out a pause.
+    def seek(self, seeker: Seeker, name: str) -> None:
+        """Have another participant look for what is missed, soon.
 
         Does nothing where there can be no other, or where it would find another server than ours.
         """

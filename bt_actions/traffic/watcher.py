@@ -166,7 +166,7 @@ class Watcher:
                 self._host.log.warning(
                     f"{name}: two action servers answer to this name; no more is sent"
                 )
-        self._route.seek(now)
+        self._route.seek()
         return state
 
     def _tell_goals(self, now: float) -> None:
