@@ -130,7 +130,7 @@ def test_a_wish_to_stop_means_something_in_every_state_and_each_event_in_some() 
         assert {TABLE[state, Event.ABANDONED], TABLE[state, Event.PARKED]} != {drop}, state
     for state in set(State) - {State.DONE, State.LOST, State.NOT_RECEIVED}:
         assert TABLE[state, Event.INTERRUPTED] is not drop, state
-    for event in Event:
+    for event in set(Event) - {Event.LOOK_OUT_DUE}:  # which ends a wait, and tells nothing
         assert not all(TABLE[state, event] is drop for state in State), event
 
 
@@ -238,7 +238,7 @@ def test_what_turns_up_again_is_canceled_and_holds_nothing() -> None:
     assert not life.goal.claims_resources
     assert life.on(Event.SERVER_RETURNED) == [CANCEL, ASK]
     assert life.goal.end is End.UNKNOWN
-    assert life.goal.blocks(waiting().goal, same_server=True)
+    assert life.goal.outstanding
     assert life.on(Event.RESULT, CANCELED) == []
     assert (life.goal.state, life.goal.end) == (State.DONE, End.CANCELED)
 
@@ -875,18 +875,18 @@ def test_what_was_waited_for_in_vain_is_unknown_and_still_canceled_if_it_turns_u
     assert Command.CANCEL in life.on(Event.ACCEPTED)
 
 
-def test_an_outstanding_goal_blocks_its_server_and_whoever_wants_its_resources() -> None:
+def test_what_may_run_again_at_a_server_that_is_back_is_outstanding() -> None:
     life = executing()
-    base = Goal(b"2", "lift", LIMITS, life.now, resources=frozenset({"base"}))
-    beside = Goal(b"3", "lift", LIMITS, life.now, resources=frozenset({"base"}), busy=Busy.SHARE)
-    own = frozenset({"base", "arm"})
-    life.goal.resources = own
     life.on(Event.SERVER_LOST, "gone")
-    assert not life.goal.blocks(base, same_server=True), "nobody can tell, and it holds nothing"
+    assert not life.goal.outstanding, "nobody can tell, and it holds nothing"
     life.on(Event.SERVER_RETURNED)
-    assert life.goal.blocks(base, same_server=False)
-    assert not life.goal.blocks(beside, same_server=False)
-    assert life.goal.blocks(beside, same_server=True)
+    assert life.goal.outstanding
+
+
+@pytest.mark.parametrize("busy", Busy)
+def test_who_waits_or_fails_has_its_resources_for_itself(busy: Busy) -> None:
+    goal = Goal(b"2", "lift", LIMITS, executing().now, resources=frozenset({"base"}), busy=busy)
+    assert goal.exclusive == ({"base"} if busy in (Busy.WAIT, Busy.FAIL) else set())
 
 
 def test_an_unconfirmed_goal_that_is_denied_for_good_need_not_be_waited_for() -> None:

@@ -129,10 +129,10 @@ class Goal(Facts):
         unknown = not self.claims_resources and self.end is End.UNKNOWN and self.sent
         return unknown and (self.accepted or not self.asking.in_vain)
 
-    def blocks(self, other: Goal, *, same_server: bool) -> bool:
-        """Whether this goal, given up as it is, must be accounted for before `other` is sent."""
-        shares = other.busy in (Busy.WAIT, Busy.FAIL) and bool(self.resources & other.resources)
-        return self.outstanding and (same_server or shares)
+    @property
+    def exclusive(self) -> frozenset[str]:
+        """The resources that no other goal may use beside it, on whichever server."""
+        return self.resources if self.busy in (Busy.WAIT, Busy.FAIL) else frozenset()
 
     @property
     def drains_within(self) -> float:

@@ -147,7 +147,6 @@ _in(
     SERVER_RETURNED=canceling.returned,
     ACCEPTED=canceling.runs,
     RESULT=canceling.finished,
-    LOOK_OUT_DUE=canceling.looked_out,
     DRAIN_GAVE_UP=canceling.drain_gave_up,
     ABANDONED=canceling.abandoned,
 )

@@ -105,7 +105,7 @@ class Event(Enum):
     FEEDBACK_DUE = "timeout.feedback has passed"
     CANCEL_DUE = "timeout.cancel has passed"
     POLL_DUE = "time to ask the server again"
-    LOOK_OUT_DUE = "a server that went away was looked out for, and is not back"
+    LOOK_OUT_DUE = "a server that went away was looked out for, and is not back: nobody waits now"
 
 
 # GoalStatus and CancelGoal as ROS 2 numbers them (action_msgs).

@@ -57,6 +57,8 @@ class ServerWatch:
 
     def __init__(self) -> None:
         self.gids: frozenset[GID] = frozenset()
+        self.in_sight_since = NEVER
+        """Since when a server has been shown without a break that was seen."""
         self.alone = False
         """More GIDs than one are shown, but only one server answers."""
         self._ready = False
@@ -76,6 +78,8 @@ class ServerWatch:
 
         `concludes`: whether all answers that have come are in, so that silence means something.
         """
+        if self.state(now) is Server.ABSENT:
+            self.in_sight_since = now
         if ready:
             self._unready_since = None
         elif self._unready_since is None:

@@ -52,7 +52,7 @@ class Admission:
         at_server = (each for each in self._domain.open if each.action == endpoint.action)
         in_flight = sum(each.goal.in_flight for one in at_server for each in one.goals.values())
         return in_flight < IN_FLIGHT and not any(
-            _conflicts_with(each, handle) or _may_come_back_for(each, handle, now) for each in left
+            each.goal.outstanding or _may_come_back_for(each, handle, now) for each in left
         )
 
     def why_not(self, handle: GoalHandle) -> str:
@@ -60,7 +60,7 @@ class Admission:
         endpoint = handle.endpoint
         if handle.goal.outcome is Outcome.SERVER_BUSY:
             return self._in_use(handle)
-        if any(_conflicts_with(each, handle) for each in self._left_near(handle)):
+        if any(each.goal.outstanding for each in self._left_near(handle)):
             return ": what it would use still has a goal that was given up, and would run both"
         if self._may_overtake(handle):
             return ": it has not answered another goal's request, and might run that one last"
@@ -93,14 +93,15 @@ class Admission:
     def _left_near(self, handle: GoalHandle) -> list[GoalHandle]:
         """Return the goals of this process that were lost, or have given up their resources.
 
-        Those that share a server, or resources, with this one.
+        Those that share a server, or what this one must have for itself. One that was lost holds
+        nothing any more; should its server be back, it is canceled first.
         """
-        action = handle.endpoint.action
+        action, exclusive = handle.endpoint.action, handle.goal.exclusive
         return [
             each
             for each in self._domain.handles()
             if (each.goal.lost or not each.goal.claims_resources)
-            and (each.endpoint.action == action or each.goal.resources & handle.goal.resources)
+            and (each.endpoint.action == action or each.goal.resources & exclusive)
         ]
 
     def _cancel_what_is_back(self, handle: GoalHandle, near: list[GoalHandle]) -> bool:
@@ -111,12 +112,11 @@ class Admission:
         """
         to_see = dict.fromkeys(each.endpoint for each in near if each.goal.lost)
         left = {each.action: None for each in to_see}
-        if handle.goal.busy in (Busy.WAIT, Busy.FAIL):
-            for (name, action_type), lost in list(self._domain.lost.items()):
-                if any(each.goal.resources & handle.goal.resources for each in lost):
-                    left[name, action_type] = None
-                    if name not in self._endpoints:  # a server that nobody speaks to any more
-                        self._open_to(action_type, name)
+        for (name, action_type), lost in list(self._domain.lost.items()):
+            if any(each.goal.resources & handle.goal.exclusive for each in lost):
+                left[name, action_type] = None
+                if name not in self._endpoints:  # a server that nobody speaks to any more
+                    self._open_to(action_type, name)
         for name, action_type in left:
             ours = self._endpoints.get(name)
             if ours is not None and ours.action == (name, action_type):
@@ -127,24 +127,10 @@ class Admission:
         return bool(to_see)
 
 
-def _conflicts_with(given_up: GoalHandle, handle: GoalHandle) -> bool:
-    """Whether it may still run where this one wants to.
-
-    One that was lost holds nothing any more; should its server be back, it is canceled first.
-    """
-    return given_up.goal.blocks(
-        handle.goal, same_server=given_up.endpoint.action == handle.endpoint.action
-    )
-
-
-def _may_come_back_for(lost: GoalHandle, handle: GoalHandle, now: float) -> bool:
+def _may_come_back_for(left: GoalHandle, handle: GoalHandle, now: float) -> bool:
     """Whether it was lost, and its server may only be shown later than that of this one.
 
-    It shares a resource with this one, and is canceled first where its server is seen in time.
+    It is canceled first where its server is seen in time.
     """
-    if not lost.goal.lost or handle.goal.busy not in (Busy.WAIT, Busy.FAIL):
-        return False
-    return (
-        lost.endpoint.action != handle.endpoint.action
-        and now - handle.endpoint.in_sight_since < BESIDE
-    )
+    elsewhere = left.endpoint.action != handle.endpoint.action
+    return left.goal.lost and elsewhere and now - handle.endpoint.watch.in_sight_since < BESIDE

@@ -57,7 +57,7 @@ class ActionEndpoint:
         self.watch = ServerWatch()
         self.cancels = domain.cancels[self.action]
         self.orphaned = False
-        self.in_sight_since = self.heard_at = host.steady()
+        self.heard_at = host.steady()
         self._probes = itertools.count(PROBES_KEPT)
         self._warned_of: set[str] = set()
         self._ended = EndedGoals(self, host)

@@ -54,8 +54,6 @@ class Endpoint(Listener, Scheduled, Protocol):
     """Its node is gone: nobody can want its goals any more."""
     heard_at: float
     """When its servers were last heard of."""
-    in_sight_since: float
-    """Since when a server has been shown without a break that was seen."""
 
     @property
     def is_parents(self) -> bool:

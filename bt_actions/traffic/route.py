@@ -51,7 +51,7 @@ class Route:
         if self.in_doubt(now) > 0.0:
             return True
         seen_since = self._endpoint.transport.seen_since
-        came_at = max(seen_since, self._endpoint.in_sight_since)
+        came_at = max(seen_since, self._endpoint.watch.in_sight_since)
         is_new = came_at - seen_since < TOO_NEW and now - came_at < DISCOVERS
         return is_new and not self._is_absent(now)
 

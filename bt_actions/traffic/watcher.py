@@ -42,7 +42,6 @@ class Watcher:
         self._looked_at = NEVER  # and told
         self._counted = 0  # at the last look
         self._looked_like = Server.ABSENT
-        self._was_away = False  # seen between two looks
         self._held_back = (True, True)  # as a server has just come; by `Route.holds_back`
 
     def run_due(self, now: float) -> float:
@@ -151,10 +150,7 @@ class Watcher:
         before = self._looked_like
         state = self._looked_like = watch.state(now)
         self._looked_at = now
-        if before is Server.ABSENT or self._was_away:
-            endpoint.in_sight_since = now
-        self._was_away = False
-        held_back = (now - endpoint.in_sight_since < BESIDE, self._route.holds_back(now))
+        held_back = (now - watch.in_sight_since < BESIDE, self._route.holds_back(now))
         if (state, held_back) != (before, self._held_back):
             wake(endpoint.handles)  # what waits for it, or was held back, may be sent
         self._held_back = held_back
@@ -194,9 +190,8 @@ class Watcher:
         watch = self._endpoint.watch
         with contextlib.suppress(Exception):
             if self._endpoint.transport.servers() != watch.gids:
-                now, self._looked_at = self._host.steady(), NEVER
-                self._ask_discovery(now, concludes=False)
-                self._was_away |= watch.state(now) is Server.ABSENT
+                self._looked_at = NEVER
+                self._ask_discovery(self._host.steady(), concludes=False)
 
     def _ask_discovery(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""

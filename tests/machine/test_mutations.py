@@ -192,17 +192,17 @@ def lets_a_lost_goal_run_on_when_its_server_is_back(patch: Patch) -> None:
 
 @mutation
 def sends_beside_a_lost_goal_that_wants_the_same_resource(patch: Patch) -> None:
-    patch.setattr(
-        Goal, "blocks", lambda goal, other, *, same_server: goal.outstanding and same_server
-    )
+    patch.setattr(Goal, "exclusive", frozenset[str]())
 
 
 @mutation
 def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
-    def blocks(goal: Goal, other: Goal, *, same_server: bool) -> bool:
-        return goal.outstanding and bool(goal.resources & other.resources)
+    def near(self: Admission, handle: GoalHandle) -> list[GoalHandle]:
+        wanted = handle.goal.resources
+        return [each for each in real(self, handle) if each.goal.resources & wanted]
 
-    patch.setattr(Goal, "blocks", blocks)
+    real = Admission._left_near
+    patch.setattr(Admission, "_left_near", near)
 
 
 @mutation

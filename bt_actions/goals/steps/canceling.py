@@ -187,11 +187,6 @@ def ask_another(goal: Facts) -> None:
         goal.commands.append(Command.ASK_RESULT)
 
 
-@leads_to()
-def looked_out(goal: Facts) -> None:
-    """Nobody waits for it any more; should its server be back all the same, it is canceled."""
-
-
 @leads_to(State.DONE)
 def abandoned(goal: Facts) -> State:
     """Forget it; what is not known by now stays so."""
