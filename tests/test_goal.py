@@ -634,15 +634,6 @@ def test_a_question_for_a_result_has_time_to_be_answered_at_the_end_of_the_wait(
     assert life.goal.late
 
 
-def test_a_paused_tree_stops_the_deadlines_of_what_was_not_sent() -> None:
-    life = waiting()
-    life.goal.postpone(60.0)
-    assert life.due_in == 65.0
-    running = executing()
-    running.goal.postpone(60.0)
-    assert running.due_in == 2.0
-
-
 # Rule 7: the server dies, restarts, comes back
 
 

@@ -81,11 +81,6 @@ class Goal(Facts):
             if self.deadlines.take_passed(event, now):
                 yield event
 
-    def postpone(self, seconds: float) -> None:
-        """Give a goal that was not sent yet so much more time: the tree was paused."""
-        if not self.sent:
-            self.deadlines.postpone(seconds)
-
     # What the caller may ask
 
     def due_in(self, now: Now) -> float | None:

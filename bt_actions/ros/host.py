@@ -12,7 +12,7 @@ import time
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.ros.log import log
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.handle import Domain
 from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduler
 from bt_actions.utilities.plain_text import raised
@@ -55,7 +55,7 @@ class RosHost:
     def domain(self, number: int) -> Domain:
         """Return what is shared in the ROS domain of this number."""
         with self.lock:
-            return self._domains.setdefault(number, Domain(number))
+            return self._domains.setdefault(number, Domain())
 
     def appears(self) -> None:
         """Take note that this process begins to see others now; the caller holds the lock."""

@@ -58,7 +58,7 @@ class Replies:
         self._asked_at = NEVER
         self._in_sight: frozenset[GID] = frozenset()  # just now
         self._crowd: frozenset[GID] = frozenset()  # the same, where it is not known who lives
-        self._one_left = self._one_came = False  # since the last look
+        self._one_left_or_came = False  # since the last look
         self._told_of_two = self._runs_anew = False
         self._fresh_since = NEVER
         """What was asked before may have been answered by who is gone, or did not have it yet."""
@@ -73,7 +73,7 @@ class Replies:
     def taken_over(self) -> None:
         """Another node sees to the goal from now on, and has not seen its server yet."""
         self._was_gone = True
-        self._one_left = self._one_came = False
+        self._one_left_or_came = False
         self._crowd = self._in_sight = frozenset()
 
     def taken_by_two(self, servers: frozenset[GID], now: float) -> None:
@@ -186,8 +186,7 @@ class Replies:
         returned = self._was_gone and not gone and watch.state(now) is not Server.ABSENT
         self._was_gone = gone or (self._was_gone and not returned)
         self._note_changes(watch, now)
-        one_left, one_came = self._one_left, self._one_came
-        self._one_left = self._one_came = False
+        others_now, self._one_left_or_came = self._one_left_or_came, False
         if goal.lost:
             none_dead = watch.all_live(now) or not watch.changed(self.sent_to)
             is_there = not gone and none_dead and watch.state(now) is not Server.ABSENT
@@ -200,13 +199,10 @@ class Replies:
         if gone:
             how = "was restarted" if watch.gids else "went away"
             return Event.SERVER_LOST, f"{name} {how} under the goal"
-        if one_left:  # what was said before may have been its word: ask who is left
+        if others_now:  # what was said before may have been the word of one that left: ask anew
             refused = self._refused
             self._forget(now)
             return Event.SERVER_AMBIGUOUS if refused else Event.SERVER_CHANGED, None
-        if one_came:
-            self._ended = None
-            return Event.SERVER_CHANGED, None
         if self._may_be_at_two(watch):
             if not watch.both_live or self._told_of_two:
                 return None
@@ -232,9 +228,7 @@ class Replies:
         crowd = watch.gids if _is_crowded(watch) else frozenset[GID]()
         left, came = self._crowd - watch.gids, (watch.gids - self._in_sight) & self.sent_to
         if left or (came and len(self.sent_to) > 1):
-            self._fresh_since = now
-            self._one_left |= bool(left)
-            self._one_came |= bool(came)
+            self._fresh_since, self._one_left_or_came = now, True
         self._crowd, self._in_sight = crowd, watch.gids
 
     def spoke(self, watch: ServerWatch, now: float) -> None:

@@ -12,7 +12,7 @@ from contextlib import nullcontext
 from bt_actions.servers.stalls import Stalls
 from bt_actions.testing.network import Lines
 from bt_actions.testing.timeline import Alarm, Timeline
-from bt_actions.traffic.domain import Domain
+from bt_actions.traffic.handle import Domain
 from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduled, Scheduler
 
@@ -39,7 +39,7 @@ class VirtualHost:
 
     def domain(self, number: int) -> Domain:
         """Return what is shared in the ROS domain of this number."""
-        return self._domains.setdefault(number, Domain(number))
+        return self._domains.setdefault(number, Domain())
 
     def steady(self) -> float:
         """Return the virtual time."""

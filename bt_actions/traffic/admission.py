@@ -12,8 +12,7 @@ from typing import Any
 from bt_actions.goals.policy import Busy, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.servers.presence import Server
-from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.handle import Endpoint, GoalHandle
+from bt_actions.traffic.handle import Domain, Endpoint, GoalHandle
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.watcher import BESIDE
 

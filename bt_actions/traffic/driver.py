@@ -1,7 +1,7 @@
 """Tells the goals of one endpoint what happens, and does what they decide.
 
 A goal decides at once, whoever tells it something. What follows waits in one queue of its domain
-(domain.Effects), so nothing is done by recursion. What was true at the decision is looked at again
+(`Effects`), so nothing is done by recursion. What was true at the decision is looked at again
 when it is done, and what fails is told to the goal. All under the host's lock.
 """
 
@@ -15,7 +15,6 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
 from bt_actions.servers.replies import Told
-from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint, GoalHandle, NodeTraffic, Standing, wake
 from bt_actions.traffic.host import Entry, Host
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
@@ -31,12 +30,11 @@ class Driver:
         self,
         endpoint: Endpoint,
         host: Host,
-        domain: Domain,
         traffic: NodeTraffic,
         failed: Callable[[str, Exception], None],
     ) -> None:
         """`failed` is told what could not be done, which is asked for again later."""
-        self._endpoint, self._host, self._domain = endpoint, host, domain
+        self._endpoint, self._host = endpoint, host
         self._traffic, self._failed = traffic, failed
         self._commands: dict[Command, Effect] = {
             Command.RELEASE: self._release,
@@ -66,7 +64,7 @@ class Driver:
 
     def _rival_sent(self, handle: GoalHandle) -> bool:
         """Whether a newer goal that replaces this one is on its way, or has arrived."""
-        holders = self._domain.resources.holders(handle.goal.resources)
+        holders = self._endpoint.domain.resources.holders(handle.goal.resources)
         newer = holders[holders.index(handle) + 1 :] if handle in holders else []
         return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
 
@@ -103,8 +101,8 @@ class Driver:
 
     def _give_back_time(self, handle: GoalHandle, now: float) -> None:
         """See to it that no deadline counts the time in which a goal is not sent on our account."""
-        if handle.held_back_since is not None:
-            handle.goal.postpone(now - handle.held_back_since)
+        if handle.held_back_since is not None and not handle.goal.sent:
+            handle.goal.deadlines.postpone(now - handle.held_back_since)
         waits = handle.goal.state is State.WAITING_FOR_SERVER
         held_back = handle.paused or (waits and self._endpoint.holds_back(now))
         handle.held_back_since = now if held_back else None
@@ -129,7 +127,7 @@ class Driver:
         if (due := goal.due_in(now)) is not None:
             host.scheduler.wake_by(now.steady + due)
         effects = self._what_follows(handle, commands)
-        self._domain.effects.run(partial(effect, handle) for effect in effects)
+        self._endpoint.domain.effects.run(partial(effect, handle) for effect in effects)
 
     def _what_follows(self, handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Effect]:
         """Yield what is to be done after a step of a goal, in order."""
@@ -192,7 +190,7 @@ class Driver:
         return True
 
     def _release(self, handle: GoalHandle) -> None:
-        for next_one in self._domain.resources.release(handle):
+        for next_one in self._endpoint.domain.resources.release(handle):
             next_one.endpoint.tell(next_one, Event.GRANTED)
 
     # What follows from it
@@ -220,14 +218,15 @@ class Driver:
 
         There may be room at its server, or no conflict any more.
         """
-        unsent, name, resources = self._domain.unsent, self._endpoint.name, handle.goal.resources
+        endpoint, resources = self._endpoint, handle.goal.resources
+        unsent = endpoint.domain.unsent
         for each in [each for each in unsent if each.goal.sent or each.goal.state is State.DONE]:
             del unsent[each]
-        wake(e for e in unsent if e.endpoint.name == name or e.goal.resources & resources)
+        wake(e for e in unsent if e.endpoint.name == endpoint.name or e.goal.resources & resources)
 
     def _replace(self, handle: GoalHandle) -> None:
         """Tell older goals on its resources that it has taken their place."""
-        for older in self._domain.resources.holders(handle.goal.resources):
+        for older in self._endpoint.domain.resources.holders(handle.goal.resources):
             if older is handle:
                 break
             older.endpoint.tell(older, Event.REPLACED, handle.goal.server)
@@ -240,7 +239,7 @@ class Driver:
             self._put_on_record(handle)
 
     def _put_on_record(self, handle: GoalHandle) -> None:
-        goal, servers = handle.goal, handle.replies.sent_to
-        accept = goal.timeouts.accept or 0.0
-        entry = Entry(self._endpoint.name, self._domain.number, servers, accept, goal.lost)
+        goal, servers, endpoint = handle.goal, handle.replies.sent_to, self._endpoint
+        domain, accept = endpoint.participant.domain, goal.timeouts.accept or 0.0
+        entry = Entry(endpoint.name, domain, servers, accept, goal.lost)
         self._host.record.enter(goal.id, entry)

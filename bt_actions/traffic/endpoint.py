@@ -16,10 +16,9 @@ from bt_actions.goals.policy import End
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Event, State
 from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
 from bt_actions.servers.replies import DENIALS
-from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.handle import GoalHandle, NodeTraffic, wake
+from bt_actions.traffic.handle import Domain, GoalHandle, NodeTraffic, wake
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import Predecessors
 from bt_actions.traffic.route import Route
@@ -63,13 +62,13 @@ class ActionEndpoint:
         self._ended = EndedGoals(self, host)
         self._predecessors = Predecessors(name, host.log)
         self.transport = participant.open_transport(action_type, name, self)
-        self.route = Route(self, host, domain)
-        self.watcher = Watcher(self, host, domain, self.route)
+        self.route = Route(self, host)
+        self.watcher = Watcher(self, host, self.route)
         self.in_doubt, self.holds_back = self.route.in_doubt, self.route.holds_back
         self.observe, self.observe_and_tell = self.watcher.observe, self.watcher.observe_and_tell
         self.recent_state = self.watcher.recent_state
         self.run_due = self.watcher.run_due
-        self.driver = driver = Driver(self, host, domain, traffic, self._warn_once)
+        self.driver = driver = Driver(self, host, traffic, self._warn_once)
         self.tell, self.pass_on = driver.tell, driver.pass_on
         self.apply_deadlines, self.ask_to_cancel = driver.apply_deadlines, driver.ask_to_cancel
 

@@ -1,18 +1,19 @@
-"""A goal on its way, with what its owner and its server need to know; and which run it belongs to.
+"""A goal on its way, and what it belongs to: its endpoint, its run, its ROS domain.
 
-Values, and the protocols by which the parts of traffic/ know each other.
+Values, registers, and the protocols by which the parts of traffic/ know each other.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import NEVER, Event, State
 from bt_actions.servers.presence import Server, ServerWatch
 from bt_actions.servers.replies import Replies, Told
@@ -41,6 +42,7 @@ class Endpoint(Listener, Scheduled, Protocol):
     """One action as one node sees it (ActionEndpoint), as its parts and its neighbors know it."""
 
     participant: Participant
+    domain: Domain
     name: str
     action_type: Any
     action: Action
@@ -94,9 +96,6 @@ class Endpoint(Listener, Scheduled, Protocol):
     def observe(self) -> None:
         """Observe who is in sight; what follows is for `observe_and_tell` to say."""
 
-    def probe(self) -> None:
-        """Ask the server just in order to be answered."""
-
     def ask_to_cancel(self, goal_id: bytes) -> None:
         """Ask the server to cancel a goal, as soon as its queue has room."""
 
@@ -105,6 +104,9 @@ class Endpoint(Listener, Scheduled, Protocol):
 
     def holds_back(self, now: float) -> bool:
         """Whether nothing is sent though a server is in sight."""
+
+    def probe(self) -> None:
+        """Ask the server just in order to be answered."""
 
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""
@@ -222,3 +224,51 @@ def wake(handles: Iterable[GoalHandle]) -> None:
     for run in {handle.begun_in: None for handle in handles}:
         if run is not None:
             run.tell(None)
+
+
+class Effects:
+    """What goals have decided is to be done, in that order; the caller holds the host's lock."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._runs = False
+
+    def run(self, effects: Iterable[Callable[[], None]]) -> None:
+        """Do these behind what was decided before, and what is decided meanwhile behind these.
+
+        Where that is under way, whoever has begun it does all.
+        """
+        self._waiting.extend(effects)
+        if self._runs:
+            return
+        self._runs = True
+        try:
+            while self._waiting:
+                self._waiting.popleft()()
+        finally:
+            self._runs = False
+
+
+class Domain:
+    """What all nodes of this process in one ROS domain share."""
+
+    def __init__(self) -> None:
+        self.resources: Resources[GoalHandle] = Resources()
+        self.effects = Effects()
+        self.open: dict[Endpoint, None] = {}
+        """The endpoints with goals, of all nodes, in the order in which they came."""
+        self.unsent: dict[GoalHandle, None] = {}
+        """Goals that are to be sent, and some that were since (Driver drops them)."""
+        self.ever_lost_sight = False
+        """A server went out of sight once: what else its process serves may have, too."""
+        self.known: set[Action] = set()
+        """The actions that had a server once."""
+        self.lost: dict[Action, list[GoalHandle]] = defaultdict(list)
+        """Lost goals whose endpoint is gone: their server may be back for the next one."""
+        self.cancels: dict[Action, Cancels] = defaultdict(Cancels)
+        """The cancel requests of this process."""
+
+    def handles(self) -> Iterator[GoalHandle]:
+        """Yield the goals of all open endpoints."""
+        for endpoint in self.open:
+            yield from endpoint.goals.values()

@@ -7,10 +7,8 @@ server is there is for servers/ to say. All under the host's lock.
 
 from __future__ import annotations
 
-from bt_actions.goals.policy import End
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import TOO_NEW
@@ -19,9 +17,9 @@ LOST_KEPT = 100
 """Goals of one action remembered in case their server, or their request, turns up: the newest."""
 
 
-def take_over(endpoint: Endpoint, domain: Domain, now: float) -> None:
+def take_over(endpoint: Endpoint, now: float) -> None:
     """Take lost goals of other nodes whose server is in sight here: it is to cancel them first."""
-    for handle in list(domain.handles()):
+    for handle in list(endpoint.domain.handles()):
         other = handle.endpoint
         if not handle.goal.lost or other is endpoint or other.action != endpoint.action:
             continue
@@ -43,9 +41,9 @@ def _sees_more(endpoint: Endpoint, other: Endpoint, servers: frozenset[bytes], n
     return other.orphaned or other.watch.gone(now, servers) or taken_for_dead
 
 
-def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
+def adopt(endpoint: Endpoint, host: Host) -> None:
     """Take over what was lost, or left, at this action before, to cancel it first."""
-    for handle in domain.lost.pop(endpoint.action, []):
+    for handle in endpoint.domain.lost.pop(endpoint.action, []):
         saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at
         if handle.endpoint.participant is not endpoint.participant and not saw_it:
             first = handle.not_gone_before == NEVER  # a later node need only have discovered
@@ -54,7 +52,7 @@ def adopt(endpoint: Endpoint, host: Host, domain: Domain) -> None:
         endpoint.take_in(handle)
 
 
-def park(endpoint: Endpoint, domain: Domain, *, all_of_them: bool = False) -> None:
+def park(endpoint: Endpoint, *, all_of_them: bool = False) -> None:
     """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
     for handle in endpoint.handles:
         goal = handle.goal
@@ -62,19 +60,13 @@ def park(endpoint: Endpoint, domain: Domain, *, all_of_them: bool = False) -> No
             endpoint.tell(handle, Event.PARKED)
         if goal.lost:
             goal.deadlines.clear()  # nobody looks out for its server from now on
-            domain.lost[endpoint.action].append(handle)
+            endpoint.domain.lost[endpoint.action].append(handle)
             endpoint.retire(handle)
 
 
 def bound_the_lost(endpoint: Endpoint, host: Host) -> None:
     """Give up the oldest of too many lost goals; none that its server may still decide on."""
-    forgettable = [
-        handle
-        for handle in endpoint.handles
-        if handle.goal.end in (End.SERVER_GONE, End.NEVER_STARTED)
-        and handle.goal.outcome is not None
-        and not handle.goal.may_still_be_accepted
-    ]
+    forgettable = [handle for handle in endpoint.handles if handle.accounted_for]
     for handle in forgettable[:-LOST_KEPT]:
         endpoint.tell(handle, Event.ABANDONED)
         host.record.strike(handle.goal.id)

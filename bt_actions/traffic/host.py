@@ -12,8 +12,7 @@ from typing import Any, Protocol
 
 from bt_actions.goals.terms import Command, Event
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic.domain import Domain
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.handle import Domain, GoalHandle
 from bt_actions.traffic.scheduler import Scheduler
 
 

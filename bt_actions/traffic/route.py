@@ -14,7 +14,6 @@ from bt_actions.goals.terms import NEVER, Event, State
 from bt_actions.servers.presence import LEASE, Server
 from bt_actions.servers.reachability import TWICE, Reachability
 from bt_actions.servers.stalls import ANSWERS_TAKE
-from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.transport import ActionTransport, Opener, probe
@@ -35,8 +34,8 @@ ON_TRIAL = 0
 class Route:
     """How one endpoint reaches its server (a transport.Seeker)."""
 
-    def __init__(self, endpoint: Endpoint, host: Host, domain: Domain) -> None:
-        self._endpoint, self._host, self._domain = endpoint, host, domain
+    def __init__(self, endpoint: Endpoint, host: Host) -> None:
+        self._endpoint, self._host = endpoint, host
         self.elsewhere = False
         """The transport is not in our node's participant: nobody spins it."""
         self._long_stalls = endpoint.participant.long_stalls
@@ -96,7 +95,7 @@ class Route:
             return False
         if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.handles):
             return False  # nobody here wants it; it is remembered, as what is parked is
-        known = self._domain.ever_lost_sight or endpoint.action in self._domain.known
+        known = endpoint.domain.ever_lost_sight or endpoint.action in endpoint.domain.known
         running = (State.SENDING, State.EXECUTING, State.REPLACED)
         still = all(handle.goal.state not in running for handle in endpoint.handles)
         return (known and self._is_absent(now) and still) or self._is_unresponsive(now)

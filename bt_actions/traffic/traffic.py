@@ -66,7 +66,7 @@ class Traffic:
         endpoint = self._endpoints[name] = ActionEndpoint(
             self.host, self.participant, self._domain, self, action_type, name
         )
-        handover.adopt(endpoint, self.host, self._domain)
+        handover.adopt(endpoint, self.host)
         return endpoint
 
     def leave(self, endpoint: ActionEndpoint) -> None:
@@ -74,7 +74,7 @@ class Traffic:
         with self.host.lock:
             endpoint.users -= 1
             if endpoint.users <= 0:
-                handover.park(endpoint, self._domain)
+                handover.park(endpoint)
             self.drop_if_unused(endpoint)
 
     def drop_if_unused(self, endpoint: Endpoint) -> None:
@@ -195,7 +195,7 @@ class Traffic:
         with self.host.lock:
             self.closed = True
             for endpoint in list(self._endpoints.values()):
-                handover.park(endpoint, self._domain, all_of_them=True)
+                handover.park(endpoint, all_of_them=True)
                 for handle in endpoint.handles:
                     endpoint.tell(handle, Event.ABANDONED)
                 endpoint.transport.close()

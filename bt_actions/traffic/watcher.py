@@ -11,7 +11,6 @@ import contextlib
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
-from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.handle import Endpoint, wake
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import TOO_NEW, Route
@@ -36,8 +35,8 @@ that came back with it; 0.5 measured."""
 class Watcher:
     """The watch over one endpoint's server."""
 
-    def __init__(self, endpoint: Endpoint, host: Host, domain: Domain, route: Route) -> None:
-        self._endpoint, self._host, self._domain, self._route = endpoint, host, domain, route
+    def __init__(self, endpoint: Endpoint, host: Host, route: Route) -> None:
+        self._endpoint, self._host, self._route = endpoint, host, route
         self._look_at = 0.0
         self._looked_at = NEVER  # and told
         self._counted = 0  # at the last look
@@ -85,9 +84,10 @@ class Watcher:
 
         Who has taken another's place since is seen right after a send.
         """
+        endpoint = self._endpoint
         is_new = now - self._looked_at < LOOK_AT_REST and self._is_alone
-        is_new &= self._endpoint.action not in self._domain.lost  # what was left is canceled first
-        if is_new and self._endpoint.participant.alive() and not self._counts_others():
+        is_new &= endpoint.action not in endpoint.domain.lost  # what was left is canceled first
+        if is_new and endpoint.participant.alive() and not self._counts_others():
             return Server.READY
         return self.observe_and_tell(now)
 
@@ -144,8 +144,8 @@ class Watcher:
             if not self._route.fall_back():
                 self._orphan()
             return Server.ABSENT
-        handover.adopt(endpoint, self._host, self._domain)
-        handover.take_over(endpoint, self._domain, now)
+        handover.adopt(endpoint, self._host)
+        handover.take_over(endpoint, now)
         self._tell_goals(now)
         before = self._looked_like
         state = self._looked_like = watch.state(now)
@@ -155,8 +155,8 @@ class Watcher:
             wake(endpoint.handles)  # what waits for it, or was held back, may be sent
         self._held_back = held_back
         if state is not before:
-            self._domain.ever_lost_sight |= state is Server.ABSENT
-            self._domain.known.add(endpoint.action)
+            endpoint.domain.ever_lost_sight |= state is Server.ABSENT
+            endpoint.domain.known.add(endpoint.action)
             if state is Server.AMBIGUOUS:
                 name = endpoint.name
                 self._host.log.warning(
@@ -223,4 +223,4 @@ class Watcher:
         patience = max((each.goal.drains_within for each in endpoint.handles), default=0.0)
         silent = self._host.steady() - endpoint.heard_at > max(SILENT_FOR, patience)
         if silent and not self._host.stalls.answers_take(self._host.steady()):
-            handover.park(endpoint, self._domain, all_of_them=True)
+            handover.park(endpoint, all_of_them=True)

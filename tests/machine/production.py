@@ -20,8 +20,8 @@ from bt_actions.goals.terms import Command, Event, Now, State
 from bt_actions.servers.reachability import Reachability
 from bt_actions.servers.stalls import IN_A_ROW, Stalls
 from bt_actions.traffic import handle as traffic
-from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic.handle import Domain
 from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduler
 from bt_actions.traffic.traffic import Traffic
@@ -214,7 +214,7 @@ class ModelHost:
         self.log, self.record, self.trace = ModelLog(caller), Record(), Witness(caller)
         self.stalls = Stalls()
         self.scheduler = Scheduler(self.steady, self.stalls, lambda: None, lambda *_: None)
-        self._domain = Domain(DOMAIN)
+        self._domain = Domain()
 
     def domain(self, number: int) -> Domain:
         return self._domain

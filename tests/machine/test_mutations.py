@@ -25,7 +25,6 @@ from bt_actions.servers import replies
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import handover
 from bt_actions.traffic.admission import Admission
-from bt_actions.traffic.domain import Domain
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.endpoint import ActionEndpoint
@@ -222,19 +221,19 @@ def knows_of_nothing_in_the_way(patch: Patch) -> None:
 
 @mutation
 def leaves_a_lost_goal_to_a_node_that_is_not_shown_its_server(patch: Patch) -> None:
-    patch.setattr(handover, "take_over", lambda endpoint, domain, now: None)
+    patch.setattr(handover, "take_over", lambda endpoint, now: None)
 
 
 @mutation
 def adopts_nothing_that_was_left(patch: Patch) -> None:
-    patch.setattr(handover, "adopt", lambda endpoint, host, domain: None)
+    patch.setattr(handover, "adopt", lambda endpoint, host: None)
 
 
 @mutation
 def remembers_nothing_that_is_lost(patch: Patch) -> None:
-    def park(endpoint: Any, domain: Domain, *, all_of_them: bool = False) -> None:
-        original(endpoint, domain, all_of_them=all_of_them)
-        domain.lost.clear()
+    def park(endpoint: Any, *, all_of_them: bool = False) -> None:
+        original(endpoint, all_of_them=all_of_them)
+        endpoint.domain.lost.clear()
 
     original = handover.park
     patch.setattr(handover, "park", park)
