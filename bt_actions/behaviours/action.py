@@ -16,7 +16,7 @@ from py_trees.common import Status
 from bt_actions.behaviours.connected import Connected
 from bt_actions.behaviours.progress import Progress
 from bt_actions.behaviours.reading import Reading
-from bt_actions.behaviours.variables import register, resolve, variables_in
+from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
@@ -139,17 +139,18 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
 
     def progress(self) -> Progress:
         """Return what the action is doing at this moment; safe to call from any thread."""
-        handle, backend, attempts = self._handle, self._backend, self.retry.attempts
-        if backend is None or handle is None:
-            return Progress("IDLE", self.attempt, attempts, None, None, "")
-        now = backend.clock.now()
-        if self.status is Status.RUNNING and self._filed(handle):
-            left = self._attempts.pause_left(now, look_only=True)
-            return Progress("BACKOFF", self.attempt, attempts, None, left, "backoff")
-        goal, deadline = handle.goal, backend.traffic.deadline(handle, now)
-        event, due = deadline or (None, None)
-        what = event.name.removesuffix("_DUE").lower() if event is not None else ""
-        return Progress(goal.state.shown, self.attempt, attempts, goal.feedback, due, what)
+        handle, backend = self._handle, self._backend
+        state, feedback, left, deadline = "IDLE", None, None, ""
+        if backend is not None and handle is not None:
+            now = backend.clock.now()
+            if self.status is Status.RUNNING and self._filed(handle):
+                left = self._attempts.pause_left(now, look_only=True)
+                state, deadline = "BACKOFF", "backoff"
+            else:
+                state, feedback = handle.goal.state.shown, handle.goal.feedback
+                if due := backend.traffic.deadline(handle, now):
+                    deadline, left = due[0].name.removesuffix("_DUE").lower(), due[1]
+        return Progress(state, self.attempt, self.retry.attempts, feedback, left, deadline)
 
     @property
     def drained(self) -> bool:
@@ -177,9 +178,15 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         that its result has not; UnknownInterface (a LookupError) when the action type is not
         installed.
         """
-        self.action_type = interface(self.action_type, "action")
-        self._check_fields()
-        register(self, self._variables(), self.save)
+        action: Any = interface(self.action_type, "action")
+        if isinstance(self.goal, Mapping) and not reads_variables(self.goal):
+            try:
+                fill(action.Goal, self.goal)
+            except MessageError as error:
+                raise ValueError(f"{self.name}: goal: {error}") from error
+        if wrong := self._reading.unknown_field(action.Result):
+            raise ValueError(f"{self.name}: {wrong}")
+        self.action_type = action
         super().setup(**kwargs)
 
     def _make(self, backend: Backend) -> ActionEndpoint:
@@ -188,8 +195,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     def initialise(self) -> None:
         """Begin a visit. What an earlier one left behind is drained beside it."""
         backend, _ = self._there()
-        if self._handle is not None and not self._filed(self._handle):
-            ActionBehaviour.terminate(self, Status.INVALID)  # the first tick of a visit broke off
+        ActionBehaviour.terminate(self, Status.INVALID)  # where the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._reading.when)
         self._outcome = None
         self._begin(backend)
@@ -318,20 +324,6 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         action: Any = self.action_type
         data = self.goal() if callable(self.goal) else self.goal
         return fill(action.Goal, resolve(data), now=self._there()[0].clock.stamp)
-
-    def _variables(self) -> set[str]:
-        """The blackboard keys that a goal is made from."""
-        return variables_in(self.goal)
-
-    def _check_fields(self) -> None:
-        action: Any = self.action_type
-        if isinstance(self.goal, Mapping) and not variables_in(self.goal):
-            try:
-                fill(action.Goal, self.goal)
-            except MessageError as error:
-                raise ValueError(f"{self.name}: goal: {error}") from error
-        if wrong := self._reading.unknown_field(action.Result):
-            raise ValueError(f"{self.name}: {wrong}")
 
     def _judge(self, handle: GoalHandle, backend: Backend) -> AttemptRecord:
         goal = handle.goal

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from py_trees.behaviour import Behaviour
@@ -45,13 +46,12 @@ class Parallel(PyTreesParallel):
 
     def _judge(self) -> Status:
         needed = len(self.children) if self.at_least is None else self.at_least
-        done = [child for child in self.children if child.status is Status.SUCCESS]
-        failed = [child for child in self.children if child.status is Status.FAILURE]
-        self.feedback_message = f"{len(done)} of {needed} succeeded, {len(failed)} failed"
-        status, those = Status.RUNNING, self.children
-        if len(done) >= needed:
-            status, those = Status.SUCCESS, done
-        elif len(self.children) - len(failed) < needed:
-            status, those = Status.FAILURE, failed
-        self.current_child = those[-1] if those else None
+        count = Counter(child.status for child in self.children)
+        done, failed = count[Status.SUCCESS], count[Status.FAILURE]
+        self.feedback_message = f"{done} of {needed} succeeded, {failed} failed"
+        enough, possible = done >= needed, len(self.children) - failed >= needed
+        status = Status.SUCCESS if enough else Status.RUNNING if possible else Status.FAILURE
+        for child in self.children:
+            if child.status is status:
+                self.current_child = child
         return status

@@ -87,5 +87,6 @@ class Reading:
         return ""
 
     def write(self) -> None:
-        """Save it, under keys that the leaf has registered."""
-        Blackboard.storage.update(self._to_save)
+        """Save it."""
+        for name, value in self._to_save:
+            Blackboard.set(name, value)

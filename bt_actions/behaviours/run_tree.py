@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.variables import Var, resolve, variables_in
+from bt_actions.behaviours.variables import Var, resolve
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
@@ -71,10 +71,6 @@ class RunTree(ActionBehaviour):
             timeout=timeout,
             **kwargs,
         )
-        self._given = [tree, inputs]
-
-    def _variables(self) -> set[str]:
-        return variables_in(self._given)
 
     def names(self, result: Any) -> Mapping[str, object]:
         """The result, and the outputs of the tree."""

@@ -6,13 +6,11 @@ the blackboard is process-global and has no lock.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
-from py_trees.common import Access
 
 from bt_actions.utilities.plain_data import numbers_only
 
@@ -70,16 +68,6 @@ def _step(value: Any, step: str, name: str) -> Any:
         raise MissingVariable(f"variable {name!r}: {step!r} is no field of a {kind}") from None
 
 
-def register(leaf: Behaviour, read: Iterable[str], written: Iterable[str]) -> None:
-    """Tell the blackboard, once for a leaf, which keys it reads and which variables it sets."""
-    access = [*((name, Access.READ) for name in read)]
-    access += ((key(name), Access.WRITE) for name in written)
-    if access and not leaf.blackboards:
-        client = leaf.attach_blackboard_client()
-        for name, how in access:
-            client.register_key(name, how)
-
-
 def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:
     """Return plain data with every Var in it replaced by its value; raises MissingVariable."""
     if isinstance(data, Var):
@@ -93,8 +81,8 @@ def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:
     return data
 
 
-def variables_in(data: Any) -> set[str]:
-    """Return the blackboard keys that `resolve` would read."""
-    found = set[str]()
-    resolve(data, lambda variable: found.add(key(variable.name)))
-    return found
+def reads_variables(data: Any) -> bool:
+    """Whether `resolve` would read anything."""
+    found: list[Var] = []
+    resolve(data, found.append)
+    return bool(found)
