@@ -13,7 +13,6 @@ from py_trees.decorators import Decorator
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.connected import Timed
-from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
@@ -27,27 +26,15 @@ class Gate(Decorator):
 
     A subclass says in `gate` what to do: None ticks the child, RUNNING waits without ticking it,
     SUCCESS and FAILURE end the node. `update` then says what the child's status means: itself,
-    where nothing else is said. Where `begin` raises ValueError, the visit fails with its text.
+    where nothing else is said. Where one of them or `initialise` raises ValueError, the visit fails
+    with its text.
     """
 
     refused = False
-    """Whether it failed by itself: its child did not, or was not ticked this time, or `update` says
-    so."""
-
-    _wrong = ""
-
-    def begin(self) -> None:
-        """Begin a visit; may raise ValueError."""
-
-    def initialise(self) -> None:
-        self.feedback_message = self._wrong = ""
-        try:
-            self.begin()
-        except ValueError as error:
-            self.feedback_message = self._wrong = str(error)
+    """Whether it failed by itself: its child did not, or was not ticked this time."""
 
     def gate(self) -> Status | None:
-        """What to do this time; called after `begin`."""
+        """What to do this time; called after `initialise`."""
         return None
 
     def update(self) -> Status:
@@ -59,19 +46,30 @@ class Gate(Decorator):
         return None if self.decorated.status is Status.RUNNING else 0.0
 
     def tick(self) -> Iterator[Behaviour]:
-        if self.status is not Status.RUNNING:
-            self.initialise()
         self.refused = False
-        decided, child_failed = Status.FAILURE if self._wrong else self.gate(), False
-        if decided is None:
+        status, child_failed = self._answer(self._ask), False
+        if status is None:
             yield from self.decorated.tick()
             child_failed = self.decorated.status is Status.FAILURE
-            decided = self.update()
-        self.refused = decided is Status.FAILURE and (self.refused or not child_failed)
-        if decided is not Status.RUNNING:
-            self.stop(decided)
-        self.status = decided
+            status = self._answer(self.update) or Status.INVALID
+        self.refused = status is Status.FAILURE and (self.refused or not child_failed)
+        if status is not Status.RUNNING:
+            self.stop(status)
+        self.status = status
         yield self
+
+    def _ask(self) -> Status | None:
+        if self.status is not Status.RUNNING:
+            self.feedback_message = ""
+            self.initialise()
+        return self.gate()
+
+    def _answer(self, question: Callable[[], Status | None]) -> Status | None:
+        try:
+            return question()
+        except ValueError as error:
+            self.feedback_message, self.refused = str(error), True
+            return Status.FAILURE
 
 
 class Deadline(Timed, Gate):
@@ -91,7 +89,7 @@ class Deadline(Timed, Gate):
         super().__init__(name, child)
         self._after = after
 
-    def begin(self) -> None:
+    def initialise(self) -> None:
         self._expired = False
         self.give(parse_duration(self._after()))
 
@@ -108,11 +106,9 @@ class Deadline(Timed, Gate):
                 f"{self._seconds:g} s are over; waiting for {stopping[0]} to end"
             )
             return Status.RUNNING
-        self.feedback_message = f"not done within {self._seconds:g} s"
-        unknown = [node.name for node in below if not node.drained]
-        if unknown:
-            self.feedback_message += f"; the end of {', '.join(unknown)} is not known"
-        return Status.FAILURE
+        unknown = ", ".join(node.name for node in below if not node.drained)
+        told = f"; the end of {unknown} is not known" if unknown else ""
+        raise ValueError(f"not done within {self._seconds:g} s{told}")
 
     def due_in(self) -> float | None:
         """Seconds until the deadline."""
@@ -125,7 +121,7 @@ class While(Gate):
     Args:
         name: as in py_trees.
         child: what to do meanwhile.
-        condition: asked before each tick; raising ExpressionError counts as no.
+        condition: asked before each tick; raising ValueError counts as no.
     """
 
     def __init__(self, name: str, child: Behaviour, condition: Callable[[], bool]) -> None:
@@ -133,12 +129,9 @@ class While(Gate):
         self._condition = condition
 
     def gate(self) -> Status | None:
-        try:
-            holds = self._condition()
-            self.feedback_message = "" if holds else "the condition does not hold"
-        except ExpressionError as error:
-            holds, self.feedback_message = False, error.message
-        return None if holds else Status.FAILURE
+        if not self._condition():
+            raise ValueError("the condition does not hold")
+        return None
 
 
 class Subtree(Gate):
@@ -160,7 +153,7 @@ class Subtree(Gate):
         self._begin = begin
         self._end = end
 
-    def begin(self) -> None:
+    def initialise(self) -> None:
         try:
             self._begin()
         except ValueError:
@@ -196,7 +189,7 @@ class Repeat(Timed, Gate):
         super().__init__(name, child)
         self._times = times
 
-    def begin(self) -> None:
+    def initialise(self) -> None:
         self._done = 0
         self.give(0.0)
         self._limit, self._of = _whole(self._times, self._counts, self._least)
@@ -278,8 +271,8 @@ class ForEach(Repeat):
         self._write = begin
         self._keep_going = keep_going
 
-    def begin(self) -> None:
-        super().begin()
+    def initialise(self) -> None:
+        super().initialise()
         self._failures = 0
         items = plain(self._get_items())
         if not isinstance(items, (list, tuple)):
@@ -302,11 +295,7 @@ class ForEach(Repeat):
             self.feedback_message += f", {self._failures} failed"
         if status is Status.SUCCESS:
             return Status.FAILURE if self._failures == self._limit else status
-        try:
-            self._hand_over()
-        except ValueError as error:
-            self.feedback_message, self.refused = str(error), True
-            return Status.FAILURE
+        self._hand_over()
         return status
 
     def _hand_over(self) -> None:
