@@ -44,28 +44,22 @@ def key(name: str) -> str:
 
 def read(name: str) -> Any:
     """Return the value of a variable, or of a field of it; raises MissingVariable."""
-    base = key(name)
     try:
-        value = Blackboard.storage[base]
+        value = Blackboard.storage[key(name)]
     except KeyError:
         raise MissingVariable(f"variable {name!r} has no value") from None
     for step in name.lstrip("/").split(".")[1:]:
-        value = _step(value, step, name)
+        if not step or step.startswith("_"):
+            raise MissingVariable(f"variable {name!r}: {step!r} is no field")
+        try:
+            if isinstance(value, Mapping):
+                value = value[step]
+            else:
+                value = value[int(step)] if step.isdigit() else getattr(value, step)
+        except (LookupError, TypeError, AttributeError):
+            kind = type(value).__name__
+            raise MissingVariable(f"variable {name!r}: {step!r} is no field of a {kind}") from None
     return value
-
-
-def _step(value: Any, step: str, name: str) -> Any:
-    if not step or step.startswith("_"):
-        raise MissingVariable(f"variable {name!r}: {step!r} is no field")
-    try:
-        if isinstance(value, Mapping):
-            return value[step]
-        if step.isdigit():
-            return value[int(step)]
-        return getattr(value, step)
-    except (LookupError, TypeError, AttributeError):
-        kind = type(value).__name__
-        raise MissingVariable(f"variable {name!r}: {step!r} is no field of a {kind}") from None
 
 
 def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:

@@ -55,9 +55,8 @@ def quaternion_of(value: object, angle: Callable[[str, object], float]) -> objec
     for name in value:
         if name not in ANGLES:
             raise ValueError(f"roll, pitch and yaw stand alone: {name!r} cannot be beside them")
-    roll, pitch, yaw = (angle(name, value[name]) / 2 if name in value else 0.0 for name in ANGLES)
-    sin_r, cos_r, sin_p, cos_p = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
-    sin_y, cos_y = math.sin(yaw), math.cos(yaw)
+    halves = (angle(name, value[name]) / 2 if name in value else 0.0 for name in ANGLES)
+    (sin_r, cos_r), (sin_p, cos_p), (sin_y, cos_y) = ((math.sin(h), math.cos(h)) for h in halves)
     return {
         "x": sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
         "y": cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,

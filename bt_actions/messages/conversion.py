@@ -108,12 +108,12 @@ def to_plain(message: object) -> Any:
     fields = getattr(type(message), "get_fields_and_field_types", None)
     if fields is not None:
         return {name: to_plain(getattr(message, name)) for name in fields()}
-    if isinstance(message, bytes):
-        return message[0] if len(message) == 1 else list(message)
+    if isinstance(message, bytes) and len(message) == 1:
+        return message[0]
     to_list = getattr(message, "tolist", None)  # array.array and numpy alike
     if to_list is not None:
         return to_list()
-    if isinstance(message, (list, tuple)):
+    if isinstance(message, (list, tuple, bytes)):
         if numbers_only(message):
             return list(message)
         return [to_plain(item) for item in message]
