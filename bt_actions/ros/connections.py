@@ -23,10 +23,11 @@ from rclpy.qos import (
 )
 
 from bt_actions.messages.interfaces import interface_name
-from bt_actions.ros.in_sight import without_service, without_topic
+from bt_actions.ros.in_sight import elsewhere, mismatch
 from bt_actions.ros.workarounds.closable import closable
 from bt_actions.traffic.backend import Call
 from bt_actions.traffic.handle import waker
+from bt_actions.utilities.suggest import listing
 
 DISCOVERS = 3.5
 """Seconds that a new participant takes, at most, to discover who was there before it.
@@ -75,8 +76,14 @@ class _Topic:
 
     def why_nobody(self) -> str:
         """What the graph shows that explains why nobody publishes, or listens; or ""."""
-        kind = interface_name(self._type)
-        return without_topic(self._node, self.name, kind, self._qos, publish=self.listens)
+        node, kind, listens = self._node, interface_name(self._type), self.listens
+        with contextlib.suppress(Exception):  # our node was destroyed
+            look = "publishers" if listens else "subscriptions"
+            others = getattr(node, f"get_{look}_info_by_topic")(self.name)
+            why = mismatch(kind, self._qos, others, publish=listens)
+            known = {} if others else dict(node.get_topic_names_and_types())
+            return (f": {why}" if why else "") + elsewhere(self.name, kind, known)
+        return ""
 
 
 class Subscription(_Topic):
@@ -169,7 +176,17 @@ class Service:
 
     def why_nobody(self) -> str:
         """What the graph shows in place of the service, behind a colon."""
-        return without_service(self._node, self.name, interface_name(self._type))
+        node, kind, known = self._node, interface_name(self._type), dict[str, list[str]]()
+        with contextlib.suppress(Exception):  # our node was destroyed
+            for name, kinds in node.get_service_names_and_types():
+                if node.count_services(name):  # and not only clients, as ours
+                    known[name] = kinds
+            if self.name not in known:
+                return f": nobody offers it{elsewhere(self.name, kind, known)}"
+            if others := sorted(set(known[self.name]) - {kind}):
+                return f": what is there is {listing(others)}, not {kind}"
+            return ": it is in sight, but was not ready"
+        return ""
 
     def call(self, request: Any) -> Call:
         """Begin a call, which wakes who has called when it is done."""

@@ -1,4 +1,4 @@
-"""Why a topic or a service finds nobody, as far as the ROS graph shows it. Only reads.
+"""Why a topic or a service finds nobody, in words, of what the ROS graph shows.
 
 What is there in vain is told first: another type, or a quality of service that does not match; then
 one of the same type in another namespace. The texts follow a name and go on as a sentence.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -60,33 +59,3 @@ def elsewhere(name: str, kind: str, known: Mapping[str, Collection[str]]) -> str
     if found:
         return f"; there is {listing(found, NAMED)} of that type"
     return did_you_mean(name, of_kind, cutoff=ALIKE)
-
-
-def without_topic(node: Node, topic: str, kind: str, qos: QoSProfile, *, publish: bool) -> str:
-    """Say, behind a colon, why nobody is heard on a topic (or, without `publish`, hears us)."""
-    look = node.get_publishers_info_by_topic if publish else node.get_subscriptions_info_by_topic
-    try:
-        others = look(topic)
-        why = mismatch(kind, qos, others, publish=publish)
-        known = {} if others else dict(node.get_topic_names_and_types())
-    except Exception:  # noqa: BLE001 - our node was destroyed
-        return ""
-    return (f": {why}" if why else "") + elsewhere(topic, kind, known)
-
-
-def without_service(node: Node, service: str, kind: str) -> str:
-    """Say, behind a colon, what is in sight where a service is not."""
-    try:
-        known: dict[str, list[str]] = {
-            name: kinds
-            for name, kinds in node.get_service_names_and_types()
-            if node.count_services(name)  # and not only clients, as ours
-        }
-    except Exception:  # noqa: BLE001 - our node was destroyed
-        return ""
-    others = sorted(set(known.get(service, ())) - {kind})
-    if others:
-        return f": what is there is {listing(others)}, not {kind}"
-    if service in known:
-        return ": it is in sight, but was not ready"
-    return f": nobody offers it{elsewhere(service, kind, known)}"

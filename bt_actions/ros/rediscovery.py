@@ -104,16 +104,14 @@ class Rediscovery:
         self._missing: dict[Seeker, str] = {}  # and the action's name
         self._participants: list[SecondParticipant] = []
         self._thread: threading.Thread | None = None
-        self._waiting: set[Seeker] = set()
+        self._wanted: set[tuple[Seeker, bool]] = set()  # and whether for a goal that waits
         self._pause = FIRST_AFTER
         self._look_at = math.inf
-        self._is_urgent = False
 
     def add(self, seeker: Seeker, action: str) -> None:
         """Look for what this one misses, too."""
         if seeker not in self._missing:
             self._missing[seeker] = action
-            self._is_urgent = True
             _bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             thread = threading.Thread(target=self._run, name="bt_actions-rediscovery", daemon=True)
@@ -148,19 +146,16 @@ class Rediscovery:
         """Wait for something to do; whether that is a look. Sooner when somebody begins to wait."""
         with host.lock:
             while not (_closing or self._unused()):
+                before, now = self._wanted, time.monotonic()
                 if not self._still_missing():
                     self._look_at = math.inf
-                    _bell.wait()
-                    continue
-                waiting = {seeker for seeker in self._missing if seeker.has_unsent}
-                now = time.monotonic()
-                if self._is_urgent or waiting - self._waiting:
-                    self._pause, self._is_urgent = FIRST_AFTER, False
+                self._wanted = {(seeker, seeker.has_unsent) for seeker in self._missing}
+                if self._wanted - before:
+                    self._pause = FIRST_AFTER
                     self._look_at = min(self._look_at, now + FIRST_AFTER)
-                self._waiting = waiting
                 if now >= self._look_at:
                     return True
-                _bell.wait(min(self._look_at - now, GOES_ON))
+                _bell.wait(min(self._look_at - now, GOES_ON) if self._missing else None)
         return False
 
     def _unused(self) -> list[SecondParticipant]:
