@@ -53,8 +53,6 @@ DEPTH = 100
 
 ASKED_KEPT = 10
 """Questions of one kind about one goal whose answers are waited for: the newest."""
-ANSWERS_KEPT = 10
-"""Answers to one question that are told: more servers of one name answer nothing new."""
 
 
 @dataclass(slots=True)
@@ -183,7 +181,7 @@ class RosTransport:
         """Put an answer into the inbox, with those before it; none that nobody waits for."""
         key = kind, number
         question = self._questions.get(key) or self._past.get(key)
-        if question is None or len(question.answers) >= ANSWERS_KEPT:
+        if question is None:
             return
         question.answers.append(answer)
         told = kind, question.goal_id, question.asked, tuple(question.answers)

@@ -24,14 +24,18 @@ def close_process() -> None:
 
     def hurry(again: bool, _ends_process: bool) -> None:
         nonlocal hurried
-        hurried = hurried or again
+        hurried |= again
 
     with contextlib.suppress(KeyboardInterrupt), ended_by_signals(hurry):
         with host.lock:
             host.closing = True
-            endpoints = [endpoint for domain in host.domains for endpoint in domain.open]
-            handles = [handle for endpoint in endpoints for handle in endpoint.handles]
-        left = [handle for handle in handles if not handle.goal.lost or handle.looked_out_for]
+            left = [
+                handle
+                for domain in host.domains
+                for endpoint in domain.open
+                for handle in endpoint.handles
+                if not handle.goal.lost or handle.looked_out_for
+            ]
         try:
             drain(host, left, lambda: hurried)
         finally:

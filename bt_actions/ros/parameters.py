@@ -7,7 +7,6 @@ rcl reads the words: whatever it takes, finds in a file for this node, or refuse
 from __future__ import annotations
 
 import ast
-import os
 import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -40,7 +39,7 @@ def parameters_in(words: Sequence[str], namespace: str = "", name: str = "") -> 
     """
     try:
         node = own_node(
-            name or f"bt_actions_{os.getpid()}_parameters",
+            name or "bt_actions_parameters",
             args=["--ros-args", *words],
             namespace=namespace,
             automatically_declare_parameters_from_overrides=True,

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import itertools
 import math
 import os
 import threading
@@ -46,7 +45,6 @@ GLANCE = 0.05
 AHEAD = 0.7
 """Seconds by which a new participant may be ahead of one that is not blind (0.1 measured)."""
 
-_number = itertools.count(1)
 _by_domain: dict[tuple[int, str], Rediscovery] = {}
 _bell = threading.Condition(host.lock)
 """Rings where something is missed, a participant is not used any more, or the process ends."""
@@ -59,7 +57,7 @@ class SecondParticipant:
     def __init__(self, domain: int, enclave: str) -> None:
         """Raises what rclpy raises where it cannot be made."""
         self.node = own_node(
-            f"bt_actions_rediscovery_{os.getpid()}_{next(_number)}",
+            f"bt_actions_rediscovery_{os.getpid()}",
             args=["--ros-args", "--enclave", enclave],
             domain=domain,
             use_global_arguments=False,
