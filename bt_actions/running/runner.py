@@ -132,7 +132,7 @@ class TreeRunner:
         does. Raises RuntimeError before the first `start`.
         """
         if self._started is None:
-            raise RuntimeError("there is no future: the tree has not been started")
+            raise RuntimeError("the tree has not been started, so there is nothing to wait for")
         return self._started.future
 
     def observe(self, callback: Observer) -> None:
@@ -174,12 +174,9 @@ class TreeRunner:
             raise _waits_for_itself(
                 "run()", "start() the tree, and take its status in a done callback of `future`"
             )
-        self._begin()
-        try:
-            with self._hear_signals(), self._spinner.replaced():
-                return self._run(timeout)
-        finally:
-            self._release()
+        with self._hear_signals(), self._spinner.replaced():
+            self._begin()
+            return self._run(timeout)
 
     def _begin(self) -> None:
         """Take the tree for a run; raises RuntimeError where it is in one."""
@@ -224,22 +221,13 @@ class TreeRunner:
         What it raises is logged, too.
         """
         self._begin()
-        before, self._started = self._started, StartedRun(self._run_and_release)
+        before, self._started = self._started, StartedRun(self._run, self._log.error)
         try:
             self._started.start()
         except RuntimeError:  # there can be no more threads
             self._started = before
             self._release()
             raise
-
-    def _run_and_release(self) -> Status:
-        try:
-            return self._run(None)
-        except BaseException as error:
-            self._log.error(f"the tree that was started raised {raised(error)}")
-            raise
-        finally:
-            self._release()
 
     def _release(self) -> None:
         self._runs_on = None
@@ -256,9 +244,7 @@ class TreeRunner:
         without a `timeout`, where `run` does because of the thread.
         """
         check_seconds(timeout)
-        if self._started is None:
-            raise RuntimeError("nothing to wait for: the tree has not been started")
-        future = self._started.future
+        future = self.future
         if self._runs_on == threading.get_ident():
             raise RuntimeError("wait() within the run would wait for itself")
         if timeout is None and not future.done() and self._spinner.is_here():
@@ -338,42 +324,42 @@ class TreeRunner:
                 if not _runs_change.wait_for(lambda: not self.running, patience):
                     return
             self._is_down = True
-            self._take_down()
+            if self._started not in (None, threading.current_thread()):  # as in a done callback
+                self._started.join()
+            guests = self._close_guests if self._on_close else None
+            with contextlib.ExitStack() as last:
+                last.callback(lambda: self._loop.close(time.monotonic()))
+                last.callback(self._spinner.stop, self._wake_up.set, guests)
+                self._loop.shutdown()
             self._log.flush()  # what was said is written, whatever becomes of the process
         finally:
             self._shutting_down.release()
 
-    def _take_down(self) -> None:
-        if self._started not in (None, threading.current_thread()):  # as in a done callback
-            self._started.join()
-        guests = self._close_guests if self._on_close else None
-        with contextlib.ExitStack() as last:
-            last.callback(lambda: self._loop.close(time.monotonic()))
-            last.callback(self._spinner.stop, self._wake_up.set, guests)
-            self._loop.shutdown()
-
     def __enter__(self) -> TreeRunner:
         return self
 
-    def __exit__(self, _kind: object, error: object, _traceback: object) -> None:
+    def __exit__(self, error: object, *_: object) -> None:
         if error is None or not self._spinner.would_wait_for_itself():
             self.shutdown()  # else what run() has said would be lost
 
     # A run
 
-    def _run(self, timeout: float | None) -> Status:
-        if self._closed:
-            raise RuntimeError("this runner has been shut down")
-        self._runs_on = threading.get_ident()
-        self._loop.begin(time.monotonic(), timeout)
-        while True:
-            try:
-                step = self._loop.step(time.monotonic())
-                if isinstance(step, Done):
-                    return step.result
-                self._wake_up.sleep(step.seconds)
-            except BaseException as error:  # noqa: BLE001 - raised again after the drain
-                self._loop.fail(error)
+    def _run(self, timeout: float | None = None) -> Status:
+        try:
+            if self._closed:
+                raise RuntimeError("this runner has been shut down")
+            self._runs_on = threading.get_ident()
+            self._loop.begin(time.monotonic(), timeout)
+            while True:
+                try:
+                    step = self._loop.step(time.monotonic())
+                    if isinstance(step, Done):
+                        return step.result
+                    self._wake_up.sleep(step.seconds)
+                except BaseException as error:  # noqa: BLE001 - raised again after the drain
+                    self._loop.fail(error)
+        finally:
+            self._release()
 
     def _spin(self) -> None:
         self._spinner.start(lambda: self._loop.is_to_end(time.monotonic()))

@@ -10,14 +10,19 @@ from concurrent import futures
 
 from py_trees.common import Status
 
+from bt_actions.utilities.plain_text import raised
+
 
 class StartedRun(threading.Thread):
     """A run on a thread of its own."""
 
-    def __init__(self, work: Callable[[], Status]) -> None:
-        """`work` is called on that thread; `future` tells what came of it."""
+    def __init__(self, work: Callable[[], Status], tell: Callable[[str], None]) -> None:
+        """`work` is called on that thread; `future` has what came of it, and `tell` what it raised.
+
+        So that this is known where nobody asks the future.
+        """
         super().__init__(name="bt_actions-tree", daemon=True)
-        self._work = work
+        self._work, self._tell = work, tell
         self.future = futures.Future[Status]()
         self.future.set_running_or_notify_cancel()
 
@@ -26,6 +31,7 @@ class StartedRun(threading.Thread):
         try:
             status = self._work()
         except BaseException as error:  # noqa: BLE001 - raised again by who waits for it
+            self._tell(f"the tree that was started raised {raised(error)}")
             self.future.set_exception(error)
         else:
             self.future.set_result(status)
