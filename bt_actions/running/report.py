@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from uuid import UUID
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -81,8 +80,8 @@ class Row:
     @property
     def waited_for(self) -> int:
         """How many goals of this leaf a run that is over waits for."""
-        in_doubt = [each for each in self._goals.values() if each.end is End.NEVER_STARTED]
-        return len(self.live) + len(in_doubt)
+        in_doubt = (each.end is End.NEVER_STARTED for each in self._goals.values())
+        return len(self.live) + sum(in_doubt)
 
     def observe(self, event: GoalChanged) -> None:
         """Take in one event of a goal of this leaf."""
@@ -151,9 +150,9 @@ class Report:
     """The time of the latest event."""
     unaccounted: list[str] = field(default_factory=list)
     """One line for each goal whose end is not known, now that the run is over."""
-    _rows: dict[UUID, Row] = field(default_factory=dict)
-    _changes: dict[UUID, NodeChanged] = field(default_factory=dict)  # of each node the latest
-    _warnings: dict[UUID, Culprit] = field(default_factory=dict)
+    _rows: dict[Behaviour, Row] = field(default_factory=dict)
+    _changes: dict[Behaviour, NodeChanged] = field(default_factory=dict)  # of each node the latest
+    _warnings: dict[Behaviour, Culprit] = field(default_factory=dict)
 
     def observe(self, event: Event) -> None:
         """Take in one event, in the order of their coming."""
@@ -162,13 +161,13 @@ class Report:
         if isinstance(event, TreeStarted):
             self.started = event.time
         elif isinstance(event, NodeChanged):
-            self._changes[event.node.id] = event
-            warning = str(getattr(event.node, "warning", ""))
-            if warning and event.status is Status.SUCCESS:
-                self._warnings[event.node.id] = self._culprit(event.node, warning)
-            row = self._rows.get(event.node.id)
-            if row is not None and event.status in (Status.SUCCESS, Status.FAILURE):
-                row.settle()
+            node, status = event.node, event.status
+            self._changes[node] = event
+            warning = str(getattr(node, "warning", ""))
+            if warning and status is Status.SUCCESS:
+                self._warnings[node] = self._culprit(node, warning)
+            if node in self._rows and status in (Status.SUCCESS, Status.FAILURE):
+                self._rows[node].settle()
         elif isinstance(event, GoalChanged):
             self.row(event.behaviour).observe(event)
         elif isinstance(event, TreeFinished):
@@ -177,12 +176,11 @@ class Report:
 
     def row(self, behaviour: Behaviour) -> Row:
         """Return the row of an action leaf, a new one at its first event."""
-        row = self._rows.get(behaviour.id)
-        if row is None:
+        if behaviour not in self._rows:
             server = str(getattr(behaviour, "server", ""))
             row = Row(behaviour, path_of(behaviour), place_of(behaviour), server)
-            self._rows[behaviour.id] = row
-        return row
+            self._rows[behaviour] = row
+        return self._rows[behaviour]
 
     def elapsed(self) -> float:
         """Return the seconds since the tree started, between events too."""
@@ -210,12 +208,12 @@ class Report:
 
     def status_of(self, node: Behaviour) -> Status:
         """Return the status that `node` was last seen with."""
-        change = self._changes.get(node.id)
+        change = self._changes.get(node)
         return change.status if change else Status.INVALID
 
     def message_of(self, node: Behaviour) -> str:
         """Return the feedback message that `node` last changed with."""
-        change = self._changes.get(node.id)
+        change = self._changes.get(node)
         return change.message if change else ""
 
     @property
@@ -235,7 +233,7 @@ class Report:
         ]
 
     def _culprit(self, node: Behaviour, message: str) -> Culprit:
-        return Culprit(node, path_of(node), message, place_of(node), self._rows.get(node.id))
+        return Culprit(node, path_of(node), message, place_of(node), self._rows.get(node))
 
     def _as_it_ended(self, node: Behaviour) -> bool:
         """Whether it was not stopped since it ended."""
@@ -266,5 +264,4 @@ class Report:
 
 def place_of(node: Behaviour) -> str:
     """Return file:line:column where a tree file says `node`, or "" for a node made in Python."""
-    place = document.place_of(node)
-    return "" if place is None else f"{place.file}:{place.line}:{place.column}"
+    return str(document.place_of(node) or "")
