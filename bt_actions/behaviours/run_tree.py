@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from bt_actions.behaviours.action import ActionBehaviour
@@ -108,22 +108,21 @@ def inputs_text(values: object) -> str:
     if not isinstance(values, Mapping):
         raise ValueError(f"inputs are a mapping of names to values, not {values!r:.40}")
     plain = to_plain(values)
-    for path, value in _scalars(plain, "inputs"):
-        if isinstance(value, float) and not math.isfinite(value):
-            raise ValueError(f"{path} is {value}, which cannot be sent")
-        if isinstance(value, int) and not -(2**63) <= value < 2**64:
-            raise ValueError(f"{path} does not fit 64 bits")
-        if not isinstance(value, str | int | float | None):
-            raise ValueError(f"{path} is a {type(value).__name__}, which cannot be sent")
+    _refuse(plain, "inputs")
     return json.dumps(plain, ensure_ascii=False)
 
 
-def _scalars(value: object, path: str) -> Iterator[tuple[str, object]]:
+def _refuse(value: object, path: str) -> None:
+    """Raise ValueError for what cannot be sent."""
     if isinstance(value, dict):
         for key, inner in value.items():
-            yield from _scalars(inner, f"{path}.{key}")
+            _refuse(inner, f"{path}.{key}")
     elif isinstance(value, list):
         for index, inner in enumerate(value):
-            yield from _scalars(inner, f"{path}[{index}]")
-    else:
-        yield path, value
+            _refuse(inner, f"{path}[{index}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{path} is {value}, which cannot be sent")
+    elif isinstance(value, int) and not -(2**63) <= value < 2**64:
+        raise ValueError(f"{path} does not fit 64 bits")
+    elif not isinstance(value, str | int | float | None):
+        raise ValueError(f"{path} is a {type(value).__name__}, which cannot be sent")

@@ -124,18 +124,15 @@ class CallService(Connected[Service], Leaf):
     def _again(self) -> bool:
         """Whether what has failed is tried again; the pause before that begins."""
         self._tries += 1
-        if self._tries >= self.retry.attempts or not self._worth_it():
+        if self._tries >= self.retry.attempts:
+            return False
+        when = self.retry.when
+        try:
+            if callable(when) and self._response is not None and not when(self._response):
+                return False
+        except ExpressionError as error:  # counts as no, as in goals/attempts.py
+            self.feedback_message += f"; retry.when: {error.message}"
             return False
         self._pausing = True
         self.give(self.retry.pause(self._tries, self._there()[0].randomness))
         return True
-
-    def _worth_it(self) -> bool:
-        when = self.retry.when
-        if not callable(when) or self._response is None:
-            return True
-        try:
-            return bool(when(self._response))
-        except ExpressionError as error:  # counts as no, as in goals/attempts.py
-            self.feedback_message += f"; retry.when: {error.message}"
-            return False
