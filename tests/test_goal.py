@@ -20,7 +20,7 @@ from bt_actions.goals.asking import (
     UNHEARD,
 )
 from bt_actions.goals.facts import PATIENCE, drop
-from bt_actions.goals.goal import Goal, turned_up_again
+from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import (
@@ -233,7 +233,8 @@ def test_what_two_servers_may_have_taken_is_no_late_success(why: Event) -> None:
 def test_what_turns_up_again_is_canceled_and_holds_nothing() -> None:
     """A goal that has ended, and that a second server runs."""
     life = Life()
-    life.goal = turned_up_again(b"1", "/move", LIMITS, frozenset({"/move"}), Busy.WAIT, life.now)
+    life.goal = Goal(b"1", "/move", LIMITS, life.now)
+    life.goal.turns_up_again()
     assert life.goal.outcome is Outcome.SERVER_AMBIGUOUS
     assert not life.goal.claims_resources
     assert life.on(Event.SERVER_RETURNED) == [CANCEL, ASK]

@@ -63,7 +63,6 @@ def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
     assert said.answered("cancel", watch, 0.0, 0.0, [DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
     assert said.answered("result", watch, 0.0, 0.0, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
     assert said.answered("result", watch, 0.0, 0.0, [UNKNOWN]) == (Event.RESULT_UNKNOWN, None)
-    assert said.answered("result", watch, 0.0, 0.0, [(2, None)]) == (Event.STATUS, 2)
 
 
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(

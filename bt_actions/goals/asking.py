@@ -6,6 +6,7 @@ They count and remember. What is asked, and what follows from an answer, is deci
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_UNKNOWN_GOAL
@@ -42,7 +43,7 @@ class Asking:
     asked_at: float | None = None
     answer: int | None = None
     """What was answered, a code of action_msgs/srv/CancelGoal."""
-    denied_since: float | None = None
+    denied_since: float = math.inf
     """Every answer since then was: unknown goal."""
     in_vain: bool = False
     """The end of its tree waited for it in vain; none does again, until its server is back."""
@@ -63,28 +64,22 @@ class Asking:
         if self.answer != CANCEL_ACCEPTED:  # after that, rcl calls it TERMINATED
             self.answer = code
         if code != CANCEL_UNKNOWN_GOAL:
-            self.denied_since = None
+            self.denied_since = math.inf
             return
-        self._denied_at = now
-        if self.denied_since is None:
-            self.denied_since = now
+        self._denied_at, self.denied_since = now, min(now, self.denied_since)
 
     def denied_lately(self, now: float) -> bool:
         """Whether the last answer was a denial, and is not old."""
-        return self.denied_since is not None and now - self._denied_at <= 2 * ASK_AGAIN
+        return self.denied_since < math.inf and now - self._denied_at <= 2 * ASK_AGAIN
 
     def left_to_deny(self, now: float) -> float:
         """Return the seconds for which it must still be denied until that is believed for good."""
-        return (
-            DENIED_FOR_GOOD
-            if self.denied_since is None
-            else self.denied_since + DENIED_FOR_GOOD - now
-        )
+        return min(now, self.denied_since) + DENIED_FOR_GOOD - now
 
     def begin_anew(self, now: float) -> None:
         """Whoever had it is to be asked again; of what was said, a late denial still counts."""
         if not self.denied_lately(now):
-            self.denied_since = None
+            self.denied_since = math.inf
         self.unheard, self.answer = 0, None
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import RETRYABLE, End, Outcome, Retry
-from bt_actions.goals.terms import Now
+from bt_actions.goals.terms import NEVER, Now
 from bt_actions.utilities.plain_text import in_words
 
 
@@ -64,7 +64,7 @@ class Attempts:
         self.retry = retry
         self.history: list[AttemptRecord] = []
         self._when = when
-        self._resume_at: float | None = None
+        self._resume_at = NEVER
         self._ros_seen = 0.0
 
     @property
@@ -89,8 +89,6 @@ class Attempts:
 
         With `look_only` nothing is noted, so that any thread may ask.
         """
-        if self._resume_at is None:
-            return 0.0
         resume_at = self._resume_at - max(0.0, self._ros_seen - now.ros)
         if not look_only:
             self._resume_at, self._ros_seen = resume_at, now.ros

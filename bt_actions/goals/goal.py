@@ -16,12 +16,13 @@ may have a resource in resources.py.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.facts import PATIENCE, Facts
-from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
+from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.steps.canceling import NEVER_DONE
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import (
@@ -47,6 +48,16 @@ class Goal(Facts):
         return f"<Goal {self.server} {self.id.hex()} {self.state.name}{told}>"
 
     # What the caller may tell
+
+    def turns_up_again(self) -> None:
+        """Be one that has ended, and that a second server runs; made for that.
+
+        It counts as lost, and is canceled at SERVER_RETURNED.
+        """
+        self.deadlines.clear()
+        self.claims_resources, self.end = False, End.SERVER_GONE
+        self.state, self.last_live = State.LOST, State.CANCELING
+        self.settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
 
     def on(self, event: Event, now: Now, detail: Any = None) -> tuple[Command, ...]:
         """Take what happened and return what to do, in order.
@@ -116,7 +127,7 @@ class Goal(Facts):
     def in_flight(self) -> bool:
         """Whether its request may lie in its server's queue."""
         may_come = self.state is State.SENDING or self.may_still_be_accepted
-        return may_come and self.asking.denied_since is None
+        return may_come and self.asking.denied_since == math.inf
 
     @property
     def outstanding(self) -> bool:
@@ -136,23 +147,3 @@ class Goal(Facts):
         if self.accepted:
             return cancel
         return max(cancel + (self.timeouts.accept or 0.0), 2 * self.patience)
-
-
-def turned_up_again(
-    goal_id: bytes,
-    server: str,
-    timeouts: Timeouts,
-    resources: frozenset[str],
-    busy: Busy,
-    now: Now,
-) -> Goal:
-    """Return what stands for a goal of this id that has ended, and that a second server runs.
-
-    It counts as lost, and is canceled at SERVER_RETURNED.
-    """
-    goal = Goal(goal_id, server, timeouts, now, resources=resources, busy=busy)
-    goal.deadlines.clear()
-    goal.claims_resources, goal.end = False, End.SERVER_GONE
-    goal.state, goal.last_live = State.LOST, State.CANCELING
-    goal.settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
-    return goal

@@ -12,6 +12,7 @@ dead server and its successor.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -61,9 +62,9 @@ class ServerWatch:
         """Since when a server has been shown without a break that was seen."""
         self.alone = False
         """More GIDs than one are shown, but only one server answers."""
-        self._ready = False
-        self._unready_since: float | None = None
-        self._crowded_since: float | None = None
+        self._unready_since = math.inf
+        self.crowded_since = math.inf
+        """Since when all that are shown now have been, if they are several."""
         self._not_alone_before = NEVER
         self._probed_at = NEVER
         self._probes: dict[bytes, _Probe] = {}  # by the ids that they ask for
@@ -81,20 +82,17 @@ class ServerWatch:
         if self.state(now) is Server.ABSENT:
             self.in_sight_since = now
         if ready:
-            self._unready_since = None
-        elif self._unready_since is None:
+            self._unready_since = math.inf
+        elif self._unready_since == math.inf:
             self._unready_since = now
-        self._ready = ready
         if gids != self.gids:
             self.alone, self._most_answers = False, 0
             self._probes.clear()
-            self._crowded_since = now if len(gids) > 1 else None
+            self.crowded_since = now if len(gids) > 1 else math.inf
             self.gids = gids
-        since = self._crowded_since
-        if not concludes or since is None or self.both_live or now < self._not_alone_before:
-            return
-        if now - since >= SLOWEST_START:
-            self.alone = self._answered_once(now, since)
+        is_open = concludes and not self.both_live and now >= self._not_alone_before
+        if is_open and now - self.crowded_since >= SLOWEST_START:
+            self.alone = self._answered_once(now, self.crowded_since)
 
     def stood_still(self, now: float) -> None:
         """Take note that nobody listened for a while: answers of that time are yet to come in."""
@@ -103,11 +101,7 @@ class ServerWatch:
     @property
     def is_crowded(self) -> bool:
         """Whether more than one server is shown."""
-        return self._crowded_since is not None
-
-    def crowded_for(self, now: float) -> float:
-        """Return for how many seconds all of those that are shown now have been, if several."""
-        return 0.0 if self._crowded_since is None else now - self._crowded_since
+        return len(self.gids) > 1
 
     def _answered_once(self, now: float, sent_since: float) -> bool:
         return any(
@@ -142,7 +136,7 @@ class ServerWatch:
 
     def two_answered(self, answers: int = 2) -> None:
         """Take note that two, or more, have answered one question, a probe or another."""
-        if self._crowded_since is not None:
+        if self.is_crowded:
             self._most_answers = max(self._most_answers, answers)
             self.alone = False
 
@@ -156,17 +150,16 @@ class ServerWatch:
 
         Or two did, and a dead one would not be shown any more.
         """
-        if not self.both_live or self._crowded_since is None:
-            return False
-        return self._most_answers >= len(self.gids) or now - self._crowded_since > LEASE
+        none_dead = self._most_answers >= len(self.gids) or now - self.crowded_since > LEASE
+        return self.both_live and none_dead
 
     def state(self, now: float) -> Server:
         """Return what answers under the name, as far as is known at `now`."""
-        if not self._ready or not self.gids:
+        if self._unready_since < math.inf or not self.gids:
             return Server.ABSENT
-        if self._crowded_since is None:
+        if not self.is_crowded:
             return Server.READY
-        none_dead = now - self._crowded_since > LEASE and now >= self._not_alone_before
+        none_dead = now - self.crowded_since > LEASE and now >= self._not_alone_before
         if self.both_live or none_dead:
             return Server.AMBIGUOUS
         return Server.READY if self.alone else Server.UNCLEAR
@@ -176,8 +169,8 @@ class ServerWatch:
 
         `runs`: goals may run here, so that it matters whether one that is not ready is gone.
         """
-        is_open = self._crowded_since is not None and not self.both_live
-        is_open |= runs and self._unready_since is not None and bool(self.gids)
+        is_open = self.is_crowded and not self.both_live
+        is_open |= runs and self._unready_since < math.inf and bool(self.gids)
         if not is_open or now - self._probed_at < PROBE_EVERY:
             return False
         self._probed_at = now
@@ -191,9 +184,8 @@ class ServerWatch:
         """
         if not sent_to & self.gids:
             return True
-        if self._unready_since is None or len(self.gids) > 1:
-            return False
-        return now - max(self._unready_since, self.heard_at) >= NOT_READY_FOR
+        silent_since = max(self._unready_since, self.heard_at)
+        return not self.is_crowded and now - silent_since >= NOT_READY_FOR
 
     def changed(self, sent_to: frozenset[GID]) -> bool:
         """Whether a server is shown that was not there when the goal was sent."""

@@ -10,6 +10,8 @@ thread, no clock of its own.
 
 from __future__ import annotations
 
+import math
+
 from bt_actions.goals.terms import NEVER
 
 AT_ONCE, TWICE = (0.0,), (0.0, 3.0)
@@ -33,7 +35,7 @@ class Reachability:
     def __init__(self) -> None:
         self.heard = False
         """Whether any question was ever answered."""
-        self._unanswered_since: float | None = None
+        self._unanswered_since = math.inf
         self._ask_at: list[float] = []
         """When to ask just in order to be answered."""
         self._in_doubt_until = NEVER
@@ -41,14 +43,13 @@ class Reachability:
 
     def asked(self, now: float) -> None:
         """Take note of a question."""
-        if self._unanswered_since is None:
-            self._unanswered_since = now
+        self._unanswered_since = min(now, self._unanswered_since)
 
     def answered(self, asked: float) -> None:
         """Take note of an answer to a question that was asked at this moment."""
         self.heard = True
-        if self._unanswered_since is not None and asked >= self._unanswered_since:
-            self._unanswered_since, self._ask_at, self._tries = None, [], 0
+        if asked >= self._unanswered_since:
+            self._unanswered_since, self._ask_at, self._tries = math.inf, [], 0
             self._in_doubt_until = NEVER
         elif self._in_doubt_until > NEVER and not self._ask_at:
             self._ask_at = [asked]  # who answers what was asked before is not busy
@@ -84,7 +85,6 @@ class Reachability:
 
         Also while that is done.
         """
-        since = self._unanswered_since
-        if since is None or now - since < UNRESPONSIVE_AFTER:
+        if now - self._unanswered_since < UNRESPONSIVE_AFTER:
             return False
         return self._tries < TRIES or not TRY_LASTS <= now - self._tried_at < TRY_AGAIN

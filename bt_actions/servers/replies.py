@@ -13,6 +13,7 @@ thread, no clock of its own; it sends nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,7 +54,7 @@ class Replies:
         """When last looked at, none of these was there."""
         self._refused = False
         self._ended: tuple[int, Any] | None = None
-        self._denied_at: float | None = None  # by one that it was not sent to, maybe
+        self._denied_at = math.inf  # by one that it was not sent to, maybe
         self._beside: frozenset[GID] = frozenset()  # was in sight already when it last spoke
         self._asked_at = NEVER
         self._in_sight: frozenset[GID] = frozenset()  # just now
@@ -143,10 +144,6 @@ class Replies:
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
-        runs = [answer for answer in answers if answer[0] not in (0, *ENDS)]
-        if runs:  # answered too soon, by a server that is none of rclpy's or rclcpp's
-            self._ended = None
-            return Event.STATUS, runs[-1][0]
         ended = [answer for answer in answers if answer[0] in ENDS]
         if ended:
             done = ended[-1]
@@ -213,10 +210,10 @@ class Replies:
         if self._refused:
             return Event.REJECTED, None
         if not watch.changed(self.sent_to | self._beside):
-            self._denied_at = None
+            self._denied_at = math.inf
         elif watch.state(now) is Server.AMBIGUOUS:
             pass
-        elif self._denied_at is not None and watch.alone_since(now, self._denied_at):
+        elif watch.alone_since(now, self._denied_at):
             return Event.SERVER_LOST, f"{name} was restarted under the goal"
         elif goal.accepted and now - self._asked_at > ASK_EVERY:
             self._asked_at = now
@@ -236,21 +233,19 @@ class Replies:
 
         So none of these has taken its place, unless the word is older than they are.
         """
-        if watch.crowded_for(now) >= OVERTAKEN:
+        if now - watch.crowded_since >= OVERTAKEN:
             self._beside = watch.gids - self.sent_to
         if len(self.sent_to) == 1:
-            self._denied_at = None
+            self._denied_at = math.inf
 
     def _denied(self, now: float) -> Told:
         """Take note of a denial by one of several; `looked` finds out what that means."""
-        if self._denied_at is None:
-            self._denied_at = now
+        self._denied_at = min(now, self._denied_at)
         return None
 
     def _forget(self, now: float) -> None:
         self._fresh_since = now
-        self._ended = self._denied_at = None
-        self._refused = False
+        self._ended, self._refused, self._denied_at = None, False, math.inf
 
     def _may_be_at_two(self, watch: ServerWatch) -> bool:
         """Whether two of the servers that it was sent to are there, as far as is known."""

@@ -10,10 +10,11 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
-from bt_actions.goals.goal import turned_up_again
+from bt_actions.goals.goal import Goal
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, NEVER, Event
 from bt_actions.servers.presence import GID
 from bt_actions.traffic.handle import Endpoint, GoalHandle
@@ -44,13 +45,16 @@ class EndedGoals:
     def keep(self, handle: GoalHandle) -> None:
         """Remember a goal that is DONE."""
         goal, endpoint = handle.goal, self._endpoint
-        what = goal.id, goal.server, goal.timeouts, goal.resources, goal.busy
+        goal_anew = partial(
+            Goal, goal.id, goal.server, goal.timeouts, resources=goal.resources, busy=goal.busy
+        )
         owner = (lambda: None) if handle.owner is None else weakref.ref(handle.owner)
         whose = handle.name, handle.begun_in, handle.attempt
 
         def again() -> GoalHandle:
-            new = turned_up_again(*what, endpoint.participant.now())
-            return GoalHandle(new, endpoint, owner(), *whose)
+            again = goal_anew(now=endpoint.participant.now())
+            again.turns_up_again()
+            return GoalHandle(again, endpoint, owner(), *whose)
 
         self._ended[goal.id] = Ended(
             again, goal.accepted, handle.replies.sent_to, self._host.steady()

@@ -9,6 +9,8 @@ and the goal is kept: where its server is seen again, it is canceled first of al
 
 from __future__ import annotations
 
+import math
+
 from bt_actions.goals.asking import ASK_AGAIN, LOOKED_OUT_FOR
 from bt_actions.goals.facts import Facts, Step, leads_to
 from bt_actions.goals.policy import End, Outcome
@@ -128,7 +130,7 @@ def drain_gave_up(goal: Facts) -> State:
 def server_lost(goal: Facts) -> State:
     """Free the leaf: SERVER_LOST; keep the goal, in case the server is not dead."""
     goal.settle_as_planned(Outcome.SERVER_LOST, str(goal.detail))
-    goal.asking.denied_since = None
+    goal.asking.denied_since = math.inf
     if goal.phase is not State.NOT_RECEIVED:  # what was denied for less may have come since
         goal.end = End.SERVER_GONE
     state = _keep(goal)

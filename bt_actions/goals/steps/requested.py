@@ -7,6 +7,8 @@ tree need not wait; whenever it turns up, it is canceled.
 
 from __future__ import annotations
 
+import math
+
 from bt_actions.goals.asking import ASK_IN_ANY_CASE
 from bt_actions.goals.facts import Facts, Step, leads_to
 from bt_actions.goals.policy import End, Outcome
@@ -138,7 +140,7 @@ def denied_again(goal: Facts) -> State:
 def turned_up(goal: Facts) -> State:
     """It was accepted after nobody wanted it any more: canceled at once, however late."""
     goal.end = End.UNKNOWN
-    goal.asking.denied_since = None
+    goal.asking.denied_since = math.inf
     goal.deadlines.disarm(Event.ACCEPT_DUE)
     if goal.outcome is None:
         goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel)
