@@ -346,13 +346,10 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         tries = f" (attempt {number} of {of})" if number > 1 else ""
         told = f": {record.reason}" if record.reason else ""
         self.feedback_message = f"{record.outcome}{tries}{told}"
-        if record.outcome is not Outcome.SUCCEEDED:
-            return Status.FAILURE
-        self._reading.write()
-        return Status.SUCCESS
+        return Status.SUCCESS if record.outcome is Outcome.SUCCEEDED else Status.FAILURE
 
     def _read_result(self, result: Any) -> str:
-        """Read the result; return what is wrong with it."""
+        """Read the result, and save what is kept of it; or return what is wrong with it."""
         return self._reading.read(result)
 
     def _in_words(self, handle: GoalHandle) -> str:

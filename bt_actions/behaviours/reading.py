@@ -23,9 +23,9 @@ Given = Callable[[Any], Any] | str
 
 
 class Reading:
-    """The `expect`, `save` and `retry.when` of an action; a result is read first, saved later."""
+    """The `expect`, `save` and `retry.when` of an action."""
 
-    __slots__ = ("_expect", "_names", "_save", "_to_save", "_wanted", "_written", "when")
+    __slots__ = ("_expect", "_names", "_save", "_wanted", "_written", "when")
 
     def __init__(
         self,
@@ -41,7 +41,6 @@ class Reading:
         self._expect = None if expect is None else self._function(expect, "expect")
         self.when = None if when is None else self._function(when, "retry.when")
         self._save = {key(name): self._function(place, "save") for name, place in save.items()}
-        self._to_save: list[tuple[str, Any]] = []  # of the last result, by blackboard key
 
     def _function(self, given: Given, what: str) -> Callable[[Any], Any]:
         """Return what was given as a function of the result.
@@ -73,7 +72,7 @@ class Reading:
         return ""
 
     def read(self, result: Any) -> str:
-        """Check the result and read from it what is to be saved; return what is wrong with it."""
+        """Check the result, and save what is to be kept of it; or return what is wrong with it."""
         try:
             if self._expect is not None and not self._expect(result):
                 wanted = self._wanted or "something else"
@@ -81,12 +80,9 @@ class Reading:
         except ExpressionError as error:
             return str(error)
         try:
-            self._to_save = [(name, value(result)) for name, value in self._save.items()]
+            saved = [(name, value(result)) for name, value in self._save.items()]
         except ValueError as error:  # ExpressionError, or what is saved does not fit
             return str(error)
-        return ""
-
-    def write(self) -> None:
-        """Save it."""
-        for name, value in self._to_save:
+        for name, value in saved:
             Blackboard.set(name, value)
+        return ""

@@ -16,8 +16,6 @@ ASK_AGAIN = 1.0
 """Seconds between two questions;"""
 LATE = 1.5
 """so many, and the server may have been stopped in between."""
-QUESTIONS = 10
-"""How many questions may be under way: over a bad link an answer takes seconds."""
 SETTLE = 4.0
 """Seconds of answers within which a server's status must have been received; where a client was
 just killed, that took 2.2 s each time, else 0.02 s (Fast DDS offers again every 3 s)."""
@@ -40,15 +38,13 @@ class Answers:
         """Begin anew, in a new participant, say, whose numbers begin anew, too."""
         self._asked: dict[int, tuple[float, frozenset[bytes]]] = {}
         self._count = Counter[int]()
-        self._last: tuple[float, frozenset[bytes]] | None = None  # question that all have answered
+        self._last = float("-inf"), frozenset[bytes]()  # question that all have answered
         self.lasted = 0.0
         """Seconds for which all have answered it, the last time too."""
 
     def asked(self, number: int, of: frozenset[bytes], now: float) -> None:
         """The question of this number was asked, `of` these servers."""
         self._asked[number] = now, of
-        for oldest in list(self._asked)[:-QUESTIONS]:
-            del self._asked[oldest], self._count[oldest]
 
     def answered(self, number: int) -> bool:
         """One server has answered the question of this number; return whether it was the last."""
@@ -56,12 +52,11 @@ class Answers:
             return False
         self._count[number] += 1
         at, of = self._asked[number]
-        if self._count[number] != len(of) or (self._last and at <= self._last[0]):
+        since, all_then = self._last
+        if self._count[number] != len(of) or at <= since:
             return False
-        if self._last is None or self._last[1] != of:
-            self.lasted = 0.0
-        else:  # for the rest of a longer time it may have been stopped
-            self.lasted += min(at - self._last[0], LATE)
+        # For the rest of a longer time it may have been stopped
+        self.lasted = self.lasted + min(at - since, LATE) if of == all_then else 0.0
         self._last = at, of
         return True
 

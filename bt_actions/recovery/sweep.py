@@ -81,8 +81,6 @@ class Cleanup:
     Where a server in sight does not answer, or this process stands still for long meanwhile, it may
     be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
     with a new one, twice at most.
-
-    Raises ValueError for seconds that are negative or no number.
     """
 
     look: float = 5.0
@@ -95,11 +93,7 @@ class Cleanup:
     stopped: Callable[[], bool] = lambda: False
 
     def __post_init__(self) -> None:
-        look, patience, accept = self.look, self.patience, self.accept
-        if not (look >= 0.0 and patience >= 0.0 and accept >= 0.0):
-            given = f"look {look}, patience {patience}, accept {accept}"
-            raise ValueError(f"{given}: seconds are 0 or more")
-        self._deadline = time.monotonic() + max(look, LOOK_LONGEST)
+        self._deadline = time.monotonic() + max(self.look, LOOK_LONGEST)
         self._has_waited = False
         self._calls: dict[str, RollCall] = {}  # by action, as long as this goes on
         self._elsewhere: dict[bytes, str] = {}
