@@ -81,6 +81,8 @@ class Cleanup:
     Where a server in sight does not answer, or this process stands still for long meanwhile, it may
     be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
     with a new one, twice at most.
+
+    Raises ValueError for seconds that are negative or no number.
     """
 
     look: float = 5.0
@@ -93,6 +95,9 @@ class Cleanup:
     stopped: Callable[[], bool] = lambda: False
 
     def __post_init__(self) -> None:
+        seconds = self.look, self.patience, self.accept
+        if not all(each >= 0.0 for each in seconds):
+            raise ValueError(f"look, patience, accept: seconds are 0 or more, not {seconds}")
         self._deadline = time.monotonic() + max(self.look, LOOK_LONGEST)
         self._has_waited = False
         self._calls: dict[str, RollCall] = {}  # by action, as long as this goes on

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 from collections.abc import Callable, Collection
 from typing import Any
@@ -46,6 +47,12 @@ def left(start_program: Callable[..., Process], serve: Callable[..., Journal], n
 def sweep(wanted: Collection[str], **more: Any) -> Swept:
     """Clean up; return what came of it."""
     return Cleanup(**{"look": 1.0, "patience": 1.0, "wanted": wanted, **more}).run()
+
+
+@pytest.mark.parametrize("wrong", [{"look": -1.0}, {"patience": math.nan}, {"accept": -1.0}])
+def test_seconds_are_none_or_more(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="seconds are 0 or more"):
+        sweep([], **wrong)
 
 
 def when_sighted(
