@@ -11,11 +11,11 @@ follow that this project cannot live with, and each has its cure here:
 And one that matters where two servers have one name: the first answer is all that rclpy hears. Here
 every answer to a question is told, with those before it.
 
-What is taken waits in one inbox and is delivered in its order by whoever comes first: the executor,
-or a call of `deliver_arrived`, after which nothing that had arrived before is still under way.
+What is taken waits in one inbox and is delivered in its order by whoever comes first: the thread
+of receiving.py, or a call of `deliver_arrived`, after which nothing that had arrived before is
+still under way.
 
-It carries messages and decides nothing. It uses the low-level handle of rclpy's ActionClient; an
-executor waits for it through workarounds/one_waitable.
+It carries messages and decides nothing. It uses the low-level handle of rclpy's ActionClient.
 """
 
 from __future__ import annotations
@@ -199,7 +199,7 @@ class RosTransport:
                     continue
                 try:
                     tell(*what)
-                except Exception as error:  # noqa: BLE001 - it would kill the executor's spin
+                except Exception as error:  # noqa: BLE001 - the others still want to hear
                     log.error(f"{self._name}: what came was not taken in: {raised(error)}")
             if any_came:
                 with contextlib.suppress(Exception):  # nothing was lost by that
@@ -233,8 +233,8 @@ class RosTransport:
             if self.closed:
                 return
             self.closed = True
-            self.handle.destroy_when_not_in_use()
         self._on_close(self)
+        self.handle.destroy_when_not_in_use()
 
 
 def _all(take: Callable[[Any], Any], kind: Any, nothing: Any = (None, None)) -> Iterator[Any]:

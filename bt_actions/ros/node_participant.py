@@ -27,8 +27,8 @@ from bt_actions.ros.graph import enclave
 from bt_actions.ros.host import host
 from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.log import log
+from bt_actions.ros.receiving import Receiver
 from bt_actions.ros.rediscovery import look_for
-from bt_actions.ros.workarounds.one_waitable import OneWaitable
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import Listener, Seeker
 from bt_actions.utilities.suggest import did_you_mean, listing
@@ -79,7 +79,7 @@ class NodeParticipant:
         self.subscription = functools.partial(Subscription, node, sight.since)
         self.publisher = functools.partial(Publisher, node, sight.since)
         self.traffic = Traffic(host, self)
-        self._waitable = OneWaitable(node)
+        self._receiver = Receiver(node)
         self._warned_of: set[str] = set()
 
     @classmethod
@@ -114,9 +114,9 @@ class NodeParticipant:
         self._warn_of_remapping(name)
         is_private = sees_nobody_else()  # no server can come to be seen later than another
         seen_since = NEVER if is_private else self.seen_since
-        leave = self._waitable.leave
+        leave = self._receiver.leave
         transport = RosTransport(self.node, action_type, name, listener, seen_since, leave)
-        self._waitable.join(transport)
+        self._receiver.join(transport)
         return transport
 
     def _warn_of_remapping(self, name: str) -> None:

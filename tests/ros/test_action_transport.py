@@ -17,7 +17,6 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 from bt_actions import Gripper, MoveRobot
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.node_participant import NodeParticipant
-from bt_actions.ros.workarounds.one_waitable import OneWaitable
 from bt_actions.traffic.transport import Request
 from tests.support.processes import Host
 from tests.support.waiting import until
@@ -228,6 +227,22 @@ def test_a_listener_that_raises_does_not_end_the_spin(
         until(lambda: heard.cancels)
 
 
+def test_what_cannot_be_taken_keeps_nothing_else_from_being_heard(
+    client: RosTransport, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = iter([RuntimeError("not this one")])
+
+    def take_data() -> None:
+        for error in taken:
+            raise error
+        RosTransport.take_data(client)
+
+    monkeypatch.setattr(client, "take_data", take_data)
+    request(client, "result")
+    until(lambda: heard.results)
+    assert next(taken, None) is None
+
+
 def test_a_destroyed_client_is_silent_and_refuses_to_send(
     client: RosTransport, heard: Heard
 ) -> None:
@@ -238,26 +253,6 @@ def test_a_destroyed_client_is_silent_and_refuses_to_send(
     assert not heard.results
     with pytest.raises(Exception, match=r"(?i)destroy|invalid|pointer"):
         request(client, "goal")
-
-
-@pytest.mark.parametrize("moment", ["__enter__", "get_num_entities", "add_to_wait_set", "is_ready"])
-def test_a_client_that_is_destroyed_in_the_executors_hands_does_not_end_the_spin(
-    client: RosTransport, node: Node, monkeypatch: pytest.MonkeyPatch, moment: str
-) -> None:
-    """`shutdown` of a leaf, while another thread spins the user's node."""
-    real = getattr(OneWaitable, moment)
-
-    def destroyed_first(self: OneWaitable, *arguments: Any) -> Any:
-        client.close()
-        return real(self, *arguments)
-
-    monkeypatch.setattr(OneWaitable, moment, destroyed_first)
-    alive = threading.Event()
-    executor = SingleThreadedExecutor(context=node.context)
-    with spinning(node, executor):
-        until(lambda: client.closed, meanwhile=lambda: executor.create_task(alive.clear))
-        executor.create_task(alive.set)
-        assert alive.wait(2.0)
 
 
 @pytest.mark.parametrize("times", [200])
@@ -277,7 +272,7 @@ def test_clients_come_and_go_under_a_spinning_executor(
 
 
 def clients_of(node: Node) -> tuple[Any, ...]:
-    return NodeParticipant.of(node)._waitable._members
+    return NodeParticipant.of(node)._receiver._members
 
 
 def test_leaves_with_the_same_action_share_one_client(node: Node, name: str) -> None:

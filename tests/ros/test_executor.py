@@ -71,20 +71,3 @@ def test_what_a_callback_raises_is_raised_by_who_spins(executor: Any) -> None:
     executor.create_task(fail)
     with pytest.raises(ValueError, match="a callback's"):
         spin_on()
-
-
-@pytest.mark.parametrize("never_waits", [True, False])
-def test_what_never_waits_is_called_by_who_spins(
-    executor: Any, context: Any, never_waits: bool
-) -> None:
-    from rclpy.node import Node
-
-    node = Node("called", context=context)
-    called: list[int] = []
-    timer: Any = node.create_timer(0.01, lambda: called.append(threading.get_ident()))
-    timer.never_waits, timer.take_data = never_waits, timer.callback
-    executor.add_node(node)
-    until(lambda: bool(called), meanwhile=lambda: spin(executor, 1))
-    executor.remove_node(node)
-    node.destroy_node()
-    assert (called[0] == threading.get_ident()) is never_waits

@@ -5,9 +5,8 @@ holds the interpreter's lock, until a thread has begun with it; the pool's threa
 Measured, with /clock at 100 Hz: 7,000 hand-overs a second, 2,000 of them queued at a time, and all
 Python threads of the process still for 0.2 s again and again. Here whoever spins waits for the pool
 instead. What is called, in which order and on how many threads is as it was: rclpy's looks at
-nothing new either while work waits for a thread. What says that it never waits, as our transports
-do, is served on the thread that spins: that saves a hand-over and two wait sets for each message.
-The bug is rclpy #1452, mended by rclpy #1547: not needed any more with a release that has that.
+nothing new either while work waits for a thread. The bug is rclpy #1452, mended by rclpy #1547: not
+needed any more with a release that has that.
 """
 
 from __future__ import annotations
@@ -32,17 +31,10 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
         self._executor.shutdown()  # it has no thread yet
         self._executor = self.pool = _Pool(num_threads)
 
-    def _make_handler(self, entity: Any, *args: Any) -> Any:
-        """Make the task that serves what is ready; None: it has been served."""
-        if not getattr(entity, "never_waits", False):
-            return super()._make_handler(entity, *args)
-        entity.take_data()
-        return None
-
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
         """Return what is to be run next, as rclpy's does; TimeoutException: nothing, as yet."""
         ready = super().wait_for_ready_callbacks(*args, **options)
-        if ready[0] is None or self.pool.holds(ready[0]):
+        if self.pool.holds(ready[0]):
             raise TimeoutException
         return ready
 
