@@ -37,9 +37,10 @@ What holds everywhere:
 - **A tick never waits.** Anybody may tick: `TreeRunner`, py_trees' own loops, a timer.
 - **The goals need no tick.** From its request to its end a goal is driven by what arrives and by a
   thread of its own: it is canceled and drained also where nobody ticks, or spins, any more.
-- **Somebody must spin the node** while the tree runs. `TreeRunner` does, unless it was given a node
-  that is in an executor. No behaviour may: `rclpy.spin_until_future_complete(node, ...)` takes the
-  node out of its executor, and the run ends with a TreeError that names the behaviour.
+- **Somebody must spin the node** while the tree runs, for its topics, services and clock.
+  `TreeRunner` does, unless it was given a node that is in an executor. No behaviour may:
+  `rclpy.spin_until_future_complete(node, ...)` takes the node out of its executor, and the run ends
+  with a TreeError that names the behaviour.
 - **In a callback** of anybody's executor a `TreeRunner` that was given no node can `run()`. On the
   node that the callback belongs to it can where another thread of the executor is free for the
   answers; else `start()` it, and take the status in a done callback of its `future`.
