@@ -15,7 +15,8 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
 from bt_actions.servers.replies import Told
-from bt_actions.traffic.handle import Endpoint, GoalHandle, NodeTraffic, Standing, wake
+from bt_actions.traffic.admission import why_not
+from bt_actions.traffic.handle import Endpoint, GoalHandle, Standing, wake
 from bt_actions.traffic.host import Entry, Host
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
 
@@ -30,12 +31,10 @@ class Driver:
         self,
         endpoint: Endpoint,
         host: Host,
-        traffic: NodeTraffic,
         failed: Callable[[str, Exception], None],
     ) -> None:
         """`failed` is told what could not be done, which is asked for again later."""
-        self._endpoint, self._host = endpoint, host
-        self._traffic, self._failed = traffic, failed
+        self._endpoint, self._host, self._failed = endpoint, host, failed
         self._commands: dict[Command, Effect] = {
             Command.RELEASE: self._release,
             Command.SEND: self._send,
@@ -123,7 +122,7 @@ class Driver:
         commands = goal.on(event, now, detail)
         host.trace.told(handle, event, detail, commands)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
-            goal.reason += self._traffic.why_not(handle)
+            goal.reason += why_not(handle)
         if (due := goal.due_in(now)) is not None:
             host.scheduler.wake_by(now.steady + due)
         effects = self._what_follows(handle, commands)

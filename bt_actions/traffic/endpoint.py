@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from collections.abc import Callable
 from typing import Any
 
 from bt_actions.goals.policy import End
@@ -18,7 +19,7 @@ from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
 from bt_actions.servers.replies import DENIALS
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.handle import Domain, GoalHandle, NodeTraffic, wake
+from bt_actions.traffic.handle import Domain, GoalHandle, wake
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import Predecessors
 from bt_actions.traffic.route import Route
@@ -41,12 +42,13 @@ class ActionEndpoint:
         host: Host,
         participant: Participant,
         domain: Domain,
-        traffic: NodeTraffic,
+        unused: Callable[[ActionEndpoint], None],
         action_type: Any,
         name: str,
     ) -> None:
+        """`unused` is told when there may be neither a user nor an open goal any more."""
         self._host = host
-        self.participant, self.domain, self._traffic = participant, domain, traffic
+        self.participant, self.domain, self._unused = participant, domain, unused
         self.action_type = action_type
         self.name = name
         self.action = name, action_type
@@ -68,7 +70,7 @@ class ActionEndpoint:
         self.observe, self.observe_and_tell = self.watcher.observe, self.watcher.observe_and_tell
         self.recent_state = self.watcher.recent_state
         self.run_due = self.watcher.run_due
-        self.driver = driver = Driver(self, host, traffic, self._warn_once)
+        self.driver = driver = Driver(self, host, self._warn_once)
         self.tell, self.pass_on = driver.tell, driver.pass_on
         self.apply_deadlines, self.ask_to_cancel = driver.apply_deadlines, driver.ask_to_cancel
 
@@ -124,7 +126,7 @@ class ActionEndpoint:
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
-        self._traffic.drop_if_unused(self)
+        self._unused(self)
 
     def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight.
@@ -207,7 +209,7 @@ class ActionEndpoint:
             self.domain.open.pop(self, None)
             self._host.scheduler.remove(self)
             self.watcher.rest()
-            self._traffic.drop_if_unused(self)
+            self._unused(self)
 
     def goals_of(self, owner: Any) -> list[GoalHandle]:
         """Return a leaf's goals that are open here, also what a second server took."""

@@ -28,16 +28,6 @@ Action = tuple[str, Any]
 """Name and type."""
 
 
-class NodeTraffic(Protocol):
-    """What an endpoint asks of its node (Traffic)."""
-
-    def why_not(self, handle: GoalHandle) -> str:
-        """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
-
-    def drop_if_unused(self, endpoint: Endpoint) -> None:
-        """Close an endpoint that has no user and no open goal."""
-
-
 class Endpoint(Listener, Scheduled, Protocol):
     """One action as one node sees it (ActionEndpoint), as its parts and its neighbors know it."""
 

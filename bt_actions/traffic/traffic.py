@@ -18,8 +18,7 @@ from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, Timeouts
 from bt_actions.goals.terms import Event, Now, State
 from bt_actions.servers.presence import Server
-from bt_actions.traffic import handover
-from bt_actions.traffic.admission import Admission
+from bt_actions.traffic import admission, handover
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.handle import Endpoint, GoalHandle, begun_in
@@ -37,8 +36,6 @@ class Traffic:
         """Whether it was destroyed; whoever sets up a tree needs another one."""
         self._domain = host.domain(participant.domain)
         self._endpoints: dict[str, ActionEndpoint] = {}
-        self._admission = Admission(host, self._domain, self._endpoints, self._open_to)
-        self.why_not = self._admission.why_not
 
     def endpoint(self, action_type: Any, action_name: str) -> ActionEndpoint:
         """Return the shared endpoint to an action, and count its user.
@@ -64,7 +61,7 @@ class Traffic:
     def _open_to(self, action_type: Any, name: str) -> ActionEndpoint:
         """Return a new endpoint to an action, with no user yet."""
         endpoint = self._endpoints[name] = ActionEndpoint(
-            self.host, self.participant, self._domain, self, action_type, name
+            self.host, self.participant, self._domain, self.drop_if_unused, action_type, name
         )
         handover.adopt(endpoint, self.host)
         return endpoint
@@ -153,7 +150,7 @@ class Traffic:
                 return
             if endpoint.recent_state(self.host.steady()) is Server.AMBIGUOUS:
                 endpoint.tell(handle, Event.SERVER_AMBIGUOUS)
-            if not self._admission.may_send(handle):
+            if not self._may_send(handle):
                 return
         try:
             message = make_message()
@@ -162,9 +159,40 @@ class Traffic:
             endpoint.tell(handle, Event.INVALID, reason)
             return
         with self.host.lock:
-            if self._admission.may_send(handle):
+            if self._may_send(handle):
                 handle.message = message
                 endpoint.tell(handle, Event.SERVER_READY)
+
+    def _may_send(self, handle: GoalHandle) -> bool:
+        """Whether to send it now. If nothing else speaks against it, see to lost goals first."""
+        now = self.host.steady()
+        if self.host.closing or not admission.finds_server(handle, now):
+            return False
+        left = admission.left_near(handle)
+        if self._cancel_what_is_back(handle, left, now):
+            left = admission.left_near(handle)
+        return admission.is_clear(handle, left, now)
+
+    def _cancel_what_is_back(self, handle: GoalHandle, left: list[GoalHandle], now: float) -> bool:
+        """Observe each server at which goals were lost that this one might run beside.
+
+        Should it be back, they are canceled. Opens an endpoint where this node has none. Returns
+        whether there was anything to observe.
+        """
+        to_see = dict.fromkeys(each.endpoint for each in left if each.goal.lost)
+        actions = {each.action: None for each in to_see}
+        for (name, action_type), lost in list(self._domain.lost.items()):
+            if any(each.goal.resources & handle.goal.exclusive for each in lost):
+                actions[name, action_type] = None
+                if name not in self._endpoints:  # a server that nobody speaks to any more
+                    self._open_to(action_type, name)
+        for action in actions:
+            ours = self._endpoints.get(action[0])
+            if ours is not None and ours.action == action:
+                to_see[ours] = None
+        for endpoint in to_see:  # all of them first: one may see what another has lost
+            endpoint.observe_and_tell(now)
+        return bool(to_see)
 
     def is_decided(self, handle: GoalHandle) -> bool:
         """Whether its outcome is decided, and its end and result are set as they are known then."""

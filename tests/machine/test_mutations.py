@@ -23,8 +23,7 @@ from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import MAY_STILL_BE_ACCEPTED, Command, Event, State
 from bt_actions.servers import replies
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic import handover
-from bt_actions.traffic.admission import Admission
+from bt_actions.traffic import admission, handover
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.endpoint import ActionEndpoint
@@ -196,27 +195,27 @@ def sends_beside_a_lost_goal_that_wants_the_same_resource(patch: Patch) -> None:
 
 @mutation
 def sends_to_a_server_that_may_run_what_was_given_up(patch: Patch) -> None:
-    def near(self: Admission, handle: GoalHandle) -> list[GoalHandle]:
+    def near(handle: GoalHandle) -> list[GoalHandle]:
         wanted = handle.goal.resources
-        return [each for each in real(self, handle) if each.goal.resources & wanted]
+        return [each for each in real(handle) if each.goal.resources & wanted]
 
-    real = Admission._left_near
-    patch.setattr(Admission, "_left_near", near)
+    real = admission.left_near
+    patch.setattr(admission, "left_near", near)
 
 
 @mutation
 def looks_only_at_the_goals_of_its_own_node(patch: Patch) -> None:
-    real = Admission._left_near
+    real = admission.left_near
 
-    def of_its_own(self: Admission, handle: GoalHandle) -> list[GoalHandle]:
-        return [each for each in real(self, handle) if each.endpoint is handle.endpoint]
+    def of_its_own(handle: GoalHandle) -> list[GoalHandle]:
+        return [each for each in real(handle) if each.endpoint is handle.endpoint]
 
-    patch.setattr(Admission, "_left_near", of_its_own)
+    patch.setattr(admission, "left_near", of_its_own)
 
 
 @mutation
 def knows_of_nothing_in_the_way(patch: Patch) -> None:
-    patch.setattr(Admission, "_left_near", lambda self, handle: [])
+    patch.setattr(admission, "left_near", lambda handle: [])
 
 
 @mutation
@@ -295,7 +294,7 @@ def takes_preemption_for_a_failure(patch: Patch) -> None:
 
 @mutation
 def sends_what_replaces_a_goal_beside_the_request_of_that(patch: Patch) -> None:
-    patch.setattr(Admission, "_may_overtake", lambda self, handle: False)
+    patch.setattr(admission, "_may_overtake", lambda handle: False)
 
 
 @mutation
