@@ -58,14 +58,13 @@ def is_clear(handle: GoalHandle, left: Iterable[GoalHandle], now: float) -> bool
 
 def why_not(handle: GoalHandle) -> str:
     """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
-    endpoint = handle.endpoint
     if handle.goal.outcome is Outcome.SERVER_BUSY:
         return _in_use(handle)
     if any(each.goal.outstanding for each in left_near(handle)):
         return ": what it would use still has a goal that was given up, and would run both"
     if _may_overtake(handle):
         return ": it has not answered another goal's request, and might run that one last"
-    return endpoint.participant.instead(endpoint.action_type, endpoint.name)
+    return handle.endpoint.participant.instead(*handle.endpoint.action)
 
 
 def _in_use(handle: GoalHandle) -> str:

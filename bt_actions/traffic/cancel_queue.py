@@ -39,10 +39,6 @@ class Cancels:
     def forget(self, goal_id: bytes) -> None:
         """Ask no more for this goal."""
         self._waiting.pop(goal_id, None)
-        self.forget_answer(goal_id)
-
-    def forget_answer(self, goal_id: bytes) -> None:
-        """There will be none to what was asked for this goal so far."""
         self._asked.pop(goal_id, None)
 
     def has_request(self, goal_id: bytes) -> bool:

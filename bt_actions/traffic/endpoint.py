@@ -19,9 +19,9 @@ from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
 from bt_actions.servers.replies import DENIALS
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.handle import Domain, GoalHandle, wake
+from bt_actions.traffic.handle import Action, Domain, GoalHandle, wake
 from bt_actions.traffic.host import Host
-from bt_actions.traffic.predecessors import Predecessors
+from bt_actions.traffic.predecessors import warn_of_dead
 from bt_actions.traffic.route import Route
 from bt_actions.traffic.transport import ActionTransport, Participant, Request, nobodys, probe
 from bt_actions.traffic.watcher import Watcher
@@ -43,27 +43,24 @@ class ActionEndpoint:
         participant: Participant,
         domain: Domain,
         unused: Callable[[ActionEndpoint], None],
-        action_type: Any,
-        name: str,
+        action: Action,
     ) -> None:
         """`unused` is told when there may be neither a user nor an open goal any more."""
         self._host = host
         self.participant, self.domain, self._unused = participant, domain, unused
-        self.action_type = action_type
-        self.name = name
-        self.action = name, action_type
+        self.action, self.name = action, action[1]
         self.users = 0
         self._forks = host.forks
         self.goals: dict[bytes, GoalHandle] = {}
         self.watch = ServerWatch()
-        self.cancels = domain.cancels[self.action]
+        self.cancels = domain.cancels[action]
         self.orphaned = False
         self.heard_at = host.steady()
         self._probes = itertools.count(PROBES_KEPT)
         self._warned_of: set[str] = set()
+        self._left_by_dead: set[bytes] = set()
         self._ended = EndedGoals(self, host)
-        self._predecessors = Predecessors(name, host.log)
-        self.transport = participant.open_transport(action_type, name, self)
+        self.transport = participant.open_transport(*action, self)
         self.route = Route(self, host)
         self.watcher = Watcher(self, host, self.route)
         self.in_doubt, self.holds_back = self.route.in_doubt, self.route.holds_back
@@ -122,7 +119,7 @@ class ActionEndpoint:
             elif status > 0 and (handle := self._heard_of(goal_id)) is not None:
                 now = self.watch.heard_at = self._host.steady()
                 self.pass_on(handle, handle.replies.shown(self.watch, now, status))
-        self._predecessors.see(running)
+        warn_of_dead(self.name, running, self._left_by_dead, self._host.log)
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
@@ -219,8 +216,6 @@ class ActionEndpoint:
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""
         self.transport.close()
-        for goal_id in self.goals:
-            self.cancels.forget_answer(goal_id)
         self.transport, self.watch = transport, ServerWatch()
         self.watcher.begin_anew()
         self._host.scheduler.wake_by(self._host.steady())

@@ -24,8 +24,8 @@ from bt_actions.traffic.transport import ActionTransport, Listener, Participant
 FEEDBACK_KEPT = 100
 """Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
 
-Action = tuple[str, Any]
-"""Name and type."""
+Action = tuple[Any, str]
+"""Type and name."""
 
 
 class Endpoint(Listener, Scheduled, Protocol):
@@ -34,9 +34,7 @@ class Endpoint(Listener, Scheduled, Protocol):
     participant: Participant
     domain: Domain
     name: str
-    action_type: Any
     action: Action
-    """The last two together."""
     users: int
     goals: dict[bytes, GoalHandle]
     watch: ServerWatch

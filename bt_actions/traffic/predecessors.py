@@ -15,23 +15,19 @@ TOLD_AT_MOST = 10
 """Goals of one action that are named; who left more left them in the same way."""
 
 
-class Predecessors:
-    """Of one action."""
+def warn_of_dead(action: str, running: Collection[bytes], told: set[bytes], log: Log) -> None:
+    """Name what the dead have left among the ids that a status shows running, but our own.
 
-    def __init__(self, action: str, log: Log) -> None:
-        self._action, self._log = action, log
-        self._told: set[bytes] = set()
-
-    def see(self, running: Collection[bytes]) -> None:
-        """Take the ids of all goals that a status shows running, but our own."""
-        if len(self._told) >= TOLD_AT_MOST:
-            return
-        authors = {each: author_of(each) for each in running if each not in self._told}
-        dead = {each for each in {*authors.values()} if each and not each.alive}  # reads a file
-        for goal_id, author in authors.items():
-            if author in dead and len(self._told) < TOLD_AT_MOST:
-                self._told.add(goal_id)
-                self._log.warning(
-                    f"{self._action}: a goal of process {author.pid}, which is dead, still runs "
-                    f"there; `bt-actions cleanup` cancels it: {goal_id.hex()}"
-                )
+    `told` are those that were named before.
+    """
+    if len(told) >= TOLD_AT_MOST:
+        return
+    authors = {each: author_of(each) for each in running if each not in told}
+    dead = {each for each in {*authors.values()} if each and not each.alive}  # reads a file
+    for goal_id, author in authors.items():
+        if author in dead and len(told) < TOLD_AT_MOST:
+            told.add(goal_id)
+            log.warning(
+                f"{action}: a goal of process {author.pid}, which is dead, still runs "
+                f"there; `bt-actions cleanup` cancels it: {goal_id.hex()}"
+            )

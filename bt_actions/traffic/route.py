@@ -122,7 +122,7 @@ class Route:
     def try_in(self, participant: Opener) -> ActionTransport:
         """Return a transport like our own in another participant, on trial."""
         endpoint, now = self._endpoint, self._host.steady()
-        transport = participant.open_transport(endpoint.action_type, endpoint.name, endpoint)
+        transport = participant.open_transport(*endpoint.action, endpoint)
         transport.on_trial = True
         if not self._is_absent(now):
             endpoint.transport.reachability.tried(now)
@@ -185,9 +185,8 @@ class Route:
         endpoint = self._endpoint
         if not self.elsewhere:
             return endpoint.participant.alive()  # the next look may see more
-        action_type, name = endpoint.action_type, endpoint.name
         try:
-            transport = endpoint.participant.open_transport(action_type, name, endpoint)
+            transport = endpoint.participant.open_transport(*endpoint.action, endpoint)
         except Exception:  # noqa: BLE001 - or it is gone by now, too
             return False
         self.elsewhere = False

@@ -21,7 +21,7 @@ from bt_actions.servers.presence import Server
 from bt_actions.traffic import admission, handover
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Endpoint, GoalHandle, begun_in
+from bt_actions.traffic.handle import Action, Endpoint, GoalHandle, begun_in
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.transport import Participant
 from bt_actions.utilities.plain_text import in_words
@@ -47,21 +47,21 @@ class Traffic:
         with self.host.lock:
             endpoint = self._endpoints.get(name)
             if endpoint is None:
-                endpoint = self._open_to(action_type, name)
-            elif endpoint.action_type is not action_type:
-                raise TypeError(
-                    f"{name} is used with two types: {endpoint.action_type.__module__}."
-                    f"{endpoint.action_type.__name__} and {action_type.__module__}."
-                    f"{action_type.__name__}"
+                endpoint = self._open_to((action_type, name))
+            elif endpoint.action[0] is not action_type:
+                types = (
+                    f"{each.__module__}.{each.__name__}"
+                    for each in (endpoint.action[0], action_type)
                 )
+                raise TypeError(f"{name} is used with two types: {' and '.join(types)}")
             endpoint.users += 1
             endpoint.watcher.look_early(self.host.steady())
             return endpoint
 
-    def _open_to(self, action_type: Any, name: str) -> ActionEndpoint:
+    def _open_to(self, action: Action) -> ActionEndpoint:
         """Return a new endpoint to an action, with no user yet."""
-        endpoint = self._endpoints[name] = ActionEndpoint(
-            self.host, self.participant, self._domain, self.drop_if_unused, action_type, name
+        endpoint = self._endpoints[action[1]] = ActionEndpoint(
+            self.host, self.participant, self._domain, self.drop_if_unused, action
         )
         handover.adopt(endpoint, self.host)
         return endpoint
@@ -181,13 +181,13 @@ class Traffic:
         """
         to_see = dict.fromkeys(each.endpoint for each in left if each.goal.lost)
         actions = {each.action: None for each in to_see}
-        for (name, action_type), lost in list(self._domain.lost.items()):
+        for action, lost in list(self._domain.lost.items()):
             if any(each.goal.resources & handle.goal.exclusive for each in lost):
-                actions[name, action_type] = None
-                if name not in self._endpoints:  # a server that nobody speaks to any more
-                    self._open_to(action_type, name)
+                actions[action] = None
+                if action[1] not in self._endpoints:  # a server that nobody speaks to any more
+                    self._open_to(action)
         for action in actions:
-            ours = self._endpoints.get(action[0])
+            ours = self._endpoints.get(action[1])
             if ours is not None and ours.action == action:
                 to_see[ours] = None
         for endpoint in to_see:  # all of them first: one may see what another has lost

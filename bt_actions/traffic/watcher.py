@@ -22,8 +22,6 @@ DELIVER_EVERY = 0.01
 """Seconds between two looks at a server: somebody waits for it; goals run on it; only its return
 would matter, or it is ready and alone, so that it does to count those in sight meanwhile (at least
 every AT_LEAST_EVERY). The last: between two takes of answers, where nobody spins."""
-LATE = 0.5
-"""Seconds by which a look is so late that answers may have come in between, unseen."""
 SILENT_FOR = 40.0
 """Seconds without a word of their server until goals whose node is gone are left to whoever can see
 whether it is there: longer than a dead one is shown, or a question is kept (DENIED_FOR_GOOD)."""
@@ -67,7 +65,7 @@ class Watcher:
                 wait = min(wait, DELIVER_EVERY)
         for handle in endpoint.handles:
             endpoint.apply_deadlines(handle)
-        return max(wait, 0.001)
+        return wait
 
     @property
     def _is_alone(self) -> bool:
@@ -116,7 +114,7 @@ class Watcher:
             return not self._endpoint.orphaned
 
     def rest(self) -> None:
-        """No look is due any more, and none will be late."""
+        """Look at once when there is a goal again."""
         self._look_at = 0.0
 
     def begin_anew(self) -> None:
@@ -203,8 +201,7 @@ class Watcher:
     def _deliver_pending(self, now: float) -> None:
         """Deliver pending answers before judging silence, where several servers are shown."""
         if self._endpoint.watch.is_crowded:
-            late = self._look_at and now - self._look_at > LATE
-            if late or self._host.stalls.answers_take(self._host.steady()):
+            if self._host.stalls.answers_take(self._host.steady()):
                 self._endpoint.watch.stood_still(now)
             self._endpoint.deliver_arrived()
 

@@ -61,13 +61,6 @@ def test_what_has_ended_is_not_asked_for_and_makes_room(cancels: Sent) -> None:
     assert cancels.sent == [*GOALS[:AT_MOST], GOALS[AT_MOST + 1]]
 
 
-def test_another_client_hears_no_answers_to_what_was_asked_before(cancels: Sent) -> None:
-    for goal in GOALS:
-        cancels.forget_answer(goal)
-    cancels.send_more(0.1)
-    assert cancels.sent == GOALS[: 2 * AT_MOST]
-
-
 def test_what_cannot_wait_is_sent_at_once_and_once(cancels: Sent) -> None:
     for goal in GOALS:
         cancels.send_now(goal)

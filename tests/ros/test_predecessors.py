@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.goals.ids import Author, new_goal_id
-from bt_actions.traffic.predecessors import Predecessors
+from bt_actions.traffic.predecessors import warn_of_dead
 
 
 def of_the_dead() -> bytes:
@@ -29,9 +29,9 @@ def said() -> Said:
 def test_a_goal_of_the_dead_is_named_once_though_statuses_of_two_servers_take_turns(
     said: Said,
 ) -> None:
-    seen, left = Predecessors("/move", said), of_the_dead()
+    told, left = set[bytes](), of_the_dead()
     for running in ({left}, {left}, set[bytes](), {left}):
-        seen.see(running)
+        warn_of_dead("/move", running, told, said)
     [line] = said
     assert line.startswith("/move: a goal of process ")
     assert "`bt-actions cleanup`" in line
@@ -41,16 +41,16 @@ def test_a_goal_of_the_dead_is_named_once_though_statuses_of_two_servers_take_tu
 def test_goals_of_the_living_and_of_other_clients_are_nobodys_concern(said: Said) -> None:
     elsewhere = bytearray(of_the_dead())
     elsewhere[3] ^= 0xFF
-    Predecessors("/move", said).see({new_goal_id(), bytes(16), b"", bytes(elsewhere)})
+    warn_of_dead("/move", {new_goal_id(), bytes(16), b"", bytes(elsewhere)}, set(), said)
     assert not said
 
 
 def test_who_dies_later_is_found_at_the_next_status(
     said: Said, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen, goal = Predecessors("/move", said), new_goal_id()
-    seen.see({goal})
+    told, goal = set[bytes](), new_goal_id()
+    warn_of_dead("/move", {goal}, told, said)
     assert not said
     monkeypatch.setattr(Author, "alive", False)
-    seen.see({goal})
+    warn_of_dead("/move", {goal}, told, said)
     assert len(said) == 1
