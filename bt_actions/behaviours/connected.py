@@ -56,8 +56,6 @@ class Connected(Generic[T]):
 class Stopwatch:
     """Seconds since it was made; a clock that jumps back takes none of them away."""
 
-    __slots__ = ("_now", "_passed", "_seen")
-
     def __init__(self, now: Callable[[], float]) -> None:
         self._now, self._passed, self._seen = now, 0.0, now()
 

@@ -205,15 +205,14 @@ class Publish(Connected[Publisher], Leaf):
     ) -> None:
         super().__init__(name)
         self._type = message_type
-        self._topic = topic
+        self._given = topic, qos
         self._data = data
-        self._qos = qos
         self._subscribers = subscribers
         self._timeout = timeout
 
     def _make(self, backend: Backend) -> Publisher:
         self._type = interface(self._type, "msg")
-        return backend.publisher(self._type, self._topic, self._qos)
+        return backend.publisher(self._type, *self._given)
 
     def do(self) -> Status:
         backend, publisher = self._there()

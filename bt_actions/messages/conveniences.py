@@ -88,19 +88,19 @@ def constant(text: str, owner: type | None) -> object:
 def _class(path: str, owner: type | None) -> type:
     """The class a path such as ``MoveRobot.Feedback`` names, in the package of `owner` or any."""
     place, slash, rest = path.rpartition("/")
-    names = rest.split(".")
+    name, _, part = rest.partition(".")
     if owner is not None and path in PARTS:
-        names = [owner.__name__.rpartition("_")[0], path]
-    kind = PARTS.get(names[-1], "msg" if len(names) == 1 else "action")
+        name, part = owner.__name__.rpartition("_")[0], path
+    kind = PARTS.get(part or name, "action" if part else "msg")
     found: type | None = None
     if owner is not None and not slash:
         with contextlib.suppress(UnknownInterface):
-            found = interface(f"{owner.__module__.split('.')[0]}/{names[0]}", kind)
-    found = found or called(f"{place}{slash}{names[0]}", kind)
-    for name in names[1:]:
-        parts = [part for part in PARTS if hasattr(found, part)]
-        if name not in parts:
-            near = did_you_mean(name, parts)
-            raise UnknownInterface(f"no message class {path!r} is known here{near}")
-        found = getattr(found, name)
-    return found
+            found = interface(f"{owner.__module__.split('.')[0]}/{name}", kind)
+    found = found or called(f"{place}{slash}{name}", kind)
+    if not part:
+        return found
+    parts = [each for each in PARTS if hasattr(found, each)]
+    if part not in parts:
+        near = did_you_mean(part, parts)
+        raise UnknownInterface(f"no message class {path!r} is known here{near}")
+    return getattr(found, part)  # type: ignore[no-any-return]

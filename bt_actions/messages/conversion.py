@@ -162,14 +162,13 @@ class _Filler:
         message: Any = cls() if self._hole is None else None
         outer, self._owner = self._owner, cls
         for name, item in value.items():
-            kind = known.get(name) if isinstance(name, str) else None
+            kind = known.get(name)
             if kind is None:
                 problem = Problem((*path, str(name)), no_field(cls, str(name)), at_key=True)
                 self.problems.append(problem)
                 continue
-            before = len(self.problems)
             converted = self.convert(kind, item, (*path, name))
-            if self._hole is None and len(self.problems) == before:
+            if self._hole is None and not self.problems:
                 setattr(message, name, converted)
         self._owner = outer
         return message

@@ -21,8 +21,8 @@ _WORDS: dict[str, str] = {"action": "action", "srv": "service", "msg": "message"
 PARTS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
                           "Request": "srv", "Response": "srv"}  # fmt: skip
 """The messages that an interface consists of, and of which kind it is then."""
-_PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_NAME = re.compile(r"([a-z][a-z0-9_]*)/(?:(action|srv|msg)/)?([A-Za-z][A-Za-z0-9_]*)")
+"""Of a type: its package, its kind where that is said, and what it is called there."""
 
 
 class UnknownInterface(LookupError, ValueError):
@@ -40,7 +40,12 @@ def interface(name: str | type, kind: Kind) -> type:
     """
     if isinstance(name, type):
         return name
-    package, short = _split(name, kind)
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise UnknownInterface(f"{name!r} is no type name: it is written package/{kind}/Name")
+    package, given, short = match.groups()
+    if given not in (None, kind):
+        raise UnknownInterface(f"{name!r} names no {_WORDS[kind]}, but one of {given}/")
     folders = (Path(entry or ".") / package / kind for entry in sys.path)
     known = next(filter(None, map(_listed, folders)), None)
     if known is None:
@@ -99,17 +104,6 @@ def short_name(cls: type) -> str:
     owner, _, part = cls.__name__.rpartition("_")
     is_part = owner and part in PARTS and ".msg" not in cls.__module__
     return f"{owner}.{part}" if is_part else cls.__name__
-
-
-def _split(name: str, kind: Kind) -> tuple[str, str]:
-    parts = name.split("/")
-    if len(parts) == 3 and parts[1] in _WORDS:
-        if parts[1] != kind:
-            raise UnknownInterface(f"{name!r} names no {_WORDS[kind]}, but one of {parts[1]}/")
-        del parts[1]
-    if len(parts) != 2 or not _PACKAGE.fullmatch(parts[0]) or not _NAME.fullmatch(parts[1]):
-        raise UnknownInterface(f"{name!r} is no type name: it is written package/{kind}/Name")
-    return parts[0], parts[1]
 
 
 @lru_cache(maxsize=1024)

@@ -165,7 +165,7 @@ class Cleanup:
             if overdue and now >= min(until, began + LOOK_AGAIN):
                 if not self._has_waited:
                     self._has_waited = True
-                    self.waits([call.action for call in overdue])
+                    self.waits(sorted(call.action for call in overdue))
                 if breaks_off and any(call.servers for call in overdue):
                     return False  # it may not hear this participant
             time.sleep(TURN)
@@ -175,7 +175,7 @@ class Cleanup:
         """Return all that was seen, and put it on record."""
         self._keep_record()
         lacks = self._lacks()
-        calls = [call for _, call in sorted(self._calls.items())]
+        calls = self._calls.values()
         return Swept(
             left=list(self._left.values()),
             known=[call.action for call in calls if call.known],
@@ -186,7 +186,7 @@ class Cleanup:
             },
             domain=self._sight.domain,
             trouble=self._trouble,
-            missing=[call.action for call in lacks],
+            missing=sorted(call.action for call in lacks),
             elsewhere=self._elsewhere,
         )
 
@@ -214,7 +214,7 @@ class Cleanup:
         required = {left.call for left in self._left.values()} | self._wanted
         return [
             call
-            for _, call in sorted(self._calls.items())
+            for call in self._calls.values()
             if not call.known and (call in required or (self.wanted is None and call.servers))
         ]
 

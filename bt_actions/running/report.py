@@ -229,7 +229,7 @@ class Report:
             self._culprit(  # which may not be what it said first of that status
                 leaf, leaf.feedback_message if self._as_it_ended(leaf) else self.message_of(leaf)
             )
-            for leaf in self._failed_leaves()
+            for leaf in self._failed_leaves(self.root)
         ]
 
     def _culprit(self, node: Behaviour, message: str) -> Culprit:
@@ -239,27 +239,25 @@ class Report:
         """Whether it was not stopped since it ended."""
         return node.status is self.status_of(node)
 
-    def _failed_leaves(self) -> Iterator[Behaviour]:
-        """Go down from the root along what failed.
+    def _failed_leaves(self, node: Behaviour) -> Iterator[Behaviour]:
+        """Go down from a node that failed along what failed.
 
         What failed though nothing below it did speaks for itself, as a leaf does. What was reset
         since an earlier visit was not told of, so a child's own status counts; but a parent that
         was stopped when it had failed has none in its children any more, and a Selector resets
         those that failed.
         """
-        waiting = [self.root]
-        while waiting:
-            node = waiting.pop()
-            own = self._as_it_ended(node) and not isinstance(node, Selector)
-            below = [
-                child
-                for child in node.children
-                if (child.status if own else self.status_of(child)) is Status.FAILURE
-            ]
-            if below and not (isinstance(node, Gate) and node.refused):  # else of an earlier time
-                waiting.extend(reversed(below))
-            else:
-                yield node
+        own = self._as_it_ended(node) and not isinstance(node, Selector)
+        below = [
+            child
+            for child in node.children
+            if (child.status if own else self.status_of(child)) is Status.FAILURE
+        ]
+        if not below or (isinstance(node, Gate) and node.refused):  # they are of an earlier time
+            yield node
+        else:
+            for child in below:
+                yield from self._failed_leaves(child)
 
 
 def place_of(node: Behaviour) -> str:
