@@ -21,7 +21,7 @@ from bt_actions.utilities.units import parse_duration
 Number = Callable[[], object] | None
 
 
-class Gate(Decorator):
+class Gate(Timed, Decorator):
     """Like py_trees' Decorator, with a question asked first.
 
     A subclass says in `gate` what to do: None ticks the child, RUNNING waits without ticking it,
@@ -42,8 +42,8 @@ class Gate(Decorator):
         return status
 
     def due_in(self) -> float | None:
-        """Zero when the child can begin anew at once."""
-        return None if self.decorated.status is Status.RUNNING else 0.0
+        """Seconds until the child can begin anew, none where nothing was given; None if it runs."""
+        return None if self.decorated.status is Status.RUNNING else self.left()
 
     def tick(self) -> Iterator[Behaviour]:
         self.refused = False
@@ -61,6 +61,7 @@ class Gate(Decorator):
     def _ask(self) -> Status | None:
         if self.status is not Status.RUNNING:
             self.feedback_message = ""
+            self.give(0.0)
             self.initialise()
         return self.gate()
 
@@ -72,7 +73,7 @@ class Gate(Decorator):
             return Status.FAILURE
 
 
-class Deadline(Timed, Gate):
+class Deadline(Gate):
     """Stops its child after some seconds, and fails when what it stopped has ended.
 
     py_trees' Timeout fails at once, so that whatever comes next runs beside a goal that is still
@@ -173,7 +174,7 @@ class Subtree(Gate):
         return status
 
 
-class Repeat(Timed, Gate):
+class Repeat(Gate):
     """Ticks its child again when it has succeeded; fails as soon as it fails.
 
     Args:
@@ -191,7 +192,6 @@ class Repeat(Timed, Gate):
 
     def initialise(self) -> None:
         self._done = 0
-        self.give(0.0)
         self._limit, self._of = _whole(self._times, self._counts, self._least)
 
     def gate(self) -> Status | None:
@@ -211,10 +211,6 @@ class Repeat(Timed, Gate):
             return self._again
         self.give(self._pauses.pause(self._done))
         return Status.RUNNING
-
-    def due_in(self) -> float | None:
-        """Seconds until the child begins anew; None while it runs."""
-        return None if self.decorated.status is Status.RUNNING else self.left()
 
 
 class RetryChild(Repeat):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, ClassVar
+from typing import Any
 
 from py_trees.common import Status
 from py_trees.ports import PortsMixin
@@ -63,8 +63,8 @@ class ActionWithPorts(PortsMixin, ActionBehaviour):
     Of py_trees' XML trees; their tags are in ports.py.
     """
 
-    ACTION_TYPE: ClassVar[str]
-    SERVER: ClassVar[str]
+    ACTION_TYPE: str
+    SERVER: str
 
     def __init__(
         self,

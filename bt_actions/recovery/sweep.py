@@ -26,8 +26,7 @@ from bt_actions.goals.ids import Author, author_of
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
 from bt_actions.recovery.ledger import Sent, left_behind
-from bt_actions.recovery.left_behind import GONE, LeftBehind
-from bt_actions.recovery.roll_call import ASK_AGAIN, SETTLE, RollCall
+from bt_actions.recovery.roll_call import ASK_AGAIN, GONE, SETTLE, LeftBehind, RollCall
 from bt_actions.ros.onlooker import ActionView, CannotStart, Onlooker, onlooker
 from bt_actions.servers.stalls import Stalls
 

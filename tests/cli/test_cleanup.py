@@ -15,8 +15,7 @@ from bt_actions.cli import main
 from bt_actions.cli.driving.signals import SAME_WISH
 from bt_actions.cli.driving.sweep import _Stop, sweep
 from bt_actions.goals.policy import End
-from bt_actions.recovery.left_behind import LeftBehind
-from bt_actions.recovery.roll_call import RollCall
+from bt_actions.recovery.roll_call import LeftBehind, RollCall
 from bt_actions.recovery.sweep import Cleanup, Swept
 from tests.cli.conftest import Start
 from tests.support.processes import Journal, Process

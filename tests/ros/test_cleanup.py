@@ -12,7 +12,7 @@ import pytest
 from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
-from bt_actions.recovery.left_behind import LeftBehind
+from bt_actions.recovery.roll_call import LeftBehind
 from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros import onlooker as sight
 from bt_actions.ros.onlooker import CannotStart

@@ -13,8 +13,7 @@ from bt_actions.goals.ids import Author
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.ledger import Sent
-from bt_actions.recovery.left_behind import LeftBehind
-from bt_actions.recovery.roll_call import RollCall
+from bt_actions.recovery.roll_call import LeftBehind, RollCall
 from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros.onlooker import CannotStart
 from tests.support.processes import Journal, Process

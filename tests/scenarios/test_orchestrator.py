@@ -704,7 +704,7 @@ def test_cleanup_finds_what_an_orchestrator_leaves_that_dies_meanwhile(
     launch: Launch, serve: Serve, tree: Tree, name: str, domain: int, node: Any, record: Record
 ) -> None:
     """SIGKILL to the orchestrator while cleanup looks, and has seen its goal"""
-    from bt_actions.recovery.left_behind import LeftBehind
+    from bt_actions.recovery.roll_call import LeftBehind
     from bt_actions.recovery.sweep import Cleanup
 
     journal = serve("1:slow=10")

@@ -16,7 +16,7 @@ from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note, wri
 from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
-    from bt_actions.recovery.left_behind import LeftBehind
+    from bt_actions.recovery.roll_call import LeftBehind
     from bt_actions.recovery.sweep import Swept
 
 
