@@ -180,14 +180,14 @@ class Replies:
         """Take what discovery shows now."""
         goal, name = self._goal, self._goal.server
         gone = watch.gone(now, self.sent_to)
-        returned = self._was_gone and not gone and watch.state(now) is not Server.ABSENT
-        self._was_gone = gone or (self._was_gone and not returned)
+        is_there = not gone and watch.state(now) is not Server.ABSENT
+        returned = self._was_gone and is_there
+        self._was_gone = gone or (self._was_gone and not is_there)
         self._note_changes(watch, now)
         others_now, self._one_left_or_came = self._one_left_or_came, False
         if goal.lost:
             none_dead = watch.all_live(now) or not watch.changed(self.sent_to)
-            is_there = not gone and none_dead and watch.state(now) is not Server.ABSENT
-            if returned or (is_there and goal.end is not End.UNKNOWN):
+            if returned or (is_there and none_dead and goal.end is not End.UNKNOWN):
                 self._forget(now)
                 return Event.SERVER_RETURNED, None
             if gone and goal.end is End.UNKNOWN:  # it was left, not lost

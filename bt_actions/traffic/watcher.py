@@ -217,7 +217,6 @@ class Watcher:
             handle.goal.deadlines.disarm(Event.LOOK_OUT_DUE)  # from here nobody sees it come back
             if handle.goal.outcome is None:
                 endpoint.tell(handle, Event.INTERRUPTED)
-        patience = max((each.goal.drains_within for each in endpoint.handles), default=0.0)
-        silent = self._host.steady() - endpoint.heard_at > max(SILENT_FOR, patience)
+        silent = self._host.steady() - endpoint.heard_at > SILENT_FOR
         if silent and not self._host.stalls.answers_take(self._host.steady()):
             handover.park(endpoint, all_of_them=True)
