@@ -142,7 +142,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         handle, backend = self._handle, self._backend
         state, feedback, left, deadline = "IDLE", None, None, ""
         if backend is not None and handle is not None:
-            now = backend.clock.now()
+            now = backend.now()
             if self.status is Status.RUNNING and self._filed(handle):
                 left = self._attempts.pause_left(now, look_only=True)
                 state, deadline = "BACKOFF", "backoff"
@@ -166,7 +166,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         """Return the seconds until this leaf needs a tick though nothing has happened."""
         if self._backend is None or self._handle is None or not self._filed(self._handle):
             return None  # while a goal is open, traffic/traffic.py applies its deadlines
-        return self._attempts.pause_left(self._backend.clock.now())
+        return self._attempts.pause_left(self._backend.now())
 
     # py_trees' contract
 
@@ -210,7 +210,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         begun = False
         while True:
             if self._filed(handle):
-                left = self._attempts.pause_left(backend.clock.now())
+                left = self._attempts.pause_left(backend.now())
                 if left > 0.0 or begun:
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
                     return Status.RUNNING
@@ -228,7 +228,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
                 return Status.RUNNING
             record = self._judge(handle, backend)
             again = not self._is_over() and self._attempts.again(
-                record, backend.clock.now(), backend.randomness
+                record, backend.now(), backend.randomness
             )
             if self._is_over():
                 return Status.FAILURE
@@ -298,7 +298,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
 
     def _begin(self, backend: Backend) -> GoalHandle:
         self._left_behind = self.open_handles()
-        self._started = backend.clock.now().ros
+        self._started = backend.now().ros
         self._handle = backend.traffic.begin(
             self._own,
             self,
@@ -323,7 +323,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     def _make_message(self) -> Any:
         action: Any = self.action_type
         data = self.goal() if callable(self.goal) else self.goal
-        return fill(action.Goal, resolve(data), now=self._there()[0].clock.stamp)
+        return fill(action.Goal, resolve(data), now=self._there()[0].stamp)
 
     def _judge(self, handle: GoalHandle, backend: Backend) -> AttemptRecord:
         goal = handle.goal
@@ -337,7 +337,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         return self._record(goal, outcome, reason, backend)
 
     def _record(self, goal: Goal, outcome: Outcome, reason: str, backend: Backend) -> AttemptRecord:
-        now = backend.clock.now().ros
+        now = backend.now().ros
         return AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:

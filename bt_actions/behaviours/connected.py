@@ -93,7 +93,7 @@ class Timed(Behaviour):
         return self.left()
 
     def _now(self) -> float:
-        return time.monotonic() if self._backend is None else self._backend.clock.now().ros
+        return time.monotonic() if self._backend is None else self._backend.now().ros
 
 
 class Leaf(Timed):

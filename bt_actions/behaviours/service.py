@@ -94,7 +94,7 @@ class CallService(Connected[Service], Leaf):
         elif client.ready:
             try:
                 fields = self._request()
-                request: Any = fill(self.service_type.Request, fields, now=backend.clock.stamp)
+                request: Any = fill(self.service_type.Request, fields, now=backend.stamp)
             except ValueError:
                 self._tries = self.retry.attempts  # no other try would get further
                 raise

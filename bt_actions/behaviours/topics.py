@@ -43,7 +43,7 @@ class TopicValue(Connected[Subscription]):
 
     def _make(self, backend: Backend) -> Subscription:
         def take(message: Any) -> None:
-            self._newest = message, Stopwatch(lambda: backend.clock.now().ros)
+            self._newest = message, Stopwatch(lambda: backend.now().ros)
             self._wake()
 
         self._newest = None
@@ -57,7 +57,7 @@ class TopicValue(Connected[Subscription]):
         backend, subscription = self._there()
         topic = subscription.name
         if self._newest is None:
-            now = backend.clock.now().steady
+            now = backend.now().steady
             if now >= self._look_again_at:  # a tree may ask at each tick
                 self._said, self._look_again_at = subscription.why_nobody(), now + 1.0
             raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._said}")
@@ -227,7 +227,7 @@ class Publish(Connected[Publisher], Leaf):
                 )
             self.feedback_message = f"waiting for who listens on {topic}"
             return Status.RUNNING
-        message: Any = fill(self._type, self._data(), now=backend.clock.stamp)
+        message: Any = fill(self._type, self._data(), now=backend.stamp)
         publisher.publish(message)
         if not listeners:
             self.warning = f"nobody listens on {topic}{publisher.why_nobody()}"

@@ -7,6 +7,7 @@ that differ within it. An id made elsewhere has the first six bytes by accident 
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import itertools
@@ -78,15 +79,11 @@ def _name_of_machine(_pid: int) -> str:
     In another time namespace the same process has another moment of its start.
     """
     parts = [socket.gethostname()]
-    for read in (
-        lambda: Path("/etc/machine-id").read_text(encoding="utf-8").strip(),
-        lambda: str(Path("/proc/self/ns/pid").readlink()),
-        lambda: str(Path("/proc/self/ns/time").readlink()),
-    ):
-        try:
-            parts.append(read())
-        except OSError:
-            parts.append("")
+    with contextlib.suppress(OSError):
+        parts.append(Path("/etc/machine-id").read_text(encoding="utf-8").strip())
+    for kind in ("pid", "time"):
+        with contextlib.suppress(OSError):
+            parts.append(str(Path("/proc/self/ns", kind).readlink()))
     return "\n".join(parts)
 
 

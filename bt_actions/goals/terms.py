@@ -48,15 +48,16 @@ class State(Enum):
     @property
     def shown(self) -> str:
         """The name in ``--json`` and on the terminal, which tell less finely."""
-        if self is State.REPLACED:
-            return State.EXECUTING.name
-        return State.CANCELING.name if self in _SHOWN_AS_CANCELING else self.name
+        return _SHOWN.get(self, self.name)
 
 
 MAY_STILL_BE_ACCEPTED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
 """It was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
-_SHOWN_AS_CANCELING = MAY_STILL_BE_ACCEPTED | {State.NOT_RECEIVED, State.LOST}
+_SHOWN = {
+    State.REPLACED: "EXECUTING",
+    **dict.fromkeys((*MAY_STILL_BE_ACCEPTED, State.NOT_RECEIVED, State.LOST), "CANCELING"),
+}
 MAY_TURN_UP = MAY_STILL_BE_ACCEPTED | {State.SENDING, State.NOT_RECEIVED, State.LOST}
 """Feedback or a status is news: it was accepted, and runs, or has run."""
 

@@ -64,8 +64,8 @@ class NodeParticipant:
     def __init__(self, node: Node) -> None:
         """The caller holds the lock."""
         self.node = node
-        self.clock = Clocks(node)
-        self.now = self.clock.now
+        clocks = Clocks(node)
+        self.now, self.stamp = clocks.now, clocks.stamp
         self.domain: int = node.context.get_domain_id()
         self.name: str = node.get_name()
         self.namespace: str = node.get_namespace()

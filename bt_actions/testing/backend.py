@@ -9,7 +9,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from bt_actions.goals.terms import Now
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
@@ -32,8 +31,12 @@ class VirtualBackend:
         self.host = host or VirtualHost(network.timeline, network.log, seed)
         self.participant = VirtualParticipant(network, "tree", network.namespace)
         self.traffic = Traffic(self.host, self.participant)
-        self.clock = VirtualClock(network)
+        self.now = self.participant.now
         self.randomness = self.host.randomness
+
+    def stamp(self) -> int:
+        """This moment in nanoseconds."""
+        return int(self.network.now() * 1e9)
 
     def service(self, service_type: type, name: str) -> VirtualService:
         """Become a client of a service."""
@@ -52,21 +55,6 @@ class VirtualBackend:
     def log(self, level: str, text: str) -> None:
         """Write a line of the tree's to the network's log."""
         self.network.log.add(level, text)
-
-
-class VirtualClock:
-    """Both clocks of a node are the virtual time."""
-
-    def __init__(self, network: VirtualNetwork) -> None:
-        self._network = network
-
-    def now(self) -> Now:
-        """This moment."""
-        return Now(self._network.now(), self._network.now())
-
-    def stamp(self) -> int:
-        """This moment in nanoseconds."""
-        return int(self._network.now() * 1e9)
 
 
 class _Connection:

@@ -20,16 +20,6 @@ LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 """What lines of a log may be called, and Python's numbers for it."""
 
 
-class Clock(Protocol):
-    """A node's two clocks."""
-
-    def now(self) -> Now:
-        """This moment."""
-
-    def stamp(self) -> int:
-        """The node's own clock in nanoseconds, as the headers of messages have it."""
-
-
 class Call(Protocol):
     """A call of a service, as futures are."""
 
@@ -95,12 +85,14 @@ class Backend(Protocol):
     traffic: Traffic
     """The goals of this node."""
 
-    @property
-    def clock(self) -> Clock:
-        """Time."""
-
     randomness: random.Random
     """What varies the pauses before retries."""
+
+    def now(self) -> Now:
+        """This moment, by the steady clock and by the node's own."""
+
+    def stamp(self) -> int:
+        """The node's own clock in nanoseconds, as the headers of messages have it."""
 
     def service(self, service_type: type, name: str) -> Service:
         """Become a client of a service."""

@@ -130,7 +130,7 @@ def test_what_is_a_backend_stands_for_itself(world: World) -> None:
 
 
 def test_time_goes_on_and_a_stamp_is_of_the_node_s_own_clock(world: World) -> None:
-    clock = world.backend.clock
+    clock = world.backend
     first, first_stamp = clock.now(), clock.stamp()
     world.until(lambda: clock.now().steady > first.steady and clock.now().ros > first.ros)
     assert isinstance(first_stamp, int)
