@@ -363,7 +363,6 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
 
     def _let_go(self) -> None:
         if self._backend is not None:
-            open_here = self.open_handles()  # a second server's share, too
-            self._left_behind = [each for each in open_here if each is not self._handle]
+            self._left_behind = self.open_handles()  # a second server's share, too
             self._backend.traffic.leave(self._own)
         self._backend = self._own = None

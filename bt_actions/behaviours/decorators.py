@@ -101,12 +101,11 @@ class Deadline(Gate):
         if not self._expired:
             return None
         below = [node for node in self.decorated.iterate() if isinstance(node, ActionBehaviour)]
-        stopping = [node.name for node in below if node.draining]
-        if stopping:
-            self.feedback_message = (
-                f"{self._seconds:g} s are over; waiting for {stopping[0]} to end"
-            )
-            return Status.RUNNING
+        for node in below:
+            if node.draining:
+                over = f"{self._seconds:g} s are over"
+                self.feedback_message = f"{over}; waiting for {node.name} to end"
+                return Status.RUNNING
         unknown = ", ".join(node.name for node in below if not node.drained)
         told = f"; the end of {unknown} is not known" if unknown else ""
         raise ValueError(f"not done within {self._seconds:g} s{told}")

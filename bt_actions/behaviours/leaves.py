@@ -26,9 +26,10 @@ class Wait(Leaf):
     def do(self) -> Status:
         if self.status is not Status.RUNNING:  # the first tick of a visit
             self.give(parse_duration(self._duration()))
-        left = self.left()
-        self.feedback_message = f"{left:.1f} s left" if left > 0.0 else ""
-        return Status.RUNNING if left > 0.0 else Status.SUCCESS
+        if (left := self.left()) <= 0.0:
+            return Status.SUCCESS
+        self.feedback_message = f"{left:.1f} s left"
+        return Status.RUNNING
 
 
 class WaitUntil(Leaf):

@@ -99,6 +99,5 @@ class ActionWithPorts(PortsMixin, ActionBehaviour):
 @functools.cache
 def leaf_of(tag: Any) -> type[ActionWithPorts]:
     """Return the class of leaves that a tag of ports.py stands for."""
-    members = ("ACTION_TYPE", "SERVER", "INPUT_PORTS", "OUTPUT_PORTS")
-    own = {name: getattr(tag, name) for name in members}
+    own = {name: value for name, value in vars(tag).items() if name.isupper()}
     return type(f"{tag.__name__}WithPorts", (ActionWithPorts,), own, register=False)

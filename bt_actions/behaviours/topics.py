@@ -54,12 +54,11 @@ class TopicValue(Connected[Subscription]):
         """The latest message. Raises ExpressionError when there is none, or it is too old."""
         if self._backend is None:
             raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
-        backend, subscription = self._there()
-        topic = subscription.name
+        topic = self._own.name
         if self._newest is None:
-            now = backend.now().steady
+            now = self._backend.now().steady
             if now >= self._look_again_at:  # a tree may ask at each tick
-                self._said, self._look_again_at = subscription.why_nobody(), now + 1.0
+                self._said, self._look_again_at = self._own.why_nobody(), now + 1.0
             raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._said}")
         message, since = self._newest
         age = since.passed()
@@ -218,7 +217,6 @@ class Publish(Connected[Publisher], Leaf):
         backend, publisher = self._there()
         topic, listeners = publisher.name, publisher.listeners
         some_may_come = publisher.may_come() > 0.0
-        self.warning = ""
         if listeners < (self._subscribers or some_may_come):
             if self._subscribers and not some_may_come and self.left() <= 0.0:
                 raise ValueError(
@@ -229,9 +227,8 @@ class Publish(Connected[Publisher], Leaf):
             return Status.RUNNING
         message: Any = fill(self._type, self._data(), now=backend.stamp)
         publisher.publish(message)
-        if not listeners:
-            self.warning = f"nobody listens on {topic}{publisher.why_nobody()}"
-        self.feedback_message = self.warning
+        why = "" if listeners else f"nobody listens on {topic}{publisher.why_nobody()}"
+        self.feedback_message = self.warning = why
         return Status.SUCCESS
 
     def due_in(self) -> float | None:

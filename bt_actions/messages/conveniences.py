@@ -10,6 +10,7 @@ import contextlib
 import math
 import re
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from bt_actions.messages.fields import constants
 from bt_actions.messages.interfaces import PARTS, UnknownInterface, called, interface, short_name
@@ -76,8 +77,7 @@ def constant(text: str, owner: type | None) -> object:
     match = _CONSTANT.fullmatch(text)
     if match is None or (match[1] is None and owner is None):
         return text
-    place = owner if match[1] is None else _class(match[1], owner)
-    assert place is not None
+    place: Any = owner if match[1] is None else _class(match[1], owner)
     known = constants(place)
     if match[2] not in known:
         near = what_it_has(match[2], known)

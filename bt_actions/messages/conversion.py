@@ -12,7 +12,6 @@ import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 from bt_actions.messages.conveniences import constant, duration_of, quaternion_of, time_of
@@ -34,7 +33,7 @@ from bt_actions.utilities.units import parse_angle
 Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")
-_CODES = MappingProxyType(dict(zip([*FLOATS, *INTEGERS], "fdbhiqBHIQ", strict=False)))
+_CODES = dict(zip([*FLOATS, *INTEGERS], "fdbhiqBHIQ", strict=False))
 """How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code. Those
 of the last type, `byte`, it keeps in a list."""
 _NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")

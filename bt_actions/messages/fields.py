@@ -17,13 +17,13 @@ from bt_actions.utilities.plain_data import scalar
 from bt_actions.utilities.suggest import what_it_has
 
 _BITS = (8, 16, 32, 64)
-INTEGERS = MappingProxyType(
-    {f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in _BITS}
-    | {f"uint{bits}": (0, 2**bits - 1) for bits in _BITS}
-    | {"byte": (0, 255)}
-)
+INTEGERS = {
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in _BITS},
+    **{f"uint{bits}": (0, 2**bits - 1) for bits in _BITS},
+    "byte": (0, 255),
+}
 """The least and the greatest value of each integer type."""
-FLOATS = MappingProxyType({"float32": 3.402823466e38, "float64": float("inf")})
+FLOATS = {"float32": 3.402823466e38, "float64": float("inf")}
 """The greatest finite value of each float type."""
 _NAMES = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
 
