@@ -77,7 +77,7 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
     It is RUNNING as long as the first message of one may still be on its way, which is so when a
     process has just begun. Its own code is not called before.
     """
-    tick, due_in = behaviour.tick, getattr(behaviour, "due_in", None)
+    tick, due_in = behaviour.tick, getattr(behaviour, "due_in", lambda: None)
     awaited: list[TopicValue] = []
 
     def tick_patiently() -> Iterator[Behaviour]:
@@ -91,10 +91,8 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
             behaviour.status = Status.INVALID  # its visit begins now
         yield from tick()
 
-    def due() -> float | None:
-        if awaited:
-            return max(topic.first_may_come() for topic in awaited)
-        return None if due_in is None else due_in()
+    def due() -> Any:
+        return max(topic.first_may_come() for topic in awaited) if awaited else due_in()
 
     behaviour.tick = tick_patiently  # type: ignore[method-assign]
     behaviour.due_in = due  # type: ignore[attr-defined]

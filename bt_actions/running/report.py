@@ -54,11 +54,6 @@ class Row:
     _latest: str = ""
 
     @property
-    def name(self) -> str:
-        """Of the leaf."""
-        return self.behaviour.name
-
-    @property
     def live(self) -> dict[str, str]:
         """The goals that may be running, also those that the leaf has left: their states by id."""
         return {
@@ -199,7 +194,9 @@ class Report:
     @property
     def servers_gone(self) -> list[str]:
         """The actions with a goal whose server went away; one that only stood still goes on."""
-        return [f"{row.name} on {row.server}" for row in self._rows.values() if row.left_at_server]
+        return [
+            f"{row.path[-1]} on {row.server}" for row in self._rows.values() if row.left_at_server
+        ]
 
     @property
     def decided(self) -> bool:

@@ -83,7 +83,11 @@ class TreeRunner:
         self._pid = os.getpid()
         self._spinner = wiring.spinner(
             self._wake_up.set,
-            may_share=all(map(_is_known, [self.tree, *self.tree.root.iterate()])),
+            # A user's class may leave anything on the node in its setup
+            may_share=all(
+                type(part).__module__.partition(".")[0] in ("bt_actions", "py_trees")
+                for part in [self.tree, *self.tree.root.iterate()]
+            ),
             node=node,
             executor=executor,
             name=name,
@@ -368,11 +372,6 @@ class TreeRunner:
         self._spinner.check()
         if error := self._spinner.error:
             raise TreeError(f"the spin thread died: {raised(error)}") from error
-
-
-def _is_known(part: object) -> bool:
-    """Whether its class is not a user's, whose setup may leave anything on the node."""
-    return type(part).__module__.partition(".")[0] in ("bt_actions", "py_trees")
 
 
 def _waits_for_itself(call: str, instead: str) -> RuntimeError:

@@ -71,7 +71,7 @@ class Watchdog:
         wanted = self._goals.wanted
         if not wanted:
             self._host.scheduler.remove(self)
-        if wanted and self.is_overdue(now) and not self._host.stalls.answers_take(now):
+        elif self.is_overdue(now) and not self._host.stalls.answers_take(now):
             self._give_up()
             for handle in wanted:
                 self._traffic.interrupt(handle)

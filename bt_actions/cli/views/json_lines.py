@@ -57,7 +57,7 @@ class JsonView:
                     "event": "goal",
                     "time": time,
                     "id": self._id(event.behaviour),
-                    "name": row.name,
+                    "name": row.path[-1],
                     "path": list(row.path),
                     "server": row.server,
                     "goal_id": event.goal_id,
@@ -138,7 +138,7 @@ class JsonView:
     def _action(self, row: Row) -> dict[str, object]:
         return {
             "id": self._id(row.behaviour),
-            "name": row.name,
+            "name": row.path[-1],
             "path": list(row.path),
             "server": row.server,
             "attempts": row.attempts,

@@ -144,7 +144,7 @@ def waiting_text(report: Report) -> str:
 
 
 def _where(rows: list[Row]) -> str:
-    which = ", ".join(f"{row.name} on {row.server}" for row in rows[:MOST])
+    which = ", ".join(f"{row.path[-1]} on {row.server}" for row in rows[:MOST])
     return f"{which} and {len(rows) - MOST} more" if len(rows) > MOST else which
 
 
