@@ -179,17 +179,19 @@ class TickLoop:
         if self.is_to_end(self._now):
             return None
         self.goals.tell(self._now)
-        wait = min(LONGEST_WAIT, max(0.0, self._deadline - self._now))
-        if self._held():
-            return min(wait, self._heartbeat)
-        goes_on = self._tick() and (self._visitor.may_go_on or self._has_others)
-        self._burst = (self._burst + 1) % BURST if goes_on else 0
-        if self.watchdog.gave_up:
-            return None
-        if self.tree.root.status in (Status.SUCCESS, Status.FAILURE):
-            self._status = self.tree.root.status
-            return None
-        return 0.0 if self._burst else min(wait, self._rests_for())
+        rest = self._heartbeat
+        if not self._held():
+            goes_on = self._tick() and (self._visitor.may_go_on or self._has_others)
+            self._burst = (self._burst + 1) % BURST if goes_on else 0
+            if self.watchdog.gave_up:
+                return None
+            if self.tree.root.status in (Status.SUCCESS, Status.FAILURE):
+                self._status = self.tree.root.status
+                return None
+            if self._burst:
+                return 0.0
+            rest = self._rests_for()
+        return min(rest, LONGEST_WAIT, max(0.0, self._deadline - self._now))
 
     def _set_up_missing(self) -> None:
         """Set up what was not yet: the tree, in the first run, or what is new in it."""
