@@ -205,7 +205,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         backend, _ = self._there()
         if self._outcome is not None:
             self.initialise()  # shut down while RUNNING, and set up again: another visit
-        traffic, handle = backend.traffic, self._handle
+        handle = self._handle
         assert handle is not None
         begun = False
         while True:
@@ -215,8 +215,8 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
                     return Status.RUNNING
                 handle, begun = self._begin(backend), True
-            traffic.advance(handle, self._make_message)
-            decided = traffic.is_decided(handle)  # then all of its feedback is here
+            backend.traffic.advance(handle, self._make_message)
+            decided = handle.is_decided  # then all of its feedback is here
             for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
                 message = handle.feedback.popleft()
                 if self.on_feedback is not None and not self._is_over():

@@ -7,11 +7,11 @@ that is set moves no deadline. Holds no deadline itself.
 from __future__ import annotations
 
 import math
+import threading
 import time
 from typing import Any
 
 from bt_actions.goals.terms import Now
-from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 
 MOMENT = 2.0
@@ -23,6 +23,7 @@ class Clocks:
 
     def __init__(self, node: Any) -> None:
         self._clock = node.get_clock()
+        self._lock = threading.Lock()
         self._simulated = False
         self._offset = 0.0
         self._last = time.monotonic()
@@ -30,7 +31,7 @@ class Clocks:
 
     def now(self) -> Now:
         """Return this moment."""
-        with host.lock:  # two threads that find time simulated must not both make up for it
+        with self._lock:  # two threads that find time simulated must not both make up for it
             return self._now()
 
     def stamp(self) -> int:

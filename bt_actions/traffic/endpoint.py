@@ -210,8 +210,7 @@ class ActionEndpoint:
 
     def goals_of(self, owner: Any) -> list[GoalHandle]:
         """Return a leaf's goals that are open here, also what a second server took."""
-        with self._host.lock:
-            return [handle for handle in self.handles if handle.owner is owner]
+        return [handle for handle in self.handles if handle.owner is owner]
 
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""

@@ -141,6 +141,14 @@ class GoalHandle:
         self.standing = Standing.of(self)
 
     @property
+    def is_decided(self) -> bool:
+        """Whether its outcome is decided, and its end and result are set as they are known then.
+
+        Asked without the lock: the step that decided it is over.
+        """
+        return self.standing.shown[1] is not None
+
+    @property
     def accounted_for(self) -> bool:
         """Whether the goal's end is known."""
         goal = self.goal

@@ -140,9 +140,9 @@ class Traffic:
         raises makes the goal INVALID_GOAL.
         """
         endpoint, handle.begun_in = handle.endpoint, begun_in.get() or handle.begun_in
+        if handle.goal.state is State.DONE:
+            return
         with self.host.lock:
-            if handle.goal.state is State.DONE:
-                return
             endpoint.apply_deadlines(handle)
             if self.host.closing:
                 endpoint.tell(handle, Event.INTERRUPTED)
@@ -193,11 +193,6 @@ class Traffic:
         for endpoint in to_see:  # all of them first: one may see what another has lost
             endpoint.observe_and_tell(now)
         return bool(to_see)
-
-    def is_decided(self, handle: GoalHandle) -> bool:
-        """Whether its outcome is decided, and its end and result are set as they are known then."""
-        with self.host.lock:  # a goal takes one step at a time
-            return handle.goal.outcome is not None
 
     def deadline(self, handle: GoalHandle, now: Now) -> tuple[Event, float] | None:
         """Its next deadline, and the seconds until then; these change with what arrives."""
