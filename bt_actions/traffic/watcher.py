@@ -17,11 +17,11 @@ from bt_actions.traffic.route import TOO_NEW, Route
 
 LOOK_WHILE_WAITING = 0.05
 LOOK_WHILE_RUNNING = 0.2
-LOOK_WHILE_LOST = LOOK_AT_REST = 1.0
+LOOK_AT_REST = 1.0
 DELIVER_EVERY = 0.01
-"""Seconds between two looks at a server: somebody waits for it; goals run on it; only its return
-would matter, or it is ready and alone, so that it does to count those in sight meanwhile (at least
-every AT_LEAST_EVERY). The last: between two takes of answers, where nobody spins."""
+"""Seconds between two looks at a server: somebody waits for it; goals are open on it; it is ready
+and alone, so that it does to count those in sight meanwhile, every LOOK_WHILE_RUNNING. The last:
+between two takes of answers, where nobody spins."""
 SILENT_FOR = 40.0
 """Seconds without a word of their server until goals whose node is gone are left to whoever can see
 whether it is there: longer than a dead one is shown, or a question is kept (DENIED_FOR_GOOD)."""
@@ -46,17 +46,11 @@ class Watcher:
         endpoint = self._endpoint
         if not endpoint.goals:
             return self.look_early(now)
-        if now >= self._look_at or self._counts_others():
+        if now >= self._look_at:
             (self.recent_state if self._rests else self.observe_and_tell)(now)
             handover.bound_the_lost(endpoint, self._host)
-            unclear = endpoint.watch.state(now) is Server.UNCLEAR
-            if unclear or endpoint.has_unsent:
-                self._look_at = now + LOOK_WHILE_WAITING
-            elif any(not handle.is_over for handle in endpoint.handles):
-                rests = self._looked_at + LOOK_AT_REST
-                self._look_at = rests if self._rests else now + LOOK_WHILE_RUNNING
-            else:
-                self._look_at = now + LOOK_WHILE_LOST
+            waits = endpoint.has_unsent or endpoint.watch.state(now) is Server.UNCLEAR
+            self._look_at = now + (LOOK_WHILE_WAITING if waits else LOOK_WHILE_RUNNING)
         wait = self._look_at - now
         endpoint.cancels.send_more(now)
         if endpoint.orphaned or self._route.elsewhere:
@@ -86,6 +80,8 @@ class Watcher:
         is_new = now - self._looked_at < LOOK_AT_REST and self._is_alone
         is_new &= endpoint.action not in endpoint.domain.lost  # what was left is canceled first
         if is_new and endpoint.participant.alive() and not self._counts_others():
+            if self._rests:
+                self._look_at = max(self._look_at, now + LOOK_WHILE_RUNNING)
             return Server.READY
         return self.observe_and_tell(now)
 
