@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -78,8 +79,11 @@ def found() -> list[Sent]:
 
 
 def on_record(directory: Path) -> list[Any]:
-    """What is there, in the order of the goals' ids."""
-    return [json.loads(path.read_bytes()) for path in sorted(directory.iterdir())]
+    """What is there."""
+    [path] = directory.iterdir()
+    text = path.read_bytes()
+    slots = (text[at : at + LENGTH].strip(b"\0") for at in range(0, len(text), LENGTH))
+    return [json.loads(slot) for slot in slots if slot]
 
 
 def test_what_a_dead_process_left_is_found(directory: Path) -> None:
@@ -119,8 +123,7 @@ def test_nothing_is_found_of_who_is_alive(ledger: Ledger, directory: Path) -> No
 
 def test_what_was_read_before_is_passed_over() -> None:
     die()
-    first, *others = found()
-    assert list(left_behind({first.path})) == others
+    assert list(left_behind({found()[0].path})) == []
 
 
 def test_what_more_is_known_of_a_goal_takes_its_place(ledger: Ledger, directory: Path) -> None:
@@ -152,7 +155,7 @@ def test_the_child_of_a_fork_leaves_its_parents_file_alone(ledger: Ledger, direc
 def test_without_room_it_complains_once_and_the_goal_goes_on(
     ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module.os, "write", lambda *_: 100)
+    monkeypatch.setattr(module.os, "pwrite", lambda *_: 100)
     for _ in range(3):
         ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
     (complaint,) = complaints
@@ -206,58 +209,93 @@ def test_a_directory_that_depends_on_where_one_stands_is_refused(
 
 
 ENTRY = {"action": "/a", "domain": 0, "servers": [], "accept": 0.0, "lost": False}
-WRONG = {"accept": math.inf}, {"accept": "x"}, {"accept": -1}, {"action": ["x"]}, {"domain": "0"}
+WRONG = (
+    {"accept": math.inf}, {"accept": "x"}, {"accept": -1}, {"action": ["x"]}, {"domain": "0"},
+    {"goal": 1}, {"goal": "00" * 16},
+)  # fmt: skip
+DEAD = new_goal_id()[:6] + (2**22 + 1).to_bytes(4, "big") + b"ab"
 
 
-def put(directory: Path, *texts: bytes) -> list[str]:
-    """Have these on record of a dead process; return the ids of their goals."""
+def put(directory: Path, *texts: bytes) -> None:
+    """Have these on record of a dead process."""
     directory.mkdir(mode=0o700, parents=True)
-    dead = new_goal_id()[:6] + (2**22 + 1).to_bytes(4, "big") + b"ab"
-    ids = [(dead + number.to_bytes(4, "big")).hex() for number in range(len(texts))]
-    for goal_id, text in zip(ids, texts, strict=True):
-        (directory / f"{goal_id}.goal").write_bytes(text)
-    return ids
+    text = b"".join(each.ljust(LENGTH) if each else b"\0" * LENGTH for each in texts)
+    (directory / f"{DEAD.hex()}.goals").write_bytes(text)
 
 
-NONSENSE = [b"nonsense", b"[" * 1000, b'"goal"', b"[]", b"\0" * LENGTH, b"\xff\xfe", b'{"goal": ']
+def entry(number: int, **other: Any) -> bytes:
+    """What is on record of a goal of that process."""
+    return json.dumps({"goal": (DEAD + bytes([0, 0, 0, number])).hex(), **ENTRY, **other}).encode()
+
+
+NONSENSE = [b"nonsense", b"[" * 1000, b'"goal"', b"[]", b"\xff\xfe", b'{"goal": ']
 
 
 @pytest.mark.parametrize(
     "text",
-    [*NONSENSE, *(json.dumps({**ENTRY, **wrong}).encode() for wrong in WRONG)],
-    ids=["a word", "deep", "a text", "a list", "zeros", "no text", "cut off", *map(str, WRONG)],
+    [*NONSENSE, *(entry(1, **wrong) for wrong in WRONG)],
+    ids=["a word", "deep", "a text", "a list", "no text", "cut off", *map(str, WRONG)],
 )
 def test_what_makes_no_sense_is_told_and_hides_no_other(text: bytes, directory: Path) -> None:
-    _bad, good = put(directory, text, json.dumps(ENTRY).encode())
-    assert [sent.goal_id.hex() for sent in found()] == [good]
+    put(directory, entry(0), text, entry(2))
+    assert [sent.goal_id[-1] for sent in found()] == [0, 2]
     [trouble] = troubles
     assert "damaged" in str(trouble)
 
 
 def test_who_was_killed_before_it_wrote_had_sent_nothing(directory: Path) -> None:
-    _empty, good = put(directory, b"", json.dumps(ENTRY).encode())
-    assert [sent.goal_id.hex() for sent in found()] == [good]
+    put(directory, b"", entry(1))
+    assert [sent.goal_id[-1] for sent in found()] == [1]
     assert troubles == []
 
 
 def test_what_cannot_be_read_is_told(directory: Path) -> None:
-    ids = die()
-    (directory / f"{ids[0]}.goal").unlink()
-    (directory / f"{ids[0]}.goal").mkdir()
-    (directory / "nonsense.goal").touch()
-    (directory / "00.goal").touch()
-    assert [sent.goal_id.hex() for sent in found()] == [ids[2], ids[3]]
+    put(directory, entry(0))
+    (directory / f"{(DEAD[:-1] + b'a').hex()}.goals").mkdir()
+    (directory / "nonsense.goals").touch()
+    (directory / "00.goals").touch()
+    assert [sent.goal_id[-1] for sent in found()] == [0]
     assert [type(trouble) for trouble in troubles] == [IsADirectoryError]
 
 
-def test_the_next_process_removes_what_nobody_wants(ledger: Ledger, directory: Path) -> None:
-    ids = die()
-    past = time.time() - KEPT_FOR - 1.0
-    os.utime(directory / f"{ids[0]}.goal", (past, past))
-    ours = new_goal_id()
-    ledger.enter(ours, Entry("/move", 0, SERVERS))
-    left = {path.stem for path in directory.iterdir()}
-    assert left == {ids[2], ids[3], ours.hex()}
+@pytest.mark.parametrize("why", ["it is old", "nothing is on it"])
+def test_the_next_process_removes_what_nobody_wants(
+    why: str, ledger: Ledger, directory: Path
+) -> None:
+    die()
+    [dead] = directory.iterdir()
+    if why == "it is old":
+        past = time.time() - KEPT_FOR - 1.0
+        os.utime(dead, (past, past))
+    else:
+        dead.write_bytes(b"\0" * LENGTH)
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    assert dead not in directory.iterdir()
+    assert len(on_record(directory)) == 1
+
+
+def test_who_ends_leaves_nothing_unless_a_goal_is_open(ledger: Ledger, directory: Path) -> None:
+    answered, is_open = new_goal_id(), new_goal_id()
+    ledger.enter(answered, Entry("/move", 0, SERVERS))
+    ledger.enter(is_open, Entry("/move", 0, SERVERS))
+    ledger.strike(answered)
+    ledger.close()
+    assert [each["goal"] for each in on_record(directory)] == [is_open.hex()]
+    ledger.enter(answered, Entry("/move", 0, SERVERS))
+    assert len(on_record(directory)) == 2
+    ledger.strike(answered)
+    ledger.close()
+    assert len(on_record(directory)) == 1
+
+
+def test_a_directory_that_is_removed_meanwhile_is_made_again(
+    ledger: Ledger, directory: Path
+) -> None:
+    """Who logs out may have all of /dev/shm removed."""
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    shutil.rmtree(directory)
+    ledger.enter(new_goal_id(), Entry("/move", 1, SERVERS))
+    assert [each["domain"] for each in on_record(directory)] == [1]
 
 
 def test_what_is_elsewhere_is_told_apart(directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:

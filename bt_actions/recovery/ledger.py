@@ -2,13 +2,14 @@
 
 A server shows the goals that it has accepted. Of one that it has received, and has not decided on
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
-So each goal without an answer has a file, named by its id, which tells its process (goals/ids.py).
-It outlives that process, and cleanup reads it (recovery/sweep.py). It lies in memory
-(/dev/shm), so that writing it waits for no disk, in a directory that only this user may write to.
+So each process has a file, named by what its goals' ids begin with (goals/ids.py), with a slot for
+each goal without an answer. It outlives a process that is killed, and cleanup reads it
+(recovery/sweep.py). It lies in memory (/dev/shm), so that writing it waits for no disk, in a
+directory that only this user may write to.
 
-It is written before the goal is sent, and removed when that has been answered; not where its server
-went away, which may only stand still. What is read is believed no further than that a question
-about a goal is worth asking.
+A slot is written before the goal is sent, and blank again when that has been answered; not where
+its server went away, which may only stand still. What is read is believed no further than that a
+question about a goal is worth asking.
 """
 
 from __future__ import annotations
@@ -29,12 +30,15 @@ from bt_actions.traffic.host import Entry, Record
 DIRECTORY = "BT_ACTIONS_LEDGER"
 """The environment variable that names another directory: one that outlives a container, say."""
 LENGTH = 1024
-"""Bytes of a file, so that it is replaced in place: the longest action name has 255."""
+"""Bytes of a slot; the longest action name has 255."""
 SERVERS_AT_MOST = 8
 """Servers of a goal on record; where there are more, none is."""
 KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up."""
-_SUFFIX = ".goal"
+_SUFFIX = ".goals"
+_BLANK = b"\0" * LENGTH
+_AUTHOR = 12
+"""Bytes of a goal's id that tell its process."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,16 +49,23 @@ class Sent(Entry):
     author: Author
     """Who is dead, or not `here`."""
     path: Path
+    at: int
+    """Where in the file its slot begins."""
 
     def strike(self) -> None:
         """It need not be asked for any more; where that fails, it is."""
+        self._write(_BLANK)
         with contextlib.suppress(OSError):
-            self.path.unlink()
+            if _is_blank(self.path):
+                self.path.unlink()
 
     def mark_lost(self) -> None:
         """Have it on record that its servers are not in sight."""
-        with contextlib.suppress(OSError):
-            _write(self.path, replace(self, lost=True))
+        self._write(_slot(self.goal_id, replace(self, lost=True)))
+
+    def _write(self, text: bytes) -> None:
+        with contextlib.suppress(OSError), self.path.open("r+b") as file:
+            os.pwrite(file.fileno(), text, self.at)
 
 
 class Ledger(Record):
@@ -66,27 +77,28 @@ class Ledger(Record):
     def __init__(self, complain: Callable[[str], None]) -> None:
         self._complain = complain
         self._complained = False
-        self._home: Path | None = None
-        self._paths: dict[bytes, str] = {}
+        self._path = Path()
+        self._file: int | None = None
+        self._end = 0
+        self._slots: dict[bytes, int] = {}
+        self._free: list[int] = []
 
     def __contains__(self, goal_id: bytes) -> bool:
         """Whether a goal is on record."""
-        return goal_id in self._paths
+        return goal_id in self._slots
 
     def enter(self, goal_id: bytes, entry: Entry) -> None:
         """Put a goal on record that is about to be sent, or what more is known of it."""
         if len(entry.servers) > SERVERS_AT_MOST:
             entry = replace(entry, servers=frozenset())
         try:
-            if self._home is None:
-                self._home = directory()
-                _tidy(self._home)
-            path = self._paths[goal_id] = f"{self._home}/{goal_id.hex()}{_SUFFIX}"
-            try:
-                _write(path, entry, os.O_CREAT)
-            except FileNotFoundError:  # who logs out may have all of /dev/shm removed
-                directory()
-                _write(path, entry, os.O_CREAT)
+            file = self._opened(goal_id)
+            at = self._slots.get(goal_id)
+            if at is None:
+                at = self._slots[goal_id] = self._free.pop() if self._free else self._end
+                self._end = max(self._end, at + LENGTH)
+            if os.pwrite(file, _slot(goal_id, entry), at) < LENGTH:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             if not self._complained:
                 self._complained = True
@@ -95,16 +107,39 @@ class Ledger(Record):
                     f"be cleaned up: they cannot be put on record: {error}"
                 )
 
+    def _opened(self, goal_id: bytes) -> int:
+        if self._file is not None and not os.fstat(self._file).st_nlink:
+            self.disown()  # who logs out may have all of /dev/shm removed
+        if self._file is None:
+            home = directory()
+            _tidy(home)
+            self._path = home / (goal_id[:_AUTHOR].hex() + _SUFFIX)
+            self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            self._end = os.fstat(self._file).st_size
+        return self._file
+
     def strike(self, goal_id: bytes) -> None:
         """Take a goal off the record, if it is there."""
-        path = self._paths.pop(goal_id, None)
-        if path is not None:
+        at = self._slots.pop(goal_id, None)
+        if at is not None and self._file is not None:
+            self._free.append(at)
             with contextlib.suppress(OSError):
-                os.unlink(path)  # noqa: PTH108 - a Path takes four times as long
+                os.pwrite(self._file, _BLANK, at)
+
+    def close(self) -> None:
+        """Remove the file, as the process ends, unless there is a goal on it."""
+        with contextlib.suppress(OSError):
+            if self._file is not None and _is_blank(self._path):
+                self._path.unlink()
+        self.disown()
 
     def disown(self) -> None:
         """Let go of all, as the child of a fork: it is the parent's."""
-        self._paths.clear()
+        if self._file is not None:
+            os.close(self._file)
+        self._file = None
+        self._slots.clear()
+        self._free.clear()
 
 
 def left_behind(passed_over: Collection[Path] = ()) -> Iterator[Sent | OSError]:
@@ -124,13 +159,16 @@ def left_behind(passed_over: Collection[Path] = ()) -> Iterator[Sent | OSError]:
         author = None if path in passed_over else _gone_author(path)
         if author is None:
             continue
-        with contextlib.suppress(FileNotFoundError):  # another cleanup was faster
-            if path.stat().st_size == 0:
-                continue  # killed before it was written, and so before the goal was sent
-            try:
-                yield _read(path, author)
-            except OSError as error:
-                yield error
+        try:
+            text = path.read_bytes()
+        except FileNotFoundError:  # another cleanup was faster
+            continue
+        except OSError as error:
+            yield error
+            continue
+        for at in range(0, len(text), LENGTH):
+            if (slot := text[at : at + LENGTH]).strip(_BLANK):
+                yield _read(slot, author, path, at)
 
 
 def directory(*, make: bool = True) -> Path:
@@ -157,47 +195,49 @@ def directory(*, make: bool = True) -> Path:
 def _gone_author(path: Path) -> Author | None:
     """Return whose file it is, if it is dead, or elsewhere; None: nobody's of ours."""
     try:
-        author = author_of(bytes.fromhex(path.stem))
+        author = author_of(bytes.fromhex(path.stem).ljust(16, b"\0"))
     except ValueError:
         return None
     return None if author is None or (author.here and author.alive) else author
 
 
-def _write(path: str | Path, entry: Entry, how: int = 0) -> None:
+def _slot(goal_id: bytes, entry: Entry) -> bytes:
+    """Return what a slot holds."""
     plain = {
+        "goal": goal_id.hex(),
         "action": entry.action,
         "domain": entry.domain,
         "servers": sorted(each.hex() for each in entry.servers),
         "accept": min(entry.accept, KEPT_FOR),
         "lost": entry.lost,
     }
-    text = json.dumps(plain).encode().ljust(LENGTH)
-    file = os.open(path, os.O_WRONLY | os.O_CLOEXEC | how, 0o600)
-    try:
-        if os.write(file, text) < len(text):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    finally:
-        os.close(file)
+    return json.dumps(plain).encode().ljust(LENGTH)
 
 
-def _read(path: Path, author: Author) -> Sent:
-    """Return what is in a file. Raises OSError where it cannot be read, or makes no sense."""
-    text = path.read_bytes()
+def _read(slot: bytes, author: Author, path: Path, at: int) -> Sent | OSError:
+    """Return what is in a slot, or what to say where it makes no sense."""
     try:
-        entry = json.loads(text)
+        entry = json.loads(slot)
+        goal_id = bytes.fromhex(entry.pop("goal"))
         is_sound = isinstance(entry["action"], str) and isinstance(entry["domain"], int)
-        if not (is_sound and 0.0 <= entry["accept"] <= KEPT_FOR):
+        if not (is_sound and 0.0 <= entry["accept"] <= KEPT_FOR and author_of(goal_id) == author):
             raise ValueError
         entry["servers"] = frozenset(map(bytes.fromhex, entry["servers"]))
-        return Sent(goal_id=bytes.fromhex(path.stem), author=author, path=path, **entry)
-    except (ValueError, KeyError, TypeError, RecursionError):
+        return Sent(goal_id=goal_id, author=author, path=path, at=at, **entry)
+    except (AttributeError, ValueError, KeyError, TypeError, RecursionError):
         what = "damaged, or of another version (remove it when nothing runs there)"
-        raise OSError(errno.EBADMSG, what, str(path)) from None
+        return OSError(errno.EBADMSG, what, str(path))
+
+
+def _is_blank(path: Path) -> bool:
+    return not path.read_bytes().strip(_BLANK)
 
 
 def _tidy(directory: Path) -> None:
-    """Remove what the dead have left and nobody has wanted for long."""
+    """Remove what the dead have left where nobody has wanted it for long, or nothing is on it."""
     for path in directory.glob("*" + _SUFFIX):
         with contextlib.suppress(OSError):
-            if time.time() - path.lstat().st_mtime > KEPT_FOR and _gone_author(path) is not None:
+            is_old = time.time() - path.lstat().st_mtime > KEPT_FOR
+            author = _gone_author(path)
+            if author is not None and (is_old or (author.here and _is_blank(path))):
                 path.unlink()

@@ -42,6 +42,7 @@ def close_process() -> None:
             for handle in left:
                 if not handle.is_over:
                     log.error(f"{handle.goal!r}: the process ends and cannot account for it")
+            host.record.close()
             log.flush()
 
 

@@ -63,6 +63,9 @@ class Record:
     def strike(self, goal_id: bytes) -> None:
         """Take a goal off the record, if it is there."""
 
+    def close(self) -> None:
+        """Take note that the process ends."""
+
     def disown(self) -> None:
         """Let go of it, as the child of a fork: it is the parent's."""
 

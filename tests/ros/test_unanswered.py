@@ -177,7 +177,7 @@ def test_what_one_of_two_servers_shows_stays_on_record(
 ) -> None:
     author = Author(here=True, pid=2**22 + 1, started=b"ab")
     path = tmp_path / "x"
-    sent = Sent("/move", 0, frozenset(servers), goal_id=b"goal", author=author, path=path)
+    sent = Sent("/move", 0, frozenset(servers), goal_id=b"goal", author=author, path=path, at=0)
     left = LeftBehind(RollCall("/move"), b"goal", 1, shown=End.CANCELED)
     over = Cleanup()
     over._sent[b"goal"], over._left[b"goal"] = sent, left
