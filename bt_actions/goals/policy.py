@@ -6,8 +6,8 @@ nothing here decides what happens to a goal (that is goal.py) or when to try aga
 
 from __future__ import annotations
 
-import math
 import random
+import sys
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -101,14 +101,10 @@ RETRYABLE = RETRIED_BY_DEFAULT | RETRIED_IF_NAMED
 def _seconds(field: str, value: Any, *, zero: bool) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{field} must be a number of seconds, not {value!r}")
-    try:
-        seconds = float(value)
-    except OverflowError:  # a whole number beyond all floats
-        seconds = math.inf
-    if not math.isfinite(seconds) or seconds < 0 or (seconds == 0 and not zero):
+    if not 0 <= value <= sys.float_info.max or (value == 0 and not zero):
         least = "zero or more" if zero else "more than zero"
         raise ValueError(f"{field} must be {least} and finite, not {value!r:.40}")
-    return seconds
+    return float(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,10 +167,9 @@ class Retry:
     when: Callable[[Any], bool] | str | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.attempts, bool) or not isinstance(self.attempts, int):
-            raise ValueError(f"retry.attempts must be a whole number, not {self.attempts!r}")
-        if self.attempts < 1:
-            raise ValueError(f"retry.attempts must be 1 or more, not {self.attempts}")
+        attempts = self.attempts
+        if isinstance(attempts, bool) or not isinstance(attempts, int) or attempts < 1:
+            raise ValueError(f"retry.attempts must be a whole number from 1 on, not {attempts!r}")
         for field in ("backoff", "factor", "max_backoff", "jitter"):
             checked = _seconds(f"retry.{field}", getattr(self, field), zero=field != "factor")
             object.__setattr__(self, field, checked)

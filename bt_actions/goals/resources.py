@@ -25,9 +25,8 @@ class Resources(Generic[Holder]):
 
     def request(self, holder: Holder, names: frozenset[str], busy: Busy) -> Event | None:
         """Ask, once, for all of `names`; return GRANTED or TAKEN, or None where it has to wait."""
-        free = not self.holders(names)
-        waits = free and any(names & wanted for wanted in self._queue.values())
-        if busy in (Busy.REPLACE, Busy.SHARE) or (free and not waits):
+        taken = self.holders(names) or any(names & wanted for wanted in self._queue.values())
+        if busy in (Busy.REPLACE, Busy.SHARE) or not taken:
             self._held[holder] = names
             return Event.GRANTED
         if busy is Busy.FAIL:

@@ -29,7 +29,8 @@ class RosHost:
         self.steady, self.new_goal_id = time.monotonic, new_goal_id
         self.lock = threading.RLock()
         """Taken before a lock of rclpy's, or of a transport's, never after."""
-        self.changed = threading.Condition(self.lock)
+        changed = threading.Condition(self.lock)
+        self.wait, self.notify_all = changed.wait, changed.notify_all
         self.log = log
         self.record = Record()
         """Replaced in wiring.py by one that is kept."""

@@ -96,9 +96,9 @@ class Replies:
 
     def _accepted(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
         """Take an answer to the goal request: accepted or not."""
-        if sum(answers) > 1 and len(self.sent_to | watch.gids) == 1:
-            return None  # by one, twice
         accepted = sum(answers)
+        if accepted > 1 and len(self.sent_to | watch.gids) == 1:
+            return None  # by one, twice
         if accepted:
             self._refused = False
             self.spoke(watch, now)

@@ -22,7 +22,6 @@ class VirtualHost:
 
     def __init__(self, timeline: Timeline, log: Lines, seed: int = 0) -> None:
         self.lock = nullcontext()
-        self.changed = _Changed(timeline)
         self.log = log
         self.record = Record()
         self.stalls = Stalls()
@@ -48,6 +47,13 @@ class VirtualHost:
     def new_goal_id(self) -> bytes:
         """Return the next 16 bytes of the seed."""
         return self.randomness.randbytes(16)
+
+    def wait(self, timeout: float) -> bool:
+        """Let the next thing happen that is due within `timeout` seconds."""
+        return self._timeline.advance(self._timeline.now + timeout)
+
+    def notify_all(self) -> None:
+        """Wake nobody: who waits looks again after each thing that happens."""
 
     # The alarm
 
@@ -79,19 +85,3 @@ class VirtualHost:
 
     def _failed(self, endpoint: Scheduled, error: Exception) -> None:
         raise error
-
-
-class _Changed:
-    """Whoever waits lets the time pass."""
-
-    def __init__(self, timeline: Timeline) -> None:
-        self._timeline = timeline
-
-    def wait(self, timeout: float | None = None) -> bool:
-        """Let the next thing happen that is due within `timeout` seconds."""
-        if timeout is None:
-            raise RuntimeError("in virtual time nobody waits without a limit")
-        return self._timeline.advance(self._timeline.now + timeout)
-
-    def notify_all(self) -> None:
-        """Wake nobody: who waits looks again after each thing that happens."""

@@ -51,8 +51,11 @@ def is_clear(handle: GoalHandle, left: Iterable[GoalHandle], now: float) -> bool
     endpoint = handle.endpoint
     at_server = (each for each in endpoint.domain.open if each.action == endpoint.action)
     in_flight = sum(each.goal.in_flight for one in at_server for each in one.goals.values())
+    just_came = now - endpoint.watch.in_sight_since < BESIDE  # another server may be shown later
     return in_flight < IN_FLIGHT and not any(
-        each.goal.outstanding or _may_come_back_for(each, handle, now) for each in left
+        each.goal.outstanding
+        or (each.goal.lost and just_came and each.endpoint.action != endpoint.action)
+        for each in left
     )
 
 
@@ -88,12 +91,3 @@ def _may_overtake(handle: GoalHandle) -> bool:
     rivals = holders[:at] if handle.goal.busy is Busy.REPLACE else []
     rivals += [other for other in holders[at + 1 :] if other.goal.busy is Busy.REPLACE]
     return any(other.goal.request_pending and other.endpoint.action == action for other in rivals)
-
-
-def _may_come_back_for(left: GoalHandle, handle: GoalHandle, now: float) -> bool:
-    """Whether it was lost, and its server may only be shown later than that of this one.
-
-    It is canceled first where its server is seen in time.
-    """
-    elsewhere = left.endpoint.action != handle.endpoint.action
-    return left.goal.lost and elsewhere and now - handle.endpoint.watch.in_sight_since < BESIDE

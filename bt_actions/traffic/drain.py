@@ -35,7 +35,7 @@ def drain(
     drains = Drain(host, handles)
     while isinstance(step := drains.step(host.steady(), hurry=hurry()), Sleep):
         with host.lock:
-            host.changed.wait(step.seconds)
+            host.wait(step.seconds)
     return step.result
 
 

@@ -210,7 +210,7 @@ class Driver:
             log.info(f"{goal!r}: accounted for at last")
         if handle.begun_in is not None:
             handle.begun_in.tell(handle)
-        self._host.changed.notify_all()
+        self._host.notify_all()
 
     def _wake_waiting(self, handle: GoalHandle) -> None:
         """Wake those of all nodes whose goals may have waited for this one.

@@ -18,27 +18,24 @@ LOST_KEPT = 100
 
 
 def take_over(endpoint: Endpoint, now: float) -> None:
-    """Take lost goals of other nodes whose server is in sight here: it is to cancel them first."""
-    for handle in list(endpoint.domain.handles()):
-        other = handle.endpoint
-        if not handle.goal.lost or other is endpoint or other.action != endpoint.action:
-            continue
-        if _sees_more(endpoint, other, handle.replies.sent_to, now):
-            endpoint.take_in(handle)
-            other.retire(handle)
+    """Take lost goals of other nodes whose server is in sight here: it is to cancel them first.
 
-
-def _sees_more(endpoint: Endpoint, other: Endpoint, servers: frozenset[bytes], now: float) -> bool:
-    """Whether one of `servers` is here that has gone for `other`, or is taken there for a dead one.
-
-    A dead server is shown until its lease runs out. Where both endpoints see the same, the goal
-    stays where it is: else they would hand it to each other in turn.
+    If it has gone for the other, or is taken there for a dead one, which is shown until its lease
+    runs out. Where both endpoints see the same, the goal stays where it is: else they would hand it
+    to each other in turn.
     """
     watch = endpoint.watch
-    if not servers & watch.gids or watch.state(now) is Server.ABSENT:
-        return False
-    taken_for_dead = watch.all_live(now) and not other.watch.all_live(now)
-    return other.orphaned or other.watch.gone(now, servers) or taken_for_dead
+    if watch.state(now) is Server.ABSENT:
+        return
+    for handle in list(endpoint.domain.handles()):
+        other, servers = handle.endpoint, handle.replies.sent_to
+        not_others = other is endpoint or other.action != endpoint.action
+        if not_others or not handle.goal.lost or not servers & watch.gids:
+            continue
+        taken_for_dead = watch.all_live(now) and not other.watch.all_live(now)
+        if other.orphaned or other.watch.gone(now, servers) or taken_for_dead:
+            endpoint.take_in(handle)
+            other.retire(handle)
 
 
 def adopt(endpoint: Endpoint, host: Host) -> None:

@@ -70,16 +70,6 @@ class Record:
         """Let go of it, as the child of a fork: it is the parent's."""
 
 
-class Changed(Protocol):
-    """A condition of the lock (threading.Condition)."""
-
-    def wait(self, timeout: float | None = None) -> bool:
-        """Wait for a change, at most so many seconds; the caller holds the lock."""
-
-    def notify_all(self) -> None:
-        """Wake whoever waits; the caller holds the lock."""
-
-
 class Trace:
     """Is told of every step of every goal, under the lock; this one takes no note."""
 
@@ -106,10 +96,6 @@ class Host(Protocol):
         """The one lock; whoever holds it may take it again. Nothing waits under it."""
 
     @property
-    def changed(self) -> Changed:
-        """Notified at every change of any goal."""
-
-    @property
     def log(self) -> Log:
         """Where lines go."""
 
@@ -133,6 +119,12 @@ class Host(Protocol):
 
     def domain(self, number: int) -> Domain:
         """Return what is shared in the ROS domain of this number."""
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for a change of any goal, at most so many seconds; the caller holds the lock."""
+
+    def notify_all(self) -> None:
+        """Wake whoever waits, as a goal has changed; the caller holds the lock."""
 
     def steady(self) -> float:
         """Return seconds that only ever go forward."""

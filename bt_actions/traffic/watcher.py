@@ -124,7 +124,10 @@ class Watcher:
         alive = endpoint.participant.alive()
         if not alive:
             self._orphan()
-        self._deliver_pending(now)
+        if watch.is_crowded:  # before silence is judged
+            if self._host.stalls.answers_take(self._host.steady()):
+                watch.stood_still(now)
+            endpoint.deliver_arrived()
         if endpoint.transport.closed:  # by what came, and nobody used the endpoint
             return Server.ABSENT
         if not alive:
@@ -193,13 +196,6 @@ class Watcher:
         self._counted = transport.count()
         ready, servers = transport.ready(), transport.servers()
         self._endpoint.watch.observe(now, ready, servers, concludes=concludes)
-
-    def _deliver_pending(self, now: float) -> None:
-        """Deliver pending answers before judging silence, where several servers are shown."""
-        if self._endpoint.watch.is_crowded:
-            if self._host.stalls.answers_take(self._host.steady()):
-                self._endpoint.watch.stood_still(now)
-            self._endpoint.deliver_arrived()
 
     def _orphan(self) -> None:
         """Our node is gone, or its context: nobody can want these goals any more."""

@@ -210,7 +210,6 @@ class ModelHost:
     def __init__(self, caller: Caller) -> None:
         self.caller = caller
         self.lock = contextlib.nullcontext()
-        self.changed = self
         self.log, self.record, self.trace = ModelLog(caller), Record(), Witness(caller)
         self.stalls = Stalls()
         self.scheduler = Scheduler(self.steady, self.stalls, lambda: None, lambda *_: None)
@@ -227,9 +226,9 @@ class ModelHost:
 
     def notify_all(self) -> None: ...
 
-    def wait(self, timeout: float | None = None) -> bool:
+    def wait(self, timeout: float) -> bool:
         """Nobody else is there to change anything meanwhile."""
-        self.caller.passes(timeout or 0.0)
+        self.caller.passes(timeout)
         return False
 
 

@@ -82,8 +82,8 @@ def test_who_holds_the_lock_may_take_it_again_and_wait_for_a_change(world: Any) 
     host, _ = world
     with host.lock, host.lock:
         before = host.steady()
-        host.changed.notify_all()
-        host.changed.wait(0.01)
+        host.notify_all()
+        host.wait(0.01)
         assert host.steady() >= before
 
 
