@@ -47,7 +47,6 @@ def both() -> Figures:
 
     def save() -> None:
         reading.read(result)
-        reading.write()
 
     times = [(_us(lambda: Blackboard.set(key, result.sequence)), _us(save)) for _ in range(TIMES)]
     alone, saved = zip(*times, strict=True)

@@ -187,6 +187,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         if wrong := self._reading.unknown_field(action.Result):
             raise ValueError(f"{self.name}: {wrong}")
         self.action_type = action
+        self._reading.announce()
         super().setup(**kwargs)
 
     def _make(self, backend: Backend) -> ActionEndpoint:

@@ -10,7 +10,7 @@ import ast
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from py_trees.blackboard import Blackboard
+from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.variables import key, read
 from bt_actions.expressions.expression import Expression, ExpressionError
@@ -62,6 +62,11 @@ class Reading:
         compute = expression.evaluate if what == "save" else expression.holds
         return lambda result: compute(self._names(result), read)
 
+    def announce(self) -> None:
+        """Tell the blackboard of the keys, so that it shows them."""
+        for name in self._save:
+            Blackboard.metadata.setdefault(name, KeyMetaData())
+
     def unknown_field(self, result_type: Any) -> str:
         """Say which field one of them reads that a result of this type has not; or ""."""
         for what, expression in self._written:
@@ -84,6 +89,5 @@ class Reading:
             saved = [(name, value(result)) for name, value in self._save.items()]
         except ValueError as error:  # ExpressionError, or what is saved does not fit
             return str(error)
-        for name, value in saved:
-            Blackboard.set(name, value)
+        Blackboard.storage.update(saved)
         return ""
