@@ -37,7 +37,7 @@ from rclpy.qos import QoSProfile, qos_profile_action_status_default
 from rclpy.type_support import check_for_type_support
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions.goals.terms import NEVER
+from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, NEVER
 from bt_actions.ros.graph import servers
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
@@ -168,7 +168,10 @@ class RosTransport:
                 for message in _all(handle.take_feedback, impl.FeedbackMessage, None):
                     put((tell.feedback_came, (bytes(message.goal_id.uuid), message.feedback), None))
                 for number, answer in _all(handle.take_cancel_response, CancelGoal.Response):
-                    self._file("cancel", number, _cancel_code(answer))
+                    code = answer.return_code
+                    if code == CANCEL_ACCEPTED and not answer.goals_canceling:
+                        code = CANCEL_REJECTED  # as rclpy's servers have it
+                    self._file("cancel", number, code)
                 for number, answer in _all(
                     handle.take_result_response, impl.GetResultService.Response
                 ):
@@ -240,11 +243,3 @@ class RosTransport:
 def _all(take: Callable[[Any], Any], kind: Any, nothing: Any = (None, None)) -> Iterator[Any]:
     """Take all that has come of a kind, but not too many at a time; `nothing` ends it."""
     return itertools.islice(iter(functools.partial(take, kind), nothing), TAKE_AT_MOST)
-
-
-def _cancel_code(response: Any) -> int:
-    """Return the code that is meant: rclpy's servers answer 0 with an empty list for a refusal."""
-    code = int(response.return_code)
-    if code == CancelGoal.Response.ERROR_NONE and not response.goals_canceling:
-        return int(CancelGoal.Response.ERROR_REJECTED)
-    return code

@@ -60,7 +60,7 @@ class Outlook:
 
     def close(self) -> None:
         """Take it away, where it was not handed over."""
-        participant.close(self._node, self.context)
+        participant.close(self._node)
 
 
 def named_node(name: str, context: Context, namespace: str) -> Node:

@@ -117,4 +117,4 @@ def onlooker(namespace: str) -> Iterator[Onlooker]:
     try:
         yield Onlooker(node)
     finally:
-        participant.close(node, node.context)
+        participant.close(node)

@@ -47,7 +47,7 @@ def parameters_in(words: Sequence[str], namespace: str = "", name: str = "") -> 
         try:
             found = node.get_parameters_by_prefix("")
         finally:
-            participant.close(node, node.context)
+            participant.close(node)
     except RuntimeError as error:  # rclpy's RCLError
         if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
             unknown = shlex.join(ast.literal_eval(str(error)))

@@ -76,7 +76,7 @@ class SecondParticipant:
 
     def close(self) -> None:
         """Take the participant away."""
-        participant.close(self.node, self.node.context)
+        participant.close(self.node)
 
 
 def look_for(seeker: Seeker, action: str, domain: int, enclave: str) -> None:

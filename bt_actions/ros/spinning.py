@@ -299,7 +299,7 @@ class Spinner:
         if self.owns_node:
             self._traffic.destroy()
             if self._context is not None:
-                participant.close(self.node, self._context)
+                participant.close(self.node)
             else:
                 self.node.destroy_node()
 

@@ -199,7 +199,7 @@ def stranger(domain: int) -> Iterator[Any]:
     context.init(domain_id=domain)
     node = Node("stranger", context=context)
     yield node
-    close(node, context)
+    close(node)
 
 
 FOREIGN = [

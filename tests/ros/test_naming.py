@@ -49,6 +49,6 @@ def test_a_name_that_is_seen_already_gets_a_number_and_a_warning(
     ]
     free.destroy_node()
     outlook.hand_over()
-    participant.close(node, outlook.context)
+    participant.close(node)
     for each in others:
         each.destroy_node()

@@ -29,7 +29,7 @@ def ours(domain: int) -> Iterator[Node]:
     context.init(domain_id=domain)
     node = Node("ours", context=context)
     yield node
-    participant.close(node, context)
+    participant.close(node)
 
 
 @pytest.mark.skipif(
@@ -51,7 +51,7 @@ def test_a_node_that_is_gone_need_not_fall_silent(domain: int) -> None:
     context = Context()
     context.init(domain_id=domain)
     node = Node("ours", context=context)
-    participant.close(node, context)
+    participant.close(node)
     assert not context.ok()
     assert not participant.fall_silent(node)
 

@@ -51,10 +51,10 @@ def test_where_the_layout_is_another_one_the_objects_are_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(statuses, "STATUS", 20)
-    statuses._fast_type.cache_clear()
+    status_reader.cache_clear()
     try:
         kind, read = status_reader()
     finally:
-        statuses._fast_type.cache_clear()
+        status_reader.cache_clear()
     assert kind is GoalStatusArray
     assert read(message(3)) == by_objects(message(3))

@@ -30,7 +30,7 @@ def _asking() -> Iterator[tuple[Node, Spin]]:
         yield node, lambda: executor.spin_once(timeout_sec=0.05)
     finally:
         executor.shutdown()
-        participant.close(node, node.context)
+        participant.close(node)
 
 
 def heard(message_type: type, depth: int) -> Generator[Any]:

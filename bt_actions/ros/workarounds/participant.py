@@ -17,7 +17,6 @@ import functools
 import os
 from typing import Any
 
-from rclpy.context import Context
 from rclpy.node import Node
 
 LIMIT = 5
@@ -33,7 +32,7 @@ _SET_LISTENER = (
 """DomainParticipant::set_listener(DomainParticipantListener *, std::chrono::seconds)"""
 
 
-def close(node: Node, context: Context) -> None:
+def close(node: Node) -> None:
     """Destroy the node, which is the last of its context, and shut the context down.
 
     Other nodes of the context, if there are any, learn nothing new from here on.
@@ -41,7 +40,7 @@ def close(node: Node, context: Context) -> None:
     fall_silent(node)
     node.destroy_node()
     with contextlib.suppress(RuntimeError):
-        context.try_shutdown()
+        node.context.try_shutdown()
 
 
 def fall_silent(node: Node) -> bool:

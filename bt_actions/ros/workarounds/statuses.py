@@ -42,25 +42,17 @@ _CONVERT = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)(_read)
 """The same as a C function; it has to be there as long as anybody may call it."""
 
 
-def status_reader() -> tuple[Any, Callable[[Any], dict[bytes, int]]]:
-    """Return what to give a `take_status`, and what makes {goal id: status} of what that returns.
-
-    In place of the message type stands one that is read at once, if the layout is as expected.
-    """
-    fast = _fast_type()
-    return (fast, lambda statuses: statuses) if fast is not None else (GoalStatusArray, by_objects)
-
-
 def by_objects(message: Any) -> dict[bytes, int]:
     """Read it as rclpy makes it."""
     return {bytes(entry.goal_info.goal_id.uuid): entry.status for entry in message.status_list}
 
 
 @functools.cache
-def _fast_type() -> type | None:
-    """Return a stand-in for GoalStatusArray that rclpy takes for a message type; or None.
+def status_reader() -> tuple[type, Callable[[Any], dict[bytes, int]]]:
+    """Return what to give a `take_status`, and what makes {goal id: status} of what that returns.
 
-    None where a message of two goals that rclpy has laid out is not read as what it is.
+    In place of the message type stands one that is read at once, if a message of two goals that
+    rclpy has laid out is read as what it is.
     """
     message = GoalStatusArray(status_list=[GoalStatus(status=2), GoalStatus(status=6)])
     for number, entry in enumerate(message.status_list, 1):
@@ -73,4 +65,6 @@ def _fast_type() -> type | None:
     )
     own = {"_CONVERT_TO_PY": capsule(ctypes.cast(_CONVERT, ctypes.c_void_p), None, None)}
     stand_in: type = type("Meta", (type(GoalStatusArray),), own)("Statuses", (), {})
-    return stand_in if deserialize_message(laid_out, stand_in) == by_objects(message) else None
+    if deserialize_message(laid_out, stand_in) == by_objects(message):
+        return stand_in, lambda statuses: statuses
+    return GoalStatusArray, by_objects
