@@ -108,15 +108,12 @@ class RosTransport:
 
     def send(self, goal_id: bytes, goal: Any) -> None:
         """Send the goal request."""
-        request = self._impl.SendGoalService.Request()
-        request.goal_id = UUID(uuid=list(goal_id))
-        request.goal = goal
+        request = self._impl.SendGoalService.Request(goal_id=UUID(uuid=list(goal_id)), goal=goal)
         self.reachability.asked(self._ask("goal", request, goal_id))
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result, which the server answers when the goal has ended."""
-        request = self._impl.GetResultService.Request()
-        request.goal_id = UUID(uuid=list(goal_id))
+        request = self._impl.GetResultService.Request(goal_id=UUID(uuid=list(goal_id)))
         self._ask("result", request, goal_id)
 
     def cancel(self, goal_id: bytes) -> None:

@@ -68,20 +68,25 @@ def named_node(name: str, context: Context, namespace: str) -> Node:
 
     One that was given by ``__node:=`` stands as it is. There is a warning in both cases.
     """
-    wanted = name
-    node = Node(name, context=context, namespace=namespace)
+    wanted, taken = name, ""
     for number in itertools.count(2):
+        node = Node(name, context=context, namespace=namespace)
+        ours = node.get_fully_qualified_name()
+        if taken:
+            log.warning(
+                f"another node is called {taken}: this one is {ours}; "
+                "--ros-args -r __node:=NAME gives another"
+            )
         mine = node.get_name(), node.get_namespace()
         if node.get_node_names_and_namespaces().count(mine) < 2:
             break
-        taken = f"another node is called {node.get_fully_qualified_name()}"
         if mine[0] != name:
-            log.warning(f"{taken}, too, as __node:= has it: others may reach one or the other")
+            log.warning(
+                f"another node is called {ours}, too, as __node:= has it: "
+                "others may reach one or the other"
+            )
             break
+        taken, ending = ours, f"_{number}"
         node.destroy_node()
-        ending = f"_{number}"
         name = wanted[: LONGEST - len(ending)] + ending
-        node = Node(name, context=context, namespace=namespace)
-        ours = node.get_fully_qualified_name()
-        log.warning(f"{taken}: this one is {ours}; --ros-args -r __node:=NAME gives another")
     return node

@@ -140,7 +140,6 @@ class _Watch:
     def disown(self) -> None:
         """In the child of a fork: it ends as if this had never been."""
         self.put_back()
-        self._before.clear()
         self._received.clear()
         self._rclpys = 0
 

@@ -382,12 +382,12 @@ class TreeServer:
         self._rosout.say(level, text)
 
     def _answer(self, goal: Goal, outcome: RunOutcome) -> None:
-        status, canceled = GoalStatus.STATUS_ABORTED, outcome.code == Code.CANCELED
+        status = GoalStatus.STATUS_ABORTED
         if outcome.code == Code.NONE:
             status = GoalStatus.STATUS_SUCCEEDED
-        elif canceled and outcome.settled:
+        elif outcome.code == Code.CANCELED and outcome.settled:
             status = GoalStatus.STATUS_CANCELED
-        self._action.answer(goal.client, result(outcome), status, after_cancel=canceled)
+        self._action.answer(goal.client, result(outcome), status)
 
     def _tell(self) -> None:
         """Tell the clients how far their runs are; the timer's callback."""

@@ -8,7 +8,6 @@ ended. Decides nothing.
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -23,9 +22,6 @@ from rclpy.action.server import (
 
 from bt_actions.ros.serving.endpoints import Endpoints
 
-_GRANTED = 2.0
-"""Seconds for the executor to say that a cancel is granted."""
-
 
 class DeferredActionServer(ActionServer):  # type: ignore[misc]
     """An action server that leaves it to others when a goal is executed and when it has ended.
@@ -35,8 +31,8 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
             the goal.
         accepted: called with the goal when its client knows that it was accepted.
         dropped: called with the goal's id where the client could not be told of that.
-        cancel: called with a goal when its client asks for its cancel; it may come before
-            `accepted` and `dropped`.
+        cancel: called with a goal when its client has been granted its cancel, and again as long as
+            that is under way; it may come before `accepted` and `dropped`.
         keeps: seconds for which a result can be asked for.
     """
 
@@ -65,7 +61,7 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
             callback_group=endpoints.group,
             goal_callback=self._on_goal,
             handle_accepted_callback=self._on_accepted,
-            cancel_callback=self._on_cancel,
+            cancel_callback=lambda goal: CancelResponse.ACCEPT,
             result_timeout=keeps,
         )
 
@@ -79,17 +75,11 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
         with contextlib.suppress(RCLError):  # a cancel comes at this moment
             goal.execute()
 
-    def answer(
-        self, goal: ServerGoalHandle, result: Any, status: int, *, after_cancel: bool
-    ) -> None:
+    def answer(self, goal: ServerGoalHandle, result: Any, status: int) -> None:
         """End a goal with a status of GoalStatus, and answer its client; on any thread.
 
-        `after_cancel`: its client has asked for that, which the executor is about to grant; a goal
-        that it does not grant is aborted.
+        It is aborted where its client has not asked for the cancel that it would end with.
         """
-        until = time.monotonic() + _GRANTED
-        while after_cancel and not goal.is_cancel_requested and time.monotonic() < until:
-            time.sleep(0.001)
         if goal.status == GoalStatus.STATUS_ACCEPTED:
             goal.execute()
         if status == GoalStatus.STATUS_SUCCEEDED:
@@ -132,6 +122,8 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
     def _on_accepted(self, goal: ServerGoalHandle) -> None:
         self._accepted(goal, self._admitted.pop(id(goal.request)))
 
-    def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
-        self._cancel(goal)
-        return CancelResponse.ACCEPT
+    async def _execute_cancel_request(self, request_header_and_message: Any) -> None:
+        await super()._execute_cancel_request(request_header_and_message)
+        for goal in list(self._goal_handles.values()):
+            if goal.is_cancel_requested:  # now it can end so
+                self._cancel(goal)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
@@ -18,16 +18,17 @@ from bt_actions.ros.workarounds import participant
 
 PATIENCE = 5.0
 """Seconds for a server to come in sight, and for one to answer."""
-Spin = Callable[[], None]
+GLANCE = 0.05
+"""Seconds between two looks."""
 
 
 @contextlib.contextmanager
-def _asking() -> Iterator[tuple[Node, Spin]]:
+def _asking() -> Iterator[Node]:
     node = own_node("bt_actions_asks")
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     try:
-        yield node, lambda: executor.spin_once(timeout_sec=0.05)
+        yield node
     finally:
         executor.shutdown()
         participant.close(node)
@@ -38,24 +39,24 @@ def heard(message_type: type, depth: int) -> Generator[Any]:
     came: list[Any] = []
     known: set[str] = set()
     until = time.monotonic() + PATIENCE
-    with _asking() as (node, spin):
+    with _asking() as node:
         while time.monotonic() < until:
             for topic, types in node.get_topic_names_and_types():
                 if interface_name(message_type) in types and topic not in known:
                     known.add(topic)
                     node.create_subscription(message_type, topic, came.append, kept(depth))
-            spin()
-            while came:
-                yield came.pop(0)
+            node.executor.spin_once(GLANCE)
+            yield from came
+            came.clear()
 
 
 def answers(service_type: Any, namespace: str) -> dict[str, Any]:
     """Ask every service of a type below a namespace; by its name, None where it does not answer."""
-    below = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
+    below = f"/{namespace.strip('/')}/".replace("//", "/")
     clients: dict[str, Any] = {}
     futures: dict[str, Any] = {}
     begun = time.monotonic()
-    with _asking() as (node, spin):
+    with _asking() as node:
         while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if clients else 0.0):
             for name, types in node.get_service_names_and_types():
                 fits = interface_name(service_type) in types and name.startswith(below)
@@ -67,5 +68,5 @@ def answers(service_type: Any, namespace: str) -> dict[str, Any]:
             all_called = 0 < len(futures) == len(clients)
             if now >= DISCOVERS and all_called and all(each.done() for each in futures.values()):
                 break
-            spin()
+            node.executor.spin_once(GLANCE)
     return {name: futures[name].result() if name in futures else None for name in sorted(clients)}

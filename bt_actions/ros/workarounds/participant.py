@@ -21,8 +21,6 @@ from rclpy.node import Node
 
 LIMIT = 5
 """Seconds for what the listener is just being told, which takes well under a millisecond."""
-TRIES = 3
-"""The limit may pass while this process stands still."""
 _PARTICIPANT_OF = "_ZN16rmw_fastrtps_cpp22get_domain_participantEP10rmw_node_s"
 """rmw_fastrtps_cpp::get_domain_participant(rmw_node_t *)"""
 _SET_LISTENER = (
@@ -51,7 +49,7 @@ def fall_silent(node: Node) -> bool:
             participant = participant_of(rmw_node_of(node.handle.pointer))
             if participant is None:
                 return False
-            return any(set_listener(participant, None, LIMIT) == 0 for _ in range(TRIES))
+            return bool(set_listener(participant, None, LIMIT) == 0)
     except Exception:  # noqa: BLE001 - it was destroyed; or of another middleware, or release of it
         return False
 
