@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import chain, repeat, starmap
 from typing import Any, NoReturn
 
 import yaml
+from yaml import AliasEvent, MappingEndEvent, MappingStartEvent, ScalarEvent, SequenceEndEvent
+from yaml import SequenceStartEvent as ListingStartEvent
 
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar, span_of
@@ -25,7 +28,8 @@ __all__ = ["MAX_DEPTH", "MAX_NODES", "compose", "compose_written"]
 MAX_DEPTH = 200
 """Levels of YAML nesting, aliases unfolded; a level of the tree takes two."""
 MAX_NODES = 2_000_000
-"""Nodes of a text, its aliases unfolded; a tree of 100,000 nodes has about a third of it."""
+"""Nodes of a text, its aliases unfolded; a list or a mapping counts twice, as it begins and ends.
+A tree of 100,000 nodes has about half of it."""
 _TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
 NO_LIBYAML = (
     "trees are read with libyaml, and PyYAML is installed without it here; its wheels hold it: "
@@ -72,38 +76,45 @@ class _Composer:
     def __init__(self, source: Source, *, unfold: bool = True) -> None:
         if not yaml.__with_libyaml__:
             raise ImportError(NO_LIBYAML, name="libyaml")
+        parser = yaml.CSafeLoader(source.text)
         self._source = source
-        self._next: Callable[[], Any] = yaml.CSafeLoader(source.text).get_event
-        self.anchored: dict[int, str] = {}
+        self._events = chain(
+            starmap(parser.get_event, repeat((), MAX_NODES)), self._beyond(parser.get_event)
+        )
         self._unfold = unfold
-        self._anchors: dict[str, tuple[Node, int, int] | None] = {}
-        """What names stand for, with its size and its height; None while it is open."""
-        self._size = 0
+        self.anchored: dict[int, str] = {}
+        self._anchors: dict[str, Node | None] = {}
+        """What names stand for; None while it is open."""
+        self._measured: dict[int, tuple[int, int]] = {}
+        self._unfolded = 0
+        """The size of all that aliases stand for."""
         self._level = 0
         """How many collections are open."""
-        self._deepest = 0
-        """How many have been since the last of `_named` began."""
-        self._named: list[tuple[int, int]] = []
-        """Of each open collection that has an anchor, the size and the deepest before it."""
         self._takes: dict[type, Callable[[Any], Node]] = {
-            yaml.ScalarEvent: self._scalar,
-            yaml.MappingStartEvent: self._mapping,
-            yaml.SequenceStartEvent: self._listing,
-            yaml.AliasEvent: self._alias,
+            ScalarEvent: self._scalar,
+            MappingStartEvent: self._mapping,
+            ListingStartEvent: self._listing,
+            AliasEvent: self._alias,
         }
 
     def read(self) -> Node | None:
         """The document, after all events were taken. Raises _GaveUp."""
         root = None
-        while type(event := self._next()) is not yaml.StreamEndEvent:
+        for event in self._events:
+            if type(event) is yaml.StreamEndEvent:
+                break
             if type(event) is yaml.DocumentStartEvent:
                 if root is not None:
                     self._give_up(
                         "BT106", event, "a second document begins here; one file, one tree"
                     )
-                event = self._next()
+                event = next(self._events)
                 root = self._takes[type(event)](event)
         return root
+
+    def _beyond(self, get_event: Callable[[], Any]) -> Iterator[Any]:
+        self._too_large(get_event())
+        yield
 
     def _report(self, code: str, event: Any, message: str) -> None:
         self._source.report(code, _event_span(event), message)
@@ -118,8 +129,7 @@ class _Composer:
 
     def _scalar(self, event: Any) -> Scalar:
         node = Scalar()
-        node.text = event.value
-        node.plain = not event.style
+        node.text, node.plain = event.value, not event.style
         node.begin, node.end = event.start_mark, event.end_mark
         if event.tag is not None:
             node.plain = False
@@ -128,36 +138,32 @@ class _Composer:
                 self._source.settled.add(_event_span(event))
                 self._source.unread.nodes.append(node)
         if event.anchor is not None:
-            self._source.anchored = True
-            self.anchored[id(node)] = event.anchor
-            self._anchors[event.anchor] = (node, 1, 0)
-        self._size += 1
-        if self._size > MAX_NODES:
-            self._too_large(event)
+            self._name(event.anchor, node)
+            self._anchors[event.anchor] = node
         return node
 
-    def _listing(self, event: Any) -> Listing:
+    def _listing(self, start: Any) -> Listing:
         node = Listing()
         node.items = items = []
-        anchor = event.anchor
-        self._begin(node, event)
-        next_event, takes = self._next, self._takes
-        while (kind := type(event := next_event())) is not yaml.SequenceEndEvent:
+        self._begin(node, start)
+        takes = self._takes
+        for event in self._events:
+            if (kind := type(event)) is SequenceEndEvent:
+                break
             items.append(takes[kind](event))
-        self._end(node, event, items[-1] if items else None)
-        if anchor is not None:
-            self._close(anchor, node)
+        self._end(node, start.anchor, event, items[-1] if items else None)
         return node
 
-    def _mapping(self, event: Any) -> Mapping:
+    def _mapping(self, start: Any) -> Mapping:
         node = Mapping()
         node.pairs = pairs = []
-        anchor = event.anchor
-        self._begin(node, event)
+        self._begin(node, start)
         keys: dict[str, Scalar] = {}
         refused = False
-        next_event, takes = self._next, self._takes
-        while (kind := type(event := next_event())) is not yaml.MappingEndEvent:
+        events, takes = self._events, self._takes
+        for event in events:
+            if (kind := type(event)) is MappingEndEvent:
+                break
             key = takes[kind](event)
             if type(key) is not Scalar:
                 hint = _braced(key) or "a text that begins with { or [ needs quotes"
@@ -165,23 +171,23 @@ class _Composer:
                 self._source.report("BT109", span_of(key), message, hint=hint)
                 refused, taken = True, False
             else:
-                key.text = sys.intern(key.text)  # a tree has few keys, and says them often
-                taken = keys.setdefault(key.text, key) is key
-                if not taken:
-                    self._report_twice(key, keys[key.text])
-            event = next_event()
+                key.text = text = sys.intern(key.text)  # a tree has few keys, and says them often
+                taken = text not in keys
+                if taken:
+                    keys[text] = key
+                else:
+                    self._report_twice(key, keys[text])
+            event = next(events)
             value = takes[type(event)](event)
             if taken:
                 pairs.append((key, value))
             else:
                 self._source.unread.nodes.append(value)
-        self._end(node, event, pairs[-1][1] if pairs else None)
+        self._end(node, start.anchor, event, pairs[-1][1] if pairs else None)
         if "<<" in keys and self._unfold:
             self._merge(node)
         if refused and not pairs:
             self._source.settled.add(span_of(node))
-        if anchor is not None:
-            self._close(anchor, node)
         return node
 
     def _report_twice(self, key: Scalar, first: Scalar) -> None:
@@ -198,50 +204,58 @@ class _Composer:
         if event.tag is not None and event.tag != "!":
             self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
         node.begin, node.end = event.start_mark, event.end_mark
-        node.flow = bool(event.flow_style)
+        node.flow = event.flow_style
         if event.anchor is not None:
-            self._source.anchored = True
-            self.anchored[id(node)] = event.anchor
+            self._name(event.anchor, node)
             self._anchors[event.anchor] = None
-            self._named.append((self._size, self._deepest))
-            self._deepest = self._level
         self._level += 1
-        if self._level > self._deepest:
-            self._deepest = self._level
 
-    def _end(self, node: Mapping | Listing, event: Any, last: Node | None) -> None:
+    def _end(
+        self, node: Mapping | Listing, anchor: str | None, event: Any, last: Node | None
+    ) -> None:
         self._level -= 1
         if node.flow:
             node.end = event.end_mark
         elif last is not None and last.end.index > node.begin.index:
             node.end = last.end
-        self._size += 1
-        if self._size > MAX_NODES:
-            self._too_large(event)
+        if anchor is not None:
+            self._anchors[anchor] = node
 
-    def _close(self, anchor: str, node: Node) -> None:
-        before, deepest = self._named.pop()
-        self._anchors[anchor] = (node, self._size - before, self._deepest - self._level)
-        self._deepest = max(deepest, self._deepest)
+    def _name(self, anchor: str, node: Node) -> None:
+        self._source.anchored = True
+        self.anchored[id(node)] = anchor
 
     def _alias(self, event: Any) -> Node:
         if event.anchor not in self._anchors:
             self._give_up("BT102", event, f"there is no anchor &{event.anchor} above")
-        found = self._anchors[event.anchor]
-        if found is None:
+        node = self._anchors[event.anchor]
+        if node is None:
             self._give_up("BT105", event, f"*{event.anchor} holds itself")
-        node, size, height = found
         if not self._unfold:
-            node, size, height = Alias(), 1, 0
-            node.name = event.anchor
-            node.begin, node.end = event.start_mark, event.end_mark
+            alias = Alias()
+            alias.name = event.anchor
+            alias.begin, alias.end = event.start_mark, event.end_mark
+            return alias
+        size, height = self._measure(node)
         if self._level + height > MAX_DEPTH:
             self._give_up("BT105", event, _TOO_DEEP)
-        self._deepest = max(self._deepest, self._level + height)
-        self._size += size
-        if self._size > MAX_NODES:
+        self._unfolded += size
+        if self._unfolded > MAX_NODES:
             self._too_large(event)
         return node
+
+    def _measure(self, node: Node) -> tuple[int, int]:
+        """How large a node is with all that it holds, and how many levels it is high."""
+        if isinstance(node, Mapping):
+            inner = [part for pair in node.pairs for part in pair]
+        elif isinstance(node, Listing):
+            inner = node.items
+        else:
+            return 1, 0
+        if id(node) not in self._measured:
+            sizes, heights = zip((0, 0), *map(self._measure, inner), strict=True)
+            self._measured[id(node)] = 2 + sum(sizes), 1 + max(heights)
+        return self._measured[id(node)]
 
     def _merge(self, node: Mapping) -> None:
         own = {key.text for key, _ in node.pairs}
@@ -260,7 +274,6 @@ class _Composer:
                     if inner_key.text not in own:
                         own.add(inner_key.text)
                         pairs.append((inner_key, inner_value))
-                        self._size += 1
         node.pairs = pairs
 
 
