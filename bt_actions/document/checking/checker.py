@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from bt_actions.document.checking.infer import BOOL, TEXT, Report, infer, named
+from bt_actions.document.checking.infer import BOOL, TEXT, Wrong, infer, named
 from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
 from bt_actions.document.checking.variables import infer_variables, items_inside, type_of
 from bt_actions.document.findings import Related, Span
@@ -31,7 +31,7 @@ from bt_actions.document.reading.settings import when_of
 from bt_actions.document.reading.tree import Declared, Document
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.reading.writes import Write, writes_in
-from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
+from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.messages.conversion import examine
@@ -77,7 +77,8 @@ class Checker:
         """What each node writes, by the node's id, in the order of the text."""
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
-        self._inferred: dict[tuple[object, ...], FieldType | None] = {}
+        self._classes: dict[str, type | None] = {}
+        self._inferred: dict[tuple[object, ...], tuple[FieldType | None, list[Wrong]]] = {}
 
     def interface(
         self, name: str, kind: str, node: Node, source: Source | None = None
@@ -124,19 +125,28 @@ class Checker:
 
     def action_class(self, declared: Declared) -> type | None:
         """The class of the action that a name stands for."""
-        text = declared.values.get("type")
-        if not isinstance(text, str):
-            return None
-        return self.interface(text, "action", declared.written("type"), declared.source)
+        name = declared.name
+        if name not in self._classes:
+            text, at = declared.values.get("type"), declared.written("type")
+            self._classes[name] = None
+            if isinstance(text, str):
+                self._classes[name] = self.interface(text, "action", at, declared.source)
+        return self._classes[name]
 
-    def call(self, values: dict[str, object], node: Mapping, cls: type | None, kind: str) -> None:
+    def call(
+        self,
+        values: MappingType[str, object],
+        written: MappingType[str, Node],
+        cls: type | None,
+        kind: str,
+    ) -> None:
         """Check what an action and a service have in common."""
         key, asked, roots = _parts(cls, kind)
-        written = node.get(key) if key in values else None
-        if written is not None:
-            self.value(asked, values[key], written)
-        for condition in (values.get("expect"), when_of(values)):
-            self.condition(condition, roots)
+        if key in values and key in written:
+            self.value(asked, values[key], written[key])
+        self.condition(values.get("expect"), roots)
+        if "retry" in values:
+            self.condition(when_of(values), roots)
         self.save(values.get("save"), roots)
 
     def save(self, saved: object, roots: Types) -> None:
@@ -259,38 +269,35 @@ class Checker:
                     self._unknown(computed)
                     break
 
-        def report(code: str, message: str, start: int, end: int) -> None:
-            self.source.report(code, computed.span(self.source, start, end), message)
-
-        if not expression.variables and not expression.roots and not expression.constants:
+        elif not expression.roots and not expression.constants:
             try:
                 computed.evaluate(lambda _name: None)
             except ExpressionError as error:
-                report("BT206", error.message, error.column, error.end_column)
+                span = computed.span(self.source, error.column, error.end_column)
+                self.source.report("BT206", span, error.message)
                 return None
-        if not self.types and not roots and not expression.variables:
-            return None
-        return self.infer(expression, roots, self.reader, report)
+            if not self.types and not roots:
+                return None
+        kind, wrong = self.infer(expression, roots, self.reader)
+        for code, message, start, end in wrong:
+            self.source.report(code, computed.span(self.source, start, end), message)
+        return kind
 
     def infer(
-        self, expression: Expression, roots: Types, reader: object, report: Report
-    ) -> FieldType | None:
-        """The type of an expression; worked out once for all of its form and with such types."""
+        self, expression: Expression, roots: Types, reader: object
+    ) -> tuple[FieldType | None, list[Wrong]]:
+        """The type of an expression, and what is wrong with it.
+
+        Worked out once for all of its form and with such types, where nothing is.
+        """
         variable = self.types_at(reader)
         key = (expression.form, *roots.items(), *map(variable, expression.variables))
-        if (known := self._inferred.get(key, BAD)) is not BAD:
-            return known  # type: ignore[return-value]  # BAD is no type
-        wrong: list[tuple[str, str, int, int]] = []
-
-        def note(*what: Any) -> None:
-            wrong.append(what)
-
-        kind = infer(expression, roots, variable, note, types=self.types)
-        for what in wrong:
-            report(*what)
-        if not wrong:
-            self._inferred[key] = kind
-        return kind
+        known = self._inferred.get(key)
+        if known is None:
+            known = infer(expression, roots, variable, types=self.types)
+            if not known[1]:
+                self._inferred[key] = known
+        return known
 
     def _unknown(self, computed: Computed) -> None:
         """Report the variables that an expression reads and nobody declares or writes."""

@@ -68,6 +68,8 @@ class _Hazards:
             if node.is_action:
                 if not inside:
                     self._look_at_action(node)
+            elif not node.children:
+                continue
             elif kind == "parallel":
                 self._parallel(node)
             elif kind == "retry" and not inside:

@@ -26,28 +26,28 @@ from bt_actions.messages.interfaces import UnknownInterface
 from bt_actions.utilities.suggest import what_it_has
 
 __all__ = [
-    "BOOL", "FLOAT", "INTEGER", "TEXT", "Report", "common_type", "infer", "named",
+    "BOOL", "FLOAT", "INTEGER", "TEXT", "Wrong", "common_type", "infer", "named",
     "type_of_literal",
 ]  # fmt: skip
 
 BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
-Report = Callable[[str, str, int, int], None]
-"""Called with a rule's code, a message, and the columns in the expression's text."""
+Wrong = tuple[str, str, int, int]
+"""A rule's code, a message, and the columns in the expression's text."""
 
 
 def infer(
     expression: Expression,
     roots: Mapping[str, FieldType | None],
     variable: Callable[[str], FieldType | None],
-    report: Report,
     *,
     types: bool = True,
-) -> FieldType | None:
-    """The type of an expression's value, or None when it is not known.
+) -> tuple[FieldType | None, list[Wrong]]:
+    """The type of an expression's value, or None when it is not known; and what is wrong with it.
 
     With `types=False` no constant of a message is looked up.
     """
-    return _Inference(expression, roots, variable, report, types).any_type_of(expression.tree)
+    inference = _Inference(expression, roots, variable, types)
+    return inference.any_type_of(expression.tree), inference.wrong
 
 
 def type_of_literal(value: object) -> FieldType | None:
@@ -118,14 +118,13 @@ class _Inference:
         expression: Expression,
         roots: Mapping[str, FieldType | None],
         variable: Callable[[str], FieldType | None],
-        report: Report,
         types: bool,
     ) -> None:
+        self.wrong: list[Wrong] = []
         self._types = types
         self._expression = expression
         self._roots = roots
         self._variable = variable
-        self._report = report
 
     def type_of(self, node: ast.expr) -> FieldType | None:
         """The one type that a part has, or None."""
@@ -174,7 +173,7 @@ class _Inference:
         start, end = self._expression.span(node)
         if code in ("BT203", "BT313") and isinstance(node, ast.Attribute):
             start = max(start, end - len(node.attr))
-        self._report(code, message, start, end)
+        self.wrong.append((code, message, start, end))
 
     def _name(self, node: ast.expr, name: str) -> FieldType | None:
         variable = self._expression.variable_of(node)
@@ -190,7 +189,7 @@ class _Inference:
         try:
             return type_of_literal(self._expression.form.constant(name))
         except UnknownInterface as error:
-            self._report("BT203", str(error), *self._expression.span(node.value))
+            self.wrong.append(("BT203", str(error), *self._expression.span(node.value)))
         except ValueError as error:
             self._wrong(node, str(error), "BT203")
         return None

@@ -173,7 +173,7 @@ def _interface(checker: Checker, node: TreeNode, kind: str) -> type | None:
 
 def _call_of(kind: str) -> Callable[[Checker, TreeNode], None]:
     return lambda checker, node: checker.call(
-        node.values, node.node, _interface(checker, node, kind), kind
+        node.values, node.written, _interface(checker, node, kind), kind
     )
 
 

@@ -105,6 +105,8 @@ class _Order:
         for child in node.children:
             ended |= succeeded
             succeeded, failed = self.visit(child, around, later)
+            if not (succeeded or failed):
+                continue
             if kind in _TURNED:
                 succeeded, failed = failed, succeeded
             elif kind not in _STRAIGHT:

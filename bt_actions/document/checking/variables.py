@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping
 from typing import Protocol
 
-from bt_actions.document.checking.infer import Report, common_type, type_of_literal
+from bt_actions.document.checking.infer import Wrong, common_type, type_of_literal
 from bt_actions.document.language.types import TypeNameError, parse_type
 from bt_actions.document.language.values import Computed, Interpolated
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
@@ -30,9 +30,9 @@ class Known(Protocol):
     variables: dict[str, FieldType | None]
 
     def infer(
-        self, expression: Expression, roots: Types, reader: object, report: Report
-    ) -> FieldType | None:
-        """The type of an expression, as a node reads it."""
+        self, expression: Expression, roots: Types, reader: object
+    ) -> tuple[FieldType | None, list[Wrong]]:
+        """The type of an expression, as a node reads it, and what is wrong with it."""
         ...
 
     def interface(self, name: str, kind: str, node: Node) -> type | None:
@@ -55,11 +55,7 @@ def type_of(write: Write, known: Known) -> FieldType | None:
     if not isinstance(write.value, Computed):
         return type_of_literal(write.value)
     roots = {} if write.root is None else {write.root: root_type(write.node, write.root, known)}
-    return known.infer(write.value.expression, roots, write.node, _silent)
-
-
-def _silent(_code: str, _message: str, _start: int, _end: int) -> None:
-    """Leave out what is told where the node is checked."""
+    return known.infer(write.value.expression, roots, write.node)[0]
 
 
 def _item_type(write: Write, known: Known) -> FieldType | None:
@@ -68,7 +64,7 @@ def _item_type(write: Write, known: Known) -> FieldType | None:
         return common_type([type_of_literal(item) for item in write.value])
     if not isinstance(write.value, Computed):
         return None
-    kind = known.infer(write.value.expression, {}, write.node, _silent)
+    kind, _ = known.infer(write.value.expression, {}, write.node)
     return kind.item if isinstance(kind, Listing) else None
 
 

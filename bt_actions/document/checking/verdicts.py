@@ -22,6 +22,8 @@ class Can(NamedTuple):
 _EITHER = Can(True, True)
 BEGUN = frozenset({"service", "wait", "wait_for_message"})
 """Kinds that take time whenever they are begun, as actions do."""
+_OPEN = frozenset({"action", "run_tree", "check", "python", "service", "wait_for_message"})
+"""Kinds that may end either way, whatever they hold."""
 _FIXED = {"success": Can(True, False), "failure": Can(False, True), "running": Can(False, False)}
 
 
@@ -45,7 +47,9 @@ class Verdicts:
         return found
 
     def _work_out(self, node: TreeNode) -> Can:
-        kind = node.kind.name if node.kind is not None else ""
+        kind = node.kind.name if node.kind is not None else "action"
+        if kind in _OPEN and not self._at_once:
+            return _EITHER
         if kind in _FIXED:
             return _FIXED[kind]
         if self._at_once and (node.is_action or kind in BEGUN):

@@ -129,8 +129,12 @@ class _Reader:
 
     def _kind_key(self, written: Mapping) -> Scalar | None:
         """The one key that is a kind or an alias, or None after reporting."""
-        kinds = [key for key, _ in written.pairs if key.text in self._kinds]
-        said = written.get("type")
+        kinds, said = [], None
+        for key, inner in written.pairs:
+            if key.text in self._kinds:
+                kinds.append(key)
+            elif key.text == "type":
+                said = inner
         if said is not None and self._typed(written, said):
             return None
         if len(kinds) == 1 and kinds[0].text not in _BESIDE_CHILD:

@@ -94,10 +94,15 @@ class Declared:
     def place(self) -> Place:
         return Place(self.source.name, self.key.line, self.key.column)
 
+    @property
+    def parts(self) -> dict[str, Node]:
+        """The YAML node of each of its keys."""
+        pairs = self.node.pairs if isinstance(self.node, Mapping) else ()
+        return {key.text: inner for key, inner in pairs}
+
     def written(self, key: str) -> Node:
         """The YAML node of one of its keys, or of the whole where it is written short."""
-        found = self.node.get(key) if isinstance(self.node, Mapping) else None
-        return self.node if found is None else found
+        return self.parts.get(key, self.node)
 
 
 @dataclass(slots=True)

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.values import Computed
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping, Node
 
 __all__ = ["Write", "writes_in", "writes_of"]
+
+
+_WRITERS = {"set", "for_each", *(name for name, kind in KINDS.items() if "save" in kind.keys)}
 
 
 @dataclass(slots=True, eq=False)
@@ -46,6 +50,8 @@ def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
     """The variables that a node itself writes."""
     values = node.values
     kind = node.kind.name if node.kind is not None else ""
+    if kind and kind not in _WRITERS:
+        return
     saved = values.get("save")
     own = saved if isinstance(saved, dict) else {}
     declared = document.actions.get(node.alias) if node.alias is not None else None
