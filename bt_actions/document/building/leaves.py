@@ -22,6 +22,7 @@ from bt_actions.document.reading.settings import server_of, settings_of, text_of
 from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.yaml.nodes import span_of
 from bt_actions.goals.policy import Retry, Timeouts
+from bt_actions.messages.interfaces import interface
 
 __all__ = ["LEAVES", "build_action"]
 
@@ -78,12 +79,12 @@ def _timeouts(fields: tuple[tuple[str, float | None], ...]) -> Timeouts:
 
 
 def _retry(settings: Mapping[str, object], context: Context) -> Retry:
-    given = table_of(settings.get("retry"))
-    fields = {key: value for key, value in given.items() if key not in ("outcomes", "when")}
-    if "outcomes" in given:
-        fields["outcomes"] = frozenset(given["outcomes"])
-    if "when" in given:  # reads the variables of one tree, so that no other can share it
-        return Retry(**fields, when=context.condition(given["when"], "result"))
+    fields = {**table_of(settings.get("retry"))}
+    if "outcomes" in fields:
+        fields["outcomes"] = frozenset(fields["outcomes"])
+    if "when" in fields:  # reads the variables of one tree, so that no other can share it
+        fields["when"] = context.condition(fields["when"], "result")
+        return Retry(**fields)
     return _plain_retry(tuple(fields.items()))
 
 
@@ -93,11 +94,7 @@ def _plain_retry(fields: tuple[tuple[str, Any], ...]) -> Retry:
 
 
 def _interface(name: object, kind: str, context: Context) -> Any:
-    if not context.types:
-        return name
-    from bt_actions.messages.interfaces import interface
-
-    return interface(str(name), kind)
+    return interface(str(name), kind) if context.types else name
 
 
 def _check(node: TreeNode, context: Context) -> Behaviour:

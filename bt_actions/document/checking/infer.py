@@ -134,10 +134,13 @@ class _Inference:
     def any_type_of(self, node: ast.expr) -> FieldType | None:
         """As `type_of`, or one of several."""
         match node:
-            case ast.Constant(value=value):
-                return type_of_literal(value)
+            case ast.Compare(left=left, ops=ops, comparators=rights):  # often asked for first
+                self._compare([left, *rights], ops)
+                return BOOL
             case ast.Name(id=name):
                 return self._name(node, name)
+            case ast.Constant(value=value):
+                return type_of_literal(value)
             case ast.Attribute() if (
                 constant := self._expression.form.constant_of(node)
             ) is not None:
@@ -157,9 +160,6 @@ class _Inference:
             case ast.BoolOp(values=values):
                 for part in values:
                     self._truth(part)
-                return BOOL
-            case ast.Compare(left=left, ops=ops, comparators=rights):
-                self._compare([left, *rights], ops)
                 return BOOL
             case ast.List(elts=items) | ast.Tuple(elts=items):
                 kinds = [self.type_of(item) for item in items]

@@ -32,10 +32,12 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
     if not wanted:
         raise TreeNotFoundError("the name of a tree is needed, not an empty text")
     path = Path(wanted)
-    base = Path() if beside is None else beside
-    candidates = [path if path.is_absolute() else base / path]
-    if path.suffix not in _SUFFIXES and candidates[0].name:
-        candidates += [candidates[0].with_name(path.name + suffix) for suffix in _SUFFIXES]
+    exact = path if beside is None else beside / path
+    if _is_file(exact):
+        return exact
+    candidates: list[Path] = []
+    if path.suffix not in _SUFFIXES and exact.name:
+        candidates += [exact.with_name(path.name + suffix) for suffix in _SUFFIXES]
     is_name = len(path.parts) == 1
     if is_name and path.suffix in _SUFFIXES:
         candidates += [folder / path for folder in tree_folders()]
@@ -43,7 +45,6 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
         candidates += [
             folder / (wanted + suffix) for folder in tree_folders() for suffix in _SUFFIXES
         ]
-    exact = candidates[0]
     for candidate in candidates:
         if _is_file(candidate):
             return candidate

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 from bt_actions.document.reading.tree import Document, TreeNode
 
@@ -24,6 +25,7 @@ def text_of(values: Mapping[str, object], key: str) -> str:
     return value if isinstance(value, str) else ""
 
 
+@lru_cache(maxsize=1024)
 def join_names(*parts: str) -> str:
     """ROS names put together; an absolute one, and one of the node's own (~), begins anew."""
     joined = ""

@@ -9,9 +9,9 @@ mistakes.
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Iterator
 from itertools import chain, repeat, starmap
+from sys import intern
 from typing import Any, NoReturn
 
 import yaml
@@ -151,7 +151,7 @@ class _Composer:
             if (kind := type(event)) is SequenceEndEvent:
                 break
             items.append(takes[kind](event))
-        self._end(node, start.anchor, event, items[-1] if items else None)
+        self._end(node, start, event, items[-1] if items else None)
         return node
 
     def _mapping(self, start: Any) -> Mapping:
@@ -165,32 +165,31 @@ class _Composer:
             if (kind := type(event)) is MappingEndEvent:
                 break
             key = takes[kind](event)
-            if type(key) is not Scalar:
-                hint = _braced(key) or "a text that begins with { or [ needs quotes"
-                message = "a key is a single word, not a list or a mapping"
-                self._source.report("BT109", span_of(key), message, hint=hint)
-                refused, taken = True, False
+            if type(key) is Scalar and key.text not in keys:
+                key.text = text = intern(key.text)  # a tree has few keys, and says them often
+                keys[text] = key
+                event = next(events)
+                pairs.append((key, takes[type(event)](event)))
             else:
-                key.text = text = sys.intern(key.text)  # a tree has few keys, and says them often
-                taken = text not in keys
-                if taken:
-                    keys[text] = key
-                else:
-                    self._report_twice(key, keys[text])
-            event = next(events)
-            value = takes[type(event)](event)
-            if taken:
-                pairs.append((key, value))
-            else:
-                self._source.unread.nodes.append(value)
-        self._end(node, start.anchor, event, pairs[-1][1] if pairs else None)
+                self._refuse(key, keys)
+                event = next(events)
+                self._source.unread.nodes.append(takes[type(event)](event))
+                refused = True
+        self._end(node, start, event, pairs[-1][1] if pairs else None)
         if "<<" in keys and self._unfold:
             self._merge(node)
         if refused and not pairs:
             self._source.settled.add(span_of(node))
         return node
 
-    def _report_twice(self, key: Scalar, first: Scalar) -> None:
+    def _refuse(self, key: Node, keys: dict[str, Scalar]) -> None:
+        """Report a key that is none, or is there already."""
+        if not isinstance(key, Scalar):
+            hint = _braced(key) or "a text that begins with { or [ needs quotes"
+            message = "a key is a single word, not a list or a mapping"
+            self._source.report("BT109", span_of(key), message, hint=hint)
+            return
+        first = keys[key.text]
         place = Place(self._source.name, first.line, first.column)
         self._source.report(
             "BT104", span_of(key), f"the key {key.text!r} is here twice",
@@ -203,23 +202,22 @@ class _Composer:
             self._give_up("BT105", event, _TOO_DEEP)
         if event.tag is not None and event.tag != "!":
             self._report("BT109", event, f"the tag {event.tag!r} has no meaning in a tree")
-        node.begin, node.end = event.start_mark, event.end_mark
-        node.flow = event.flow_style
+        node.begin, node.flow = event.start_mark, event.flow_style
         if event.anchor is not None:
             self._name(event.anchor, node)
             self._anchors[event.anchor] = None
         self._level += 1
 
-    def _end(
-        self, node: Mapping | Listing, anchor: str | None, event: Any, last: Node | None
-    ) -> None:
+    def _end(self, node: Mapping | Listing, start: Any, event: Any, last: Node | None) -> None:
         self._level -= 1
         if node.flow:
             node.end = event.end_mark
         elif last is not None and last.end.index > node.begin.index:
             node.end = last.end
-        if anchor is not None:
-            self._anchors[anchor] = node
+        else:
+            node.end = start.end_mark
+        if start.anchor is not None:
+            self._anchors[start.anchor] = node
 
     def _name(self, anchor: str, node: Node) -> None:
         self._source.anchored = True
