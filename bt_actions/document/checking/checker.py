@@ -106,7 +106,7 @@ class Checker:
             known = self._doubts_of[id(included)] = Doubts(included)
         return known
 
-    def types_at(self, reader: object) -> Callable[[str], FieldType | None]:
+    def _types_at(self, reader: object) -> Callable[[str], FieldType | None]:
         """Gives the type of a variable as a node reads it."""
         items = self._items.get(id(reader))
         if items is None:
@@ -290,7 +290,7 @@ class Checker:
 
         Worked out once for all of its form and with such types, where nothing is.
         """
-        variable = self.types_at(reader)
+        variable = self._types_at(reader) if self._items else self.variables.get
         key = (expression.form, *roots.items(), *map(variable, expression.variables))
         known = self._inferred.get(key)
         if known is None:

@@ -121,9 +121,10 @@ def infer_variables(written: Iterable[Write], known: Known) -> None:
         changed = False
         for name, writes in writers.items():
             if known.variables[name] is None:
-                kinds = {type_of(write, known) for write in writes} - {None}
-                known.variables[name] = kinds.pop() if len(kinds) == 1 else None
-                changed |= known.variables[name] is not None
+                kinds = [kind for write in writes if (kind := type_of(write, known)) is not None]
+                if kinds and kinds.count(kinds[0]) == len(kinds):
+                    known.variables[name] = kinds[0]
+                    changed = True
     open_still = {n: w for n, w in writers.items() if len(w) > 1 or w[0].depends}
     for _ in range(_ROUNDS):
         changed = False
