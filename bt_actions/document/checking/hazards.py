@@ -65,12 +65,11 @@ class _Hazards:
             kind = node.kind.name if node.kind is not None else ""
             if node.alias is not None:
                 self._used.add(node.alias)
-            if node.is_action:
-                if not inside:
-                    self._look_at_action(node)
-            elif not node.children:
+            if node.is_action and not inside:
+                self._look_at_action(node)
+            if not node.children:
                 continue
-            elif kind == "parallel":
+            if kind == "parallel":
                 self._parallel(node)
             elif kind == "retry" and not inside:
                 self._retry(node)
@@ -88,7 +87,7 @@ class _Hazards:
                 around = around | {
                     write.name: node for write in self._checker.writes.get(id(node), ())
                 }
-            stack.extend((child, inside, around) for child in reversed(node.children))
+            stack += [(child, inside, around) for child in reversed(node.children)]
 
     # BT304
 

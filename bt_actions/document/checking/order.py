@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence, Set
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
 from bt_actions.document.checking.checker import Checker
@@ -45,18 +46,22 @@ _SILENT = _Written(_NOTHING, _NOTHING)
 
 def find_early_reads(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
     """Report the reads that no write can come before."""
-    _Order(checker, doubts, root).visit(root, _NOTHING, _NOTHING)
+    _Order(checker, doubts).visit(root, _NOTHING, _NOTHING)
 
 
 class _Order:
-    def __init__(self, checker: Checker, doubts: Doubts, root: TreeNode) -> None:
+    def __init__(self, checker: Checker, doubts: Doubts) -> None:
         self._checker = checker
         self._doubts = doubts
         self._known = {*checker.document.inputs, *checker.document.topics}
         """What may have been written when the node is reached that is visited now."""
         self._passed: set[str] = set()
         """What the nodes write that were visited already."""
-        self._root = root
+        self._own = {
+            node: frozenset([write.name for write in writes])
+            for node, writes in checker.writes.items()
+        }
+        """What each node writes, by its id."""
         actions = checker.document.actions.items()
         self._shared: dict[str | None, Sequence[Computed]] = {
             name: checker.reads.get(id(declared), ()) for name, declared in actions
@@ -66,7 +71,7 @@ class _Order:
     @cached_property
     def _writers(self) -> Counter[str]:
         """How many nodes write a name."""
-        return Counter(name for node in self._root.walk() for name in self._own(node))
+        return Counter(chain.from_iterable(self._own.values()))
 
     def visit(self, node: TreeNode, around: frozenset[str], later: frozenset[str]) -> _Written:
         """Look at a node and what is below it.
@@ -75,7 +80,7 @@ class _Order:
         when nothing in their first round has failed.
         """
         kind = node.kind.name if node.kind is not None else ""
-        own = self._own(node)
+        own = self._own.get(id(node), _NOTHING)
         self._reads(node, own, around)
         if own:
             self._passed |= own
@@ -103,7 +108,8 @@ class _Order:
         ended: set[str] = set()  # written when a child ends the node
         succeeded: Set[str] = _NOTHING
         for child in node.children:
-            ended |= succeeded
+            if succeeded:
+                ended |= succeeded
             succeeded, failed = self.visit(child, around, later)
             if not (succeeded or failed):
                 continue
@@ -119,19 +125,16 @@ class _Order:
         self._known -= added
         return _Written(ended, onward) if kind == "fallback" else _Written(onward, ended)
 
-    def _own(self, node: TreeNode) -> frozenset[str]:
-        writes = self._checker.writes.get(id(node))
-        return frozenset([write.name for write in writes]) if writes else _NOTHING
-
     def _below(self, node: TreeNode) -> frozenset[str]:
-        return frozenset(name for inner in node.walk() for name in self._own(inner))
+        return _NOTHING.union(*(self._own.get(id(inner), _NOTHING) for inner in node.walk()))
 
     def _reads(self, node: TreeNode, own: frozenset[str], around: frozenset[str]) -> None:
-        checker = self._checker
-        for read in checker.reads.get(id(node), ()):
-            for at, name in enumerate(read.expression.variables):
+        for read in self._checker.reads.get(id(node), ()):
+            if self._known.issuperset(read.expression.variables):
+                continue
+            for name, at in read.expression.variable_spans:
                 if name not in self._known and not self._may_be_written(name, own, around):
-                    span = read.span(checker.source, *read.expression.variable_spans[at][1])
+                    span = read.span(self._checker.source, *at)
                     self._report(name, span, f"nothing has written ${name} when this is read")
         for read in self._shared.get(node.alias, ()):
             for name in read.expression.variables:

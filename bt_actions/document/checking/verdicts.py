@@ -41,15 +41,15 @@ class Verdicts:
 
     def of(self, node: TreeNode) -> Can:
         """How a node can end."""
-        found = self._known.get(id(node))
-        if found is None:
-            found = self._known[id(node)] = self._work_out(node)
-        return found
-
-    def _work_out(self, node: TreeNode) -> Can:
         kind = node.kind.name if node.kind is not None else "action"
         if kind in _OPEN and not self._at_once:
             return _EITHER
+        found = self._known.get(id(node))
+        if found is None:
+            found = self._known[id(node)] = self._work_out(kind, node)
+        return found
+
+    def _work_out(self, kind: str, node: TreeNode) -> Can:
         if kind in _FIXED:
             return _FIXED[kind]
         if self._at_once and (node.is_action or kind in BEGUN):
