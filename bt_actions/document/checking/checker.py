@@ -6,6 +6,7 @@ With `types=False` nothing of ROS is imported, and what would need it is taken f
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
 from functools import lru_cache
@@ -30,7 +31,7 @@ from bt_actions.document.reading.inputs import refuse_infinite
 from bt_actions.document.reading.settings import when_of
 from bt_actions.document.reading.tree import Declared, Document
 from bt_actions.document.reading.unread import Doubts
-from bt_actions.document.reading.writes import Write, writes_in
+from bt_actions.document.reading.writes import Write, writes_of
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError
@@ -70,10 +71,10 @@ class Checker:
         self.python = python
         self.variables: dict[str, FieldType | None] = {}
         self.declared_at: dict[str, Declared] = {}
-        self.reads: dict[int, list[Computed]] = {}
+        self.reads = defaultdict[int, list[Computed]](list)
         """What reads variables in each node, by the node's id; an alias's own under the alias's."""
         self.reader: object = document
-        self.writes: dict[int, list[Write]] = {}
+        self.writes = defaultdict[int, list[Write]](list)
         """What each node writes, by the node's id, in the order of the text."""
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
@@ -117,11 +118,13 @@ class Checker:
 
     def collect_writes(self) -> None:
         """Find the variables that nodes write, with their types as far as they are known."""
-        written = writes_in(self.document)
-        for write in written:
-            self.writes.setdefault(id(write.node), []).append(write)
-        self._items = items_inside(written, self.declared_at)
-        infer_variables(written, self)
+        writers = defaultdict[str, list[Write]](list)
+        for node in self.document.nodes():
+            for write in writes_of(node, self.document):
+                self.writes[id(node)].append(write)
+                writers[write.name].append(write)
+        self._items = items_inside(writers, self.declared_at)
+        infer_variables(writers, self)
 
     def action_class(self, declared: Declared) -> type | None:
         """The class of the action that a name stands for."""
@@ -263,7 +266,7 @@ class Checker:
         """Check what an expression reads and does; return its type, or None."""
         expression = computed.expression
         if expression.variables:
-            self.reads.setdefault(id(self.reader), []).append(computed)
+            self.reads[id(self.reader)].append(computed)
             for name in expression.variables:
                 if name not in self.variables:
                     self._unknown(computed)
@@ -291,7 +294,7 @@ class Checker:
         Worked out once for all of its form and with such types, where nothing is.
         """
         variable = self._types_at(reader) if self._items else self.variables.get
-        key = (expression.form, *roots.items(), *map(variable, expression.variables))
+        key = (expression.form, *roots.values(), *map(variable, expression.variables))
         known = self._inferred.get(key)
         if known is None:
             known = infer(expression, roots, variable, types=self.types)

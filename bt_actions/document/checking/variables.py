@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping, Sequence
 from typing import Protocol
 
 from bt_actions.document.checking.infer import Wrong, common_type, type_of_literal
@@ -80,15 +80,14 @@ def _output_type(write: Write, known: Known) -> FieldType | None:
         return None
 
 
-def items_inside(written: Iterable[Write], declared: Container[str]) -> dict[int, dict[str, Write]]:
+def items_inside(
+    writers: Mapping[str, Sequence[Write]], declared: Container[str]
+) -> dict[int, dict[str, Write]]:
     """What gives the nodes inside of loops their items, by the node's id.
 
     Only where several loops use one name, and nothing else writes it: inside of each it has the
     type of that loop's items.
     """
-    writers: dict[str, list[Write]] = {}
-    for write in written:
-        writers.setdefault(write.name, []).append(write)
     inside: dict[int, dict[str, Write]] = {}
     for name, loops in writers.items():
         if len(loops) < 2 or name in declared or any(one.root != "item of" for one in loops):
@@ -102,18 +101,15 @@ def items_inside(written: Iterable[Write], declared: Container[str]) -> dict[int
     return inside
 
 
-def infer_variables(written: Iterable[Write], known: Known) -> None:
+def infer_variables(writers: Mapping[str, Sequence[Write]], known: Known) -> None:
     """Give the variables that nodes write the one type that all of them write, or None.
 
     What is declared keeps its type. A value may be computed from a variable that is written further
     down, or from itself (a counter): so unknown types are left out of account at first, and count
     once every variable has had its chance.
     """
-    writers: dict[str, list[Write]] = {}
-    for write in written:
-        if write.name not in known.variables or write.name in writers:
-            writers.setdefault(write.name, []).append(write)
-            known.variables.setdefault(write.name, None)
+    writers = {name: writes for name, writes in writers.items() if name not in known.variables}
+    known.variables.update(dict.fromkeys(writers))
     changed = True
     for _ in range(_ROUNDS):
         if not changed:

@@ -65,23 +65,17 @@ class _Reader:
 
     def tree(self, written: Node) -> TreeNode | None:
         """The tree that begins with a node."""
-        root = self.node(written)
+        root = self._node(written)
         while self._waiting:
             parent, item = self._waiting.pop()
-            child = self.node(item)
+            child = self._node(item)
             if child is not None:
                 child.level = parent.level + 1
                 parent.children.append(child)
         return root
 
-    def node(self, written: Node) -> TreeNode | None:
-        """A node by itself; its children wait."""
-        node = self._node(written)
-        if node is None:
-            self._source.unread.nodes.append(written)
-        return node
-
     def _node(self, written: Node) -> TreeNode | None:
+        """A node by itself; its children wait."""
         source = self._source
         if not isinstance(written, Mapping):
             hint = None
@@ -91,10 +85,12 @@ class _Reader:
                     hint = f"write '{word}: {name or 'name'}'"
             message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
             source.report("BT111", span_of(written), message, hint=hint)
+            source.unread.nodes.append(written)
             return None
         key = self._kind_key(written)
         if key is None:
             self._only_children(written)
+            source.unread.nodes.append(written)
             return None
         kind = KINDS.get(key.text)
         node = TreeNode(kind, key, written, source)
@@ -216,7 +212,7 @@ class _Reader:
                 else:
                     value = wrong_form(kind.value, inner, source, hint=hint)
                 node.values[name] = value
-                if kind.named_by_value and isinstance(value, str):
+                if isinstance(value, str) and kind.named_by_value:
                     node.name = value
                 if value is BAD:
                     source.unread.nodes.append(inner)

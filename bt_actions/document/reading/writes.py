@@ -10,7 +10,7 @@ from bt_actions.document.language.values import Computed
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping, Node
 
-__all__ = ["Write", "writes_in", "writes_of"]
+__all__ = ["Write", "writes_of"]
 
 
 _WRITERS = {"set", "for_each", *(name for name, kind in KINDS.items() if "save" in kind.keys)}
@@ -39,11 +39,6 @@ class Write:
     def depends(self) -> bool:
         """Does the type of what is written depend on those of variables?"""
         return isinstance(self.value, Computed) and bool(self.value.expression.variables)
-
-
-def writes_in(document: Document) -> list[Write]:
-    """The variables that the nodes of a document write, in the order of the text."""
-    return [write for node in document.nodes() for write in writes_of(node, document)]
 
 
 def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
