@@ -92,8 +92,8 @@ def _within(checker: Checker, source: Source, what: str) -> Iterator[None]:
 
 def _check_together(checker: Checker, node: TreeNode, declared: Declared) -> None:
     """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
-    own, shared = node.values.get("goal"), declared.values.get("goal")
-    if not isinstance(own, dict) or not isinstance(shared, dict):
+    shared, own = declared.values.get("goal"), node.values.get("goal")
+    if not isinstance(shared, dict) or not isinstance(own, dict):
         return
     cls = checker.action_class(declared)
     if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):

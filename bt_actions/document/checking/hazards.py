@@ -148,10 +148,9 @@ class _Hazards:
     # BT305, BT306, BT307
 
     def _unreachable(self, node: TreeNode, kind: str) -> None:
+        onward = 0 if kind == "sequence" else 1
         for child, after in zip(node.children, node.children[1:], strict=False):
-            can = self._verdicts.of(child)
-            ends = not can.fail if kind == "fallback" else not can.succeed
-            if ends and not self._doubts.below(child):
+            if not self._verdicts.of(child)[onward] and not self._doubts.below(child):
                 how = "fails" if kind == "fallback" else "succeeds"
                 self._report(
                     "BT305", span_of(after.key), "this child is never reached",
@@ -268,7 +267,7 @@ class _Hazards:
         read = {name for one in reads for name in one.expression.variables}
         written = {write.name for writes in checker.writes.values() for write in writes}
         if not doubts.unknown_variable:
-            self._unread(read)
+            self._unread(read, written)
         for name in self._own(document.actions):
             if name not in self._used and not doubts.unknown_action and not doubts.mentions(name):
                 key = document.actions[name].key
@@ -279,7 +278,7 @@ class _Hazards:
                 text = f"nothing writes the output {name!r}"
                 self._report("BT311", span_of(declared.key), text)
 
-    def _unread(self, read: set[str]) -> None:
+    def _unread(self, read: set[str], written: set[str]) -> None:
         document, doubts = self._document, self._doubts
         for name, declared in document.inputs.items():
             if name not in read and name not in document.outputs and not doubts.mentions(name):
@@ -289,7 +288,7 @@ class _Hazards:
                 key = document.topics[name].key
                 self._report("BT309", span_of(key), f"nothing reads the topic {name!r}")
         known = read | set(document.outputs) | set(document.inputs) | set(document.topics)
-        for writes in self._checker.writes.values():
+        for writes in self._checker.writes.values() if written - known else ():
             unread = [one for one in writes if one.name not in known and one.under not in _LOOPED]
             if not unread:
                 continue

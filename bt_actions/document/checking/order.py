@@ -79,13 +79,15 @@ class _Order:
         `around` is what loops and branches around it may have written, `later` what they write only
         when nothing in their first round has failed.
         """
-        kind = node.kind.name if node.kind is not None else ""
         own = self._own.get(id(node), _NOTHING)
         self._reads(node, own, around)
         if own:
             self._passed |= own
+        elif not node.children:
+            return _SILENT
+        kind = node.kind.name if node.kind is not None else ""
         if not node.children:
-            return _Written(own, own if kind == "subtree" else _NOTHING) if own else _SILENT
+            return _Written(own, own if kind == "subtree" else _NOTHING)
         if kind == "repeat":  # a read in its first round has nothing yet
             later |= self._below(node)
         elif kind in _LOOPS or node.values.get("memory") is False:

@@ -20,7 +20,7 @@ from bt_actions.document.language.shape import (
 )
 from bt_actions.document.language.values import BAD, Computed, read_expression, read_value
 from bt_actions.document.yaml.cut import warn_cut
-from bt_actions.document.yaml.nodes import Node, Scalar, span_of
+from bt_actions.document.yaml.nodes import NULLS, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, spoken
 from bt_actions.utilities.suggest import did_you_mean
 from bt_actions.utilities.units import DURATION_UNITS, parse_duration
@@ -268,7 +268,7 @@ class Condition:
     words: str = "an expression"
 
     def read(self, node: Node, source: Source) -> object:
-        if not isinstance(node, Scalar) or node.value is None:
+        if not isinstance(node, Scalar) or (node.plain and node.text in NULLS):
             return wrong_form(self, node, source)
         expression = read_expression(node, source, node.text, 0, self.roots)
         if expression is None:

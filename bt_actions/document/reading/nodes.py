@@ -197,13 +197,13 @@ class _Reader:
     def _fill(
         self, node: TreeNode, keys: MappingType[str, Key], kind: Kind, needs: tuple[Key, ...]
     ) -> None:
-        source = self._source
+        source, values, written = self._source, node.values, node.written
         unknown = False
         beside: list[tuple[Scalar, Node]] = []
         for key, inner in chain(node.node.pairs, beside):
             name = key.text
             if key is node.key:
-                node.written[name] = inner
+                written[name] = inner
                 hint = None
                 if not isinstance(inner, Scalar):
                     hint = self._below_name(node, inner, kind, keys, beside)
@@ -211,13 +211,13 @@ class _Reader:
                     value = kind.value.read(inner, source)
                 else:
                     value = wrong_form(kind.value, inner, source, hint=hint)
-                node.values[name] = value
+                values[name] = value
                 if isinstance(value, str) and kind.named_by_value:
                     node.name = value
                 if value is BAD:
                     source.unread.nodes.append(inner)
             elif name in _CHILDREN and name in keys:
-                node.written[name] = inner
+                written[name] = inner
                 self._children(node, name, inner)
             else:
                 known = keys.get(name)
@@ -228,18 +228,17 @@ class _Reader:
                     if name in _CHILDREN:
                         self._children(TreeNode(None, key, node.node, source), name, inner)
                     continue
-                node.written[name] = inner
-                value = node.values[name] = known.shape.read(inner, source)
+                written[name] = inner
+                value = values[name] = known.shape.read(inner, source)
                 if value is BAD:
                     source.unread.nodes.append(inner)
                     source.unread.names |= isinstance(known.shape, Name)
-        own = node.values.get("name")
-        if isinstance(own, str):
+        if isinstance(own := values.get("name"), str):
             node.name = own
         if unknown:
             return
         for wanted in needs:
-            if wanted.name not in node.written:
+            if wanted.name not in written:
                 source.report(
                     "BT108", span_of(node.key),
                     f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,

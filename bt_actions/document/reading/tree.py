@@ -68,8 +68,8 @@ class TreeNode:
 
     def release(self) -> None:
         """Keep of the YAML only where it stands: nothing more is made from it."""
-        self.node.pairs = []
-        self.written = {}
+        self.node.pairs.clear()
+        self.written.clear()
 
     def walk(self) -> Iterator[TreeNode]:
         """This node and all below it, in the order of the text."""

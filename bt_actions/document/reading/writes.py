@@ -13,6 +13,7 @@ from bt_actions.document.yaml.nodes import Mapping, Node
 __all__ = ["Write", "writes_of"]
 
 
+_ROOTS = {"subtree": None, "wait_for_message": "message"}
 _WRITERS = {"set", "for_each", *(name for name, kind in KINDS.items() if "save" in kind.keys)}
 
 
@@ -55,9 +56,8 @@ def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
         for name, value in shared.items():
             if name not in own:
                 yield Write(name, node, "", value, "result")
-    root = {"subtree": None, "wait_for_message": "message"}.get(kind, "result")
     for name, value in own.items():
-        yield Write(name, node, "save", value, root)
+        yield Write(name, node, "save", value, _ROOTS.get(kind, "result"))
     if kind == "set" and isinstance(table := values.get("set"), dict):
         for name, value in table.items():
             yield Write(name, node, "set", value)

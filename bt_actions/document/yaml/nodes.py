@@ -13,6 +13,7 @@ from yaml import Mark
 from bt_actions.document.findings import Span
 
 __all__ = [
+    "NULLS",
     "Alias",
     "Listing",
     "Mapping",
@@ -25,8 +26,8 @@ __all__ = [
 ]
 
 _NUMBER_START = frozenset("0123456789+-.")
-_WORDS: dict[str, object] = {
-    "": None, "~": None, "null": None, "Null": None, "NULL": None,
+NULLS = frozenset({"", "~", "null", "Null", "NULL"})
+_WORDS: dict[str, object] = dict.fromkeys(NULLS) | {
     "true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False,
 }  # fmt: skip
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
