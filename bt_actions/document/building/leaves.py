@@ -31,13 +31,12 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
     """The behaviour of an action, by its name in the document or in place."""
     settings = settings_of(node, context.document)
     goal = settings.get("goal", {})
-    dynamic = next(computed_in(goal), None) is not None
     action = _interface(settings["type"], "action", context)
     return ActionBehaviour(
         node.name,
         action,
         context.name(settings, "server"),
-        context.value(goal) if dynamic else goal,
+        context.value(goal) if computed_in(goal) else goal,
         timeout=_timeouts(tuple(table_of(settings.get("timeout")).items())),
         **_terms(settings, context, "result", action.Result if context.types else None),
     )

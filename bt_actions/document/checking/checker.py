@@ -272,7 +272,7 @@ class Checker:
                     self._unknown(computed)
                     break
 
-        elif not expression.roots and not expression.constants:
+        elif not expression.form.roots and not expression.form.constants:
             try:
                 computed.evaluate(lambda _name: None)
             except ExpressionError as error:

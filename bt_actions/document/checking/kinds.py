@@ -253,7 +253,7 @@ def _python(checker: Checker, node: TreeNode) -> None:
     if refused := refusal(path, checker.python):
         checker.source.report("BT214", span_of(node.key), refused)
         return
-    computed = list(computed_in(arguments))
+    computed = computed_in(arguments)
     for one in computed:
         text = "an argument is a plain value: the class is made before the tree runs"
         checker.source.report("BT204", span_of(one.node), text)

@@ -57,11 +57,11 @@ class Verdicts:
         if self._at_once and kind in ("log", "set", "publish", "wait_until"):
             return Can(True, False)
         if kind in ("log", "wait"):
-            return Can(True, any(True for _ in computed_in(node.values.get(kind))))
+            return Can(True, bool(computed_in(node.values.get(kind))))
         if kind in ("set", "publish"):
             data = node.values.get("set" if kind == "set" else "message")
             waits = node.values.get("timeout") is not None
-            return Can(True, waits or any(True for _ in computed_in(data)))
+            return Can(True, waits or bool(computed_in(data)))
         if kind == "subtree":
             return self._subtree(node)
         if not node.children:
@@ -84,7 +84,7 @@ class Verdicts:
         if node.included is None or node.included.root is None:
             return _EITHER
         inner = self.of(node.included.root)
-        refused = any(True for _ in computed_in(node.values.get("with")))
+        refused = bool(computed_in(node.values.get("with")))
         return Can(inner.succeed, inner.fail or (refused and not self._at_once))
 
     def _decorated(self, kind: str, inner: Can, node: TreeNode) -> Can:

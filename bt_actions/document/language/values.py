@@ -7,7 +7,7 @@ A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` sta
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 from functools import lru_cache
@@ -309,23 +309,21 @@ def locate(node: Node, path: tuple[str | int, ...], *, at_key: bool = False) -> 
     return node
 
 
-def computed_in(value: object) -> Iterator[Computed]:
+def computed_in(value: object) -> list[Computed]:
     """Every computed part of a value, in the order it was written."""
     if isinstance(value, Computed):
-        yield value
-    elif isinstance(value, Interpolated):
-        for part in value.parts:
-            if isinstance(part, Computed):
-                yield part
-    elif isinstance(value, (dict, list)):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from computed_in(item)
+        return [value]
+    if isinstance(value, Interpolated):
+        return [part for part in value.parts if isinstance(part, Computed)]
+    if isinstance(value, dict):
+        value = [*value.values()]
+    return [each for item in value for each in computed_in(item)] if isinstance(value, list) else []
 
 
 def constant_of(computed: Computed) -> object:
     """The value of an expression over nothing but numbers and texts; None for any other."""
     expression = computed.expression
-    if expression.variables or expression.roots or expression.constants:
+    if expression.variables or expression.form.roots or expression.form.constants:
         return None
     try:
         return computed.evaluate(lambda _name: None)

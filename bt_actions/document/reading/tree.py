@@ -21,13 +21,15 @@ class TreeNode:
 
     `values` holds what was read under each key (the kind's own key included), `written` the YAML
     node of each; `level` is how deep it is, from 1. `alias` is the action's name in this document,
-    where the node is one; `included` the tree that a subtree stands for.
+    where the node is one; `included` the tree that a subtree stands for. `is_action` tells whether
+    it sends a goal: under an action's name, with its type in place, or to a server of trees.
     """
 
     __slots__ = (
         "alias",
         "children",
         "included",
+        "is_action",
         "key",
         "kind",
         "level",
@@ -40,6 +42,7 @@ class TreeNode:
 
     def __init__(self, kind: Kind | None, key: Scalar, node: Mapping, source: Source) -> None:
         self.kind = kind
+        self.is_action = kind is None or kind.name in ("action", "run_tree")
         self.level = 1
         self.key = key
         self.node = node
@@ -58,13 +61,6 @@ class TreeNode:
         if not node.begin.index <= at.index < node.end.index:
             at = node.begin
         return Place(self.source.name, at.line + 1, at.column + 1)
-
-    @property
-    def is_action(self) -> bool:
-        """Whether it sends a goal: under an action's name, with its type in place, or to a server
-        of trees."""
-        sends = self.kind is not None and self.kind.name in ("action", "run_tree")
-        return self.alias is not None or sends
 
     def release(self) -> None:
         """Keep of the YAML only where it stands: nothing more is made from it."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bt_actions.document.language.kinds import KINDS
@@ -42,28 +41,27 @@ class Write:
         return isinstance(self.value, Computed) and bool(self.value.expression.variables)
 
 
-def writes_of(node: TreeNode, document: Document) -> Iterator[Write]:
+def writes_of(node: TreeNode, document: Document) -> list[Write]:
     """The variables that a node itself writes."""
     values = node.values
     kind = node.kind.name if node.kind is not None else ""
     if kind and kind not in _WRITERS:
-        return
+        return []
     saved = values.get("save")
     own = saved if isinstance(saved, dict) else {}
     declared = document.actions.get(node.alias) if node.alias is not None else None
     shared = declared.values.get("save") if declared is not None else None
+    root = _ROOTS.get(kind, "result")
+    writes = [Write(name, node, "save", value, root) for name, value in own.items()]
     if isinstance(shared, dict):
-        for name, value in shared.items():
-            if name not in own:
-                yield Write(name, node, "", value, "result")
-    for name, value in own.items():
-        yield Write(name, node, "save", value, _ROOTS.get(kind, "result"))
+        given = [pair for pair in shared.items() if pair[0] not in own]
+        writes = [Write(name, node, "", value, "result") for name, value in given] + writes
     if kind == "set" and isinstance(table := values.get("set"), dict):
-        for name, value in table.items():
-            yield Write(name, node, "set", value)
+        writes += [Write(name, node, "set", value) for name, value in table.items()]
     elif kind == "for_each":
         item, index = values.get("as", "item"), values.get("index")
         if isinstance(item, str):
-            yield Write(item, node, "as", values.get("in"), "item of")
+            writes.append(Write(item, node, "as", values.get("in"), "item of"))
         if isinstance(index, str):
-            yield Write(index, node, "index", 0)
+            writes.append(Write(index, node, "index", 0))
+    return writes

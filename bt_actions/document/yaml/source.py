@@ -93,8 +93,13 @@ class Source:
     """Of such data, each counted as often as the document names it."""
     errors: int = 0
     """How many of the findings keep the tree from running."""
+    commented: frozenset[int] = field(init=False)
+    """The numbers of the lines that hold a '#'."""
     _lines: list[str] | None = None
-    _commented: frozenset[int] | None = None
+
+    def __post_init__(self) -> None:
+        numbers = enumerate(self.lines, 1) if "#" in self.text else ()
+        self.commented = frozenset(number for number, line in numbers if "#" in line)
 
     @property
     def lines(self) -> list[str]:
@@ -107,14 +112,6 @@ class Source:
         """Line `number` (from 1), or None past the end."""
         lines = self.lines
         return lines[number - 1] if 0 < number <= len(lines) else None
-
-    @property
-    def commented(self) -> frozenset[int]:
-        """The numbers of the lines that hold a '#'."""
-        if self._commented is None:
-            numbers = enumerate(self.lines, 1) if "#" in self.text else ()
-            self._commented = frozenset(number for number, line in numbers if "#" in line)
-        return self._commented
 
     def refusal(self, path: Path) -> str:
         """Why it may not name this file, wherever links lead; or ""."""
