@@ -31,6 +31,7 @@ MAX_NODES = 2_000_000
 """Nodes of a text, its aliases unfolded; a list or a mapping counts twice, as it begins and ends.
 A tree of 100,000 nodes has about half of it."""
 _TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
+_TOO_LARGE = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
 NO_LIBYAML = (
     "trees are read with libyaml, and PyYAML is installed without it here; its wheels hold it: "
     "pip install --force-reinstall --only-binary :all: PyYAML"
@@ -79,7 +80,7 @@ class _Composer:
         parser = yaml.CSafeLoader(source.text)
         self._source = source
         self._events = chain(
-            starmap(parser.get_event, repeat((), MAX_NODES)), self._beyond(parser.get_event)
+            starmap(parser.get_event, repeat((), MAX_NODES)), _beyond(source, parser.get_event)
         )
         self._unfold = unfold
         self.anchored: dict[int, str] = {}
@@ -90,12 +91,6 @@ class _Composer:
         """The size of all that aliases stand for."""
         self._level = 0
         """How many collections are open."""
-        self._takes: dict[type, Callable[[Any], Node]] = {
-            ScalarEvent: self._scalar,
-            MappingStartEvent: self._mapping,
-            ListingStartEvent: self._listing,
-            AliasEvent: self._alias,
-        }
 
     def read(self) -> Node | None:
         """The document, after all events were taken. Raises _GaveUp."""
@@ -109,23 +104,14 @@ class _Composer:
                         "BT106", event, "a second document begins here; one file, one tree"
                     )
                 event = next(self._events)
-                root = self._takes[type(event)](event)
+                root = _TAKES[type(event)](self, event)
         return root
-
-    def _beyond(self, get_event: Callable[[], Any]) -> Iterator[Any]:
-        self._too_large(get_event())
-        yield
 
     def _report(self, code: str, event: Any, message: str) -> None:
         self._source.report(code, _event_span(event), message)
 
     def _give_up(self, code: str, event: Any, message: str) -> NoReturn:
-        self._report(code, event, message)
-        raise _GaveUp
-
-    def _too_large(self, event: Any) -> NoReturn:
-        text = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
-        self._give_up("BT105", event, text)
+        _give_up(self._source, code, event, message)
 
     def _scalar(self, event: Any) -> Scalar:
         node = Scalar()
@@ -146,11 +132,10 @@ class _Composer:
         node = Listing()
         node.items = items = []
         self._begin(node, start)
-        takes = self._takes
         for event in self._events:
             if (kind := type(event)) is SequenceEndEvent:
                 break
-            items.append(takes[kind](event))
+            items.append(_TAKES[kind](self, event))
         self._end(node, start, event, items[-1] if items else None)
         return node
 
@@ -160,20 +145,20 @@ class _Composer:
         self._begin(node, start)
         keys: dict[str, Scalar] = {}
         refused = False
-        events, takes = self._events, self._takes
+        events = self._events
         for event in events:
             if (kind := type(event)) is MappingEndEvent:
                 break
-            key = takes[kind](event)
+            key = _TAKES[kind](self, event)
             if type(key) is Scalar and key.text not in keys:
                 key.text = text = intern(key.text)  # a tree has few keys, and says them often
                 keys[text] = key
                 event = next(events)
-                pairs.append((key, takes[type(event)](event)))
+                pairs.append((key, _TAKES[type(event)](self, event)))
             else:
                 self._refuse(key, keys)
                 event = next(events)
-                self._source.unread.nodes.append(takes[type(event)](event))
+                self._source.unread.nodes.append(_TAKES[type(event)](self, event))
                 refused = True
         self._end(node, start, event, pairs[-1][1] if pairs else None)
         if "<<" in keys and self._unfold:
@@ -239,7 +224,7 @@ class _Composer:
             self._give_up("BT105", event, _TOO_DEEP)
         self._unfolded += size
         if self._unfolded > MAX_NODES:
-            self._too_large(event)
+            self._give_up("BT105", event, _TOO_LARGE)
         return node
 
     def _measure(self, node: Node) -> tuple[int, int]:
@@ -273,6 +258,25 @@ class _Composer:
                         own.add(inner_key.text)
                         pairs.append((inner_key, inner_value))
         node.pairs = pairs
+
+
+_TAKES: dict[type, Callable[[_Composer, Any], Node]] = {
+    ScalarEvent: _Composer._scalar,  # noqa: SLF001 - how it takes each kind of event
+    MappingStartEvent: _Composer._mapping,  # noqa: SLF001
+    ListingStartEvent: _Composer._listing,  # noqa: SLF001
+    AliasEvent: _Composer._alias,  # noqa: SLF001
+}
+
+
+def _beyond(source: Source, get_event: Callable[[], Any]) -> Iterator[Any]:
+    """What comes after `MAX_NODES` events."""
+    _give_up(source, "BT105", get_event(), _TOO_LARGE)
+    yield
+
+
+def _give_up(source: Source, code: str, event: Any, message: str) -> NoReturn:
+    source.report(code, _event_span(event), message)
+    raise _GaveUp
 
 
 def _braced(node: Node) -> str | None:
