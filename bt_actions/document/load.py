@@ -8,6 +8,7 @@ import os
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -262,10 +263,13 @@ def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> lis
             check_document(checker)
             doubts = Doubts(document)  # anew: the checker found more
             find_hazards(checker, doubts)
-            has_unread = document.root is None and document.node.get("root") is not None
-            all_tried = not has_unread and not doubts.any
-            apply_ignores(document.source, complete=all_tried)
+            apply_ignores(document.source, partial(_all_tried, document, doubts))
     return workspace.findings
+
+
+def _all_tried(document: Document, doubts: Doubts) -> bool:
+    has_unread = document.root is None and document.node.get("root") is not None
+    return not has_unread and not doubts.any
 
 
 @_no_collecting()

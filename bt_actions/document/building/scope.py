@@ -15,6 +15,7 @@ from py_trees.blackboard import Blackboard
 
 __all__ = ["Scope"]
 
+_ODD = re.compile(r"[^A-Za-z0-9_]")
 _LOADS = "/bt/loads"
 """The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""
 
@@ -90,4 +91,4 @@ class Scope:
 
 
 def _safe(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_]", "_", name) or "tree"
+    return _ODD.sub("_", name) or "tree"

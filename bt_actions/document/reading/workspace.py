@@ -43,6 +43,7 @@ class Workspace:
         self._sizes: dict[int, int] = {}
         self._heights: dict[int, int] = {}
         self._failed: dict[Path, DocumentError] = {}
+        self._keys: dict[Path, Path] = {}
 
     def open(self, path: Path, name: str | None = None) -> Document | None:
         """The tree in a file, with its imports and subtrees; None when there is none to speak of.
@@ -54,12 +55,11 @@ class Workspace:
         if refusal := source.refusal(path):
             source.report("BT209", Span(1, 1, 1, 2), refusal)
             raise DocumentError(source.findings)
-        return self._open_tree(source, (_key(path),))
+        return self._open_tree(source, (path,))
 
     def open_source(self, source: Source) -> Document | None:
         """The tree in a source that was read already (standard input, an editor's buffer)."""
-        chain = (_key(source.path),) if source.path is not None else ()
-        return self._open_tree(source, chain)
+        return self._open_tree(source, () if source.path is None else (source.path,))
 
     @property
     def documents(self) -> list[Document]:
@@ -69,8 +69,8 @@ class Workspace:
     @property
     def files(self) -> dict[Path, str]:
         """Every file that was read, resolved, with its text; that of data files is empty."""
-        found = {_key(each.path): each.text for each in self._sources if each.path is not None}
-        return found | {_key(path): "" for each in self._sources for path in each.files}
+        found = {self._key(each.path): each.text for each in self._sources if each.path}
+        return found | {self._key(path): "" for each in self._sources for path in each.files}
 
     @property
     def findings(self) -> list[Finding]:
@@ -93,7 +93,7 @@ class Workspace:
                 source.errors = errors
 
     def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
-        key = (chain[-1] if chain else _key(Path(source.name)), False)
+        key = (chain[-1] if chain else Path(source.name), False)
         if key in self._documents:
             return self._documents[key]
         self._sources.append(source)
@@ -135,7 +135,8 @@ class Workspace:
         path = self._find(wanted, written, node.source)
         if path is None:
             return None
-        key = _key(path)
+        key = self._key(path)
+        chain = tuple(map(self._key, chain))
         if key in chain:
             names = [step.name for step in chain[chain.index(key) :]] + [key.name]
             text = f"the tree includes itself: {' -> '.join(names)}"
@@ -174,7 +175,7 @@ class Workspace:
         return path
 
     def _read(self, path: Path, written: Node, source: Source) -> Source | None:
-        key = _key(path)
+        key = self._key(path)
         if key not in self._failed:
             try:
                 opened = read_source(path, _shown(path, source), pipes=False)
@@ -227,7 +228,8 @@ class Workspace:
         path = self._find(name, node, source)
         if path is None:
             return None
-        key = _key(path)
+        key = self._key(path)
+        chain = tuple(map(self._key, chain))
         if key in chain:
             names = [step.name for step in chain[chain.index(key) :]] + [key.name]
             source.report("BT210", span_of(node), f"a cycle of imports: {' -> '.join(names)}")
@@ -248,19 +250,21 @@ class Workspace:
             self._import(library, (*chain, key))
         return library
 
+    def _key(self, path: Path) -> Path:
+        """The file itself, wherever links lead; looked for once it matters."""
+        if path not in self._keys:
+            try:
+                self._keys[path] = path.resolve()
+            except (OSError, RuntimeError):
+                self._keys[path] = path
+        return self._keys[path]
+
 
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
     except OSError:
         return False
-
-
-def _key(path: Path) -> Path:
-    try:
-        return path.resolve()
-    except (OSError, RuntimeError):
-        return path
 
 
 def _shown(path: Path, source: Source) -> str:

@@ -7,7 +7,7 @@ error, or silences nothing, is an error itself.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from bt_actions.document.findings import Severity, Span
 from bt_actions.document.findings.rules import RULES
@@ -21,10 +21,10 @@ _IGNORE = re.compile(r"(?:^|(?<=\s))#\s*bt:\s*ignore\b(?:\[([^\]]*)\])?")
 _CODE = re.compile(r"[^\s,]+")
 
 
-def apply_ignores(source: Source, *, complete: bool = True) -> None:
+def apply_ignores(source: Source, complete: Callable[[], bool]) -> None:
     """Take the silenced findings out of a source, and report what is wrong with the ignores.
 
-    `complete` is False when not all rules were tried: then no ignore is called useless.
+    `complete` says whether all rules were tried: else no ignore is called useless.
     """
     if "ignore" not in source.text or source.root is None:
         return
@@ -43,7 +43,7 @@ def apply_ignores(source: Source, *, complete: bool = True) -> None:
         source.findings[:] = [
             finding for finding in source.findings if (finding.code, finding.line) not in silenced
         ]
-    for code, span in useless if complete else ():
+    for code, span in useless if complete() else ():
         source.report("BT120", span, f"there is no {code} here to silence")
 
 
