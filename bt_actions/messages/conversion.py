@@ -78,7 +78,8 @@ def fill_value(kind: FieldType, data: object) -> object:
     Raises MessageError.
     """
     value = _filled(kind, data, time.time_ns)
-    return value if isinstance(data, array.array) else plain(value)
+    was_array = isinstance(data, (array.array, bytes, bytearray))
+    return value if was_array and isinstance(value, array.array) else plain(value)
 
 
 def _filled(kind: FieldType, data: object, now: Callable[[], int]) -> Any:
