@@ -14,8 +14,7 @@ _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout
 import bt_actions.behaviours.ports as _ports  # noqa: F401 - makes the tags of XML trees known
 
 if _TYPE_CHECKING:
-    from bt_actions.behaviours.action import ActionBehaviour
-    from bt_actions.behaviours.progress import Progress
+    from bt_actions.behaviours.action import ActionBehaviour, Progress
     from bt_actions.behaviours.robot import Gripper, MoveRobot
     from bt_actions.behaviours.run_tree import RunTree
     from bt_actions.behaviours.variables import Var
@@ -50,8 +49,7 @@ __all__ = [  # noqa: RUF022 - grouped by use
 ]
 
 _PLACES = {
-    "behaviours.action": ["ActionBehaviour"],
-    "behaviours.progress": ["Progress"],
+    "behaviours.action": ["ActionBehaviour", "Progress"],
     "behaviours.robot": ["Gripper", "MoveRobot"],
     "behaviours.run_tree": ["RunTree"],
     "behaviours.variables": ["Var"],

@@ -8,13 +8,13 @@ goals/ decides what happens to the goal; here stand the visit to the leaf and it
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected
-from bt_actions.behaviours.progress import Progress
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
@@ -30,6 +30,21 @@ from bt_actions.utilities.shorten import shorten, shorten_fields
 if TYPE_CHECKING:
     from bt_actions.traffic.endpoint import ActionEndpoint
     from bt_actions.traffic.handle import GoalHandle
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """What an action is doing at this moment."""
+
+    state: str
+    """A goal's state, or IDLE before the first visit, BACKOFF between two attempts."""
+    attempt: int
+    attempts: int
+    feedback: Any
+    """The latest feedback message, or None."""
+    seconds_left: float | None
+    deadline: str
+    """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
 
 
 class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
