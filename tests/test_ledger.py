@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
-import shutil
 import subprocess
 import sys
 import time
@@ -155,7 +155,10 @@ def test_the_child_of_a_fork_leaves_its_parents_file_alone(ledger: Ledger, direc
 def test_without_room_it_complains_once_and_the_goal_goes_on(
     ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module.os, "pwrite", lambda *_: 100)
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(module.os, "posix_fallocate", fail)
     for _ in range(3):
         ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
     (complaint,) = complaints
@@ -286,16 +289,6 @@ def test_who_ends_leaves_nothing_unless_a_goal_is_open(ledger: Ledger, directory
     ledger.strike(answered)
     ledger.close()
     assert len(on_record(directory)) == 1
-
-
-def test_a_directory_that_is_removed_meanwhile_is_made_again(
-    ledger: Ledger, directory: Path
-) -> None:
-    """Who logs out may have all of /dev/shm removed."""
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
-    shutil.rmtree(directory)
-    ledger.enter(new_goal_id(), Entry("/move", 1, SERVERS))
-    assert [each["domain"] for each in on_record(directory)] == [1]
 
 
 def test_what_is_elsewhere_is_told_apart(directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:

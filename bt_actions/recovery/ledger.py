@@ -4,8 +4,8 @@ A server shows the goals that it has accepted. Of one that it has received, and 
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
 So each process has a file, named by what its goals' ids begin with (goals/ids.py), with a slot for
 each goal without an answer. It outlives a process that is killed, and cleanup reads it
-(recovery/sweep.py). It lies in memory (/dev/shm), so that writing it waits for no disk, in a
-directory that only this user may write to.
+(recovery/sweep.py). It lies in memory (/dev/shm), in a directory that only this user may write to,
+and is mapped: a call of the system's for each goal would give Python's lock away.
 
 A slot is written before the goal is sent, and blank again when that has been answered; not where
 its server went away, which may only stand still. What is read is believed no further than that a
@@ -17,6 +17,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import mmap
 import os
 import stat
 import time
@@ -35,6 +36,7 @@ SERVERS_AT_MOST = 8
 """Servers of a goal on record; where there are more, none is."""
 KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up."""
+_MORE = 16 * LENGTH
 _SUFFIX = ".goals"
 _BLANK = b"\0" * LENGTH
 _AUTHOR = 12
@@ -79,7 +81,7 @@ class Ledger(Record):
         self._complained = False
         self._path = Path()
         self._file: int | None = None
-        self._end = 0
+        self._map: mmap.mmap | None = None
         self._slots: dict[bytes, int] = {}
         self._free: list[int] = []
 
@@ -92,13 +94,12 @@ class Ledger(Record):
         if len(entry.servers) > SERVERS_AT_MOST:
             entry = replace(entry, servers=frozenset())
         try:
-            file = self._opened(goal_id)
             at = self._slots.get(goal_id)
             if at is None:
-                at = self._slots[goal_id] = self._free.pop() if self._free else self._end
-                self._end = max(self._end, at + LENGTH)
-            if os.pwrite(file, _slot(goal_id, entry), at) < LENGTH:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                if not self._free:
+                    self._grow(goal_id)
+                at = self._slots[goal_id] = self._free.pop()
+            self._fill(at, _slot(goal_id, entry))
         except OSError as error:
             if not self._complained:
                 self._complained = True
@@ -107,24 +108,27 @@ class Ledger(Record):
                     f"be cleaned up: they cannot be put on record: {error}"
                 )
 
-    def _opened(self, goal_id: bytes) -> int:
-        if self._file is not None and not os.fstat(self._file).st_nlink:
-            self.disown()  # who logs out may have all of /dev/shm removed
+    def _grow(self, goal_id: bytes) -> None:
         if self._file is None:
             home = directory()
             _tidy(home)
             self._path = home / (goal_id[:_AUTHOR].hex() + _SUFFIX)
             self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-            self._end = os.fstat(self._file).st_size
-        return self._file
+        size = os.fstat(self._file).st_size
+        os.posix_fallocate(self._file, size, _MORE)  # where there is no room, a map would crash
+        self._map = mmap.mmap(self._file, size + _MORE)
+        self._free = [*range(size, size + _MORE, LENGTH)][::-1]
+
+    def _fill(self, at: int, slot: bytes) -> None:
+        if self._map is not None:
+            self._map[at : at + LENGTH] = slot
 
     def strike(self, goal_id: bytes) -> None:
         """Take a goal off the record, if it is there."""
         at = self._slots.pop(goal_id, None)
-        if at is not None and self._file is not None:
+        if at is not None:
+            self._fill(at, _BLANK)
             self._free.append(at)
-            with contextlib.suppress(OSError):
-                os.pwrite(self._file, _BLANK, at)
 
     def close(self) -> None:
         """Remove the file, as the process ends, unless there is a goal on it."""
@@ -137,7 +141,7 @@ class Ledger(Record):
         """Let go of all, as the child of a fork: it is the parent's."""
         if self._file is not None:
             os.close(self._file)
-        self._file = None
+        self._file = self._map = None
         self._slots.clear()
         self._free.clear()
 
