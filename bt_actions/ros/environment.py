@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable
 from enum import Enum
 from pathlib import Path
 
@@ -43,14 +44,17 @@ def prepare(reach: Reach = Reach.NETWORK) -> None:
     whatever their domain (docs/reliability-settings.md). With Reach.MACHINE, rmw_fastrtps insists
     on shared memory besides.
     """
-    chosen = any(os.environ.get(name) for name in _PROFILES)
-    if not chosen and not any(Path(name).exists() for name in _IN_THIS_FOLDER):
+    if not _any_is_set(_PROFILES) and not any(Path(name).exists() for name in _IN_THIS_FOLDER):
         os.environ[PROFILE] = str(SHORT_LEASE)
         os.environ.setdefault(_TRANSPORTS, "UDPv4")
-    if not any(os.environ.get(name) for name in _LOGS):
+    if not _any_is_set(_LOGS):
         os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")  # rcl insists on one
     if reach is Reach.PROCESS:
         for name in _RANGES:
             os.environ.pop(name, None)
-    if reach is not Reach.NETWORK and not any(os.environ.get(name) for name in _RANGES):
+    if reach is not Reach.NETWORK and not _any_is_set(_RANGES):
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = reach.value
+
+
+def _any_is_set(names: Iterable[str]) -> bool:
+    return any(map(os.environ.get, names))

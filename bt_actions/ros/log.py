@@ -94,7 +94,8 @@ class Log:
     def _put(self, write: Callable[[str], object], text: str) -> None:
         with self._guard:
             try:
-                self._lines.put_nowait(partial(write, _fit(text)))
+                line = clean_lines(text[:LONGEST]).encode()[:LONGEST].decode(errors="ignore")
+                self._lines.put_nowait(partial(write, line))
             except queue.Full:
                 self._dropped += 1
             if self._thread is None:
@@ -129,11 +130,6 @@ def _has_room() -> None:
     poll.register(STDERR, select.POLLOUT)
     with contextlib.suppress(OSError):
         poll.poll()
-
-
-def _fit(text: str) -> str:
-    """What a line takes of a text."""
-    return clean_lines(text[:LONGEST]).encode()[:LONGEST].decode(errors="ignore")
 
 
 log = Log("bt_actions")

@@ -134,10 +134,8 @@ class Rediscovery:
                     log.warning(f"no second look for lost servers: {raised(error)}")
                 self._pause = FIRST_AFTER if found else min(2 * self._pause, LONGEST_PAUSE)
                 self._look_at = time.monotonic() + self._pause
-            with host.lock:
-                unused = self._unused()
-                self._participants = [each for each in self._participants if each.users]
-            for second in unused:
+            for second in self._unused():
+                self._participants.remove(second)
                 second.close()
 
     def _is_time(self) -> bool:

@@ -47,9 +47,7 @@ def fall_silent(node: Node) -> bool:
         rmw_node_of, participant_of, set_listener = _functions()
         with node.handle:
             participant = participant_of(rmw_node_of(node.handle.pointer))
-            if participant is None:
-                return False
-            return bool(set_listener(participant, None, LIMIT) == 0)
+            return participant is not None and set_listener(participant, None, LIMIT) == 0
     except Exception:  # noqa: BLE001 - it was destroyed; or of another middleware, or release of it
         return False
 
