@@ -199,10 +199,9 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
                 fill(action.Goal, self.goal)
             except MessageError as error:
                 raise ValueError(f"{self.name}: goal: {error}") from error
-        if wrong := self._reading.unknown_field(action.Result):
+        if wrong := self._reading.set_up(action.Result):
             raise ValueError(f"{self.name}: {wrong}")
         self.action_type = action
-        self._reading.announce()
         super().setup(**kwargs)
 
     def _make(self, backend: Backend) -> ActionEndpoint:

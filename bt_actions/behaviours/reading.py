@@ -62,13 +62,13 @@ class Reading:
         compute = expression.evaluate if what == "save" else expression.holds
         return lambda result: compute(self._names(result), read)
 
-    def announce(self) -> None:
-        """Tell the blackboard of the keys, so that it shows them."""
+    def set_up(self, result_type: Any) -> str:
+        """Tell the blackboard of the keys, so that it shows them.
+
+        Return which field one of them reads that a result of this type has not; or "".
+        """
         for name in self._save:
             Blackboard.metadata.setdefault(name, KeyMetaData())
-
-    def unknown_field(self, result_type: Any) -> str:
-        """Say which field one of them reads that a result of this type has not; or ""."""
         for what, expression in self._written:
             for node in ast.walk(expression.tree):
                 match node:
