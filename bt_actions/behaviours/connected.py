@@ -86,7 +86,7 @@ class Timed(Behaviour):
 
     def left(self) -> float:
         """The seconds that remain; zero when they have run out."""
-        return max(0.0, self._seconds - self._watch.passed())
+        return self._seconds and max(0.0, self._seconds - self._watch.passed())
 
     def due_in(self) -> float | None:
         """Seconds until it needs a tick though nothing has happened."""
@@ -97,15 +97,7 @@ class Timed(Behaviour):
 
 
 class Leaf(Timed):
-    """A leaf that says in `do` what it does, and fails where that raises ValueError.
-
-    Its time begins with each visit.
-    """
-
-    _timeout: float | None = None
-
-    def initialise(self) -> None:
-        self.give(self._timeout)
+    """A leaf that says in `do` what it does, and fails where that raises ValueError."""
 
     def do(self) -> Status:
         """Do what a tick does; may raise ValueError (ExpressionError is one)."""
@@ -118,3 +110,12 @@ class Leaf(Timed):
         except ValueError as error:
             self.feedback_message = str(error)
             return Status.FAILURE
+
+
+class Limited(Leaf):
+    """A leaf whose time begins with each visit."""
+
+    _timeout: float | None = None
+
+    def initialise(self) -> None:
+        self.give(self._timeout)

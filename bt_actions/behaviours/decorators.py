@@ -61,7 +61,7 @@ class Gate(Timed, Decorator):
     def _ask(self) -> Status | None:
         if self.status is not Status.RUNNING:
             self.feedback_message = ""
-            self.give(0.0)
+            self._seconds = 0.0  # where it is given none
             self.initialise()
         return self.gate()
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from py_trees.common import Status
 
-from bt_actions.behaviours.connected import Leaf
+from bt_actions.behaviours.connected import Leaf, Limited
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.units import parse_duration
@@ -32,7 +32,7 @@ class Wait(Leaf):
         return Status.RUNNING
 
 
-class WaitUntil(Leaf):
+class WaitUntil(Limited):
     """Succeeds as soon as a condition holds; fails after `timeout` seconds where one is given.
 
     What cannot be computed yet (a variable without a value) does not hold yet.

@@ -7,7 +7,7 @@ from typing import Any
 
 from py_trees.common import Status
 
-from bt_actions.behaviours.connected import Connected, Leaf
+from bt_actions.behaviours.connected import Connected, Limited
 from bt_actions.behaviours.topics import LOOKS
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.goals.policy import Retry
@@ -16,7 +16,7 @@ from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend, Call, Service
 
 
-class CallService(Connected[Service], Leaf):
+class CallService(Connected[Service], Limited):
     """Calls a service once, and again as `retry` says.
 
     A call that was not answered in time may have been carried out all the same: it is tried again

@@ -9,7 +9,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.behaviours.connected import Connected, Leaf, Stopwatch
+from bt_actions.behaviours.connected import Connected, Limited, Stopwatch
 from bt_actions.expressions.expression import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
@@ -98,7 +98,7 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
     behaviour.due_in = due  # type: ignore[attr-defined]
 
 
-class WaitForMessage(Connected[Subscription], Leaf):
+class WaitForMessage(Connected[Subscription], Limited):
     """Succeeds with the first message, since it started, that is the one waited for.
 
     Args:
@@ -167,7 +167,7 @@ class WaitForMessage(Connected[Subscription], Leaf):
         self._kept = deque(maxlen=0)
 
 
-class Publish(Connected[Publisher], Leaf):
+class Publish(Connected[Publisher], Limited):
     """Publishes one message and succeeds; fails when the message cannot be built.
 
     Before it publishes it waits for who listens: for `subscribers` where given; without that only
