@@ -223,7 +223,7 @@ class TickLoop:
     def _is_as_found(self) -> bool:
         """Whether the tree is as it was set up; takes about 10 ns a behaviour."""
         found = self._with_children
-        return self.tree.root in found and all(n.children == had for n, had in found.items())
+        return self.tree.root in found and [n.children for n in found] == list(found.values())
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""

@@ -95,12 +95,12 @@ class ChangeVisitor(VisitorBase):
         Raises Misbehaviour, also where it has no status: py_trees makes INVALID of what is none,
         and goes on with its parent. Nothing else leaves that after a tick.
         """
-        after_each, visited = self._after_each, self._visited
+        after_each, visited, none = self._after_each, self._visited, Status.INVALID
         for behaviour in ticked:
             for visitor in others:
                 behaviour.visit(visitor)
             status = behaviour.status
-            if status is Status.INVALID or status.__class__ is not Status:
+            if status is none or status.__class__ is not Status:
                 what = (
                     "no status after its tick; update() has to return RUNNING, SUCCESS or FAILURE"
                 )
@@ -123,7 +123,7 @@ class ChangeVisitor(VisitorBase):
         stopped: list[Behaviour] = []
         if visited != before:
             seen, known = set(visited), self._known
-            stopped = [n for n in before if known.get(n) is Status.RUNNING and n not in seen]
+            stopped = [n for n in before if n not in seen and known.get(n) is Status.RUNNING]
             self._kinds = {type(node) for node in visited}
             self._visited_before = visited
         return self._changes(stopped + visited)
