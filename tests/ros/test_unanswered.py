@@ -119,7 +119,8 @@ def test_how_long_one_has_to_be_denied(
     serve()
     leave(0.0)
     [path] = records.iterdir()
-    path.write_text(path.read_text().replace('"accept": 0.0', f'"accept": {on_record}').rstrip())
+    told = '"accept": 0.0'
+    path.write_text(path.read_text().replace(told, f'"accept": {on_record}'.ljust(len(told))))
     swept, _ = sweep(accept=given)
     assert [left.nothing_left for left in swept.left] == [f"denied for {takes:g} s"]
     assert list(records.iterdir()) == []
