@@ -10,7 +10,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any, Literal, NamedTuple
 
 from action_msgs.msg import GoalStatus
@@ -150,7 +150,7 @@ class TreeServer:
         if self.lifecycle is not None:
             self.lifecycle.stop()
         self.halt(Ending.DEACTIVATED)
-        self._endpoints.settle(_LAST_WORDS)
+        wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
         time.sleep(_LINGER)
         self._is_drained = True
 

@@ -37,14 +37,15 @@ class Endpoints:
     def __init__(self, node: Node) -> None:
         self.node = node
         self.group = ReentrantCallbackGroup()
-        self._awaited: list[threading.Event] = []
-        """What callbacks await; set when they have it."""
         self._made = contextlib.ExitStack()
 
     async def off(
         self, submit: Callable[[Callable[[], None]], Any], work: Callable[[], Any]
     ) -> Any:
-        """Await in a callback what `work` returns or raises; `submit` has another thread do it."""
+        """Await in a callback what `work` returns or raises; `submit` has another thread do it.
+
+        That thread is done with it when the callback has what it awaits.
+        """
         executor: Any = self.node.executor
         future, taken = Future(executor=executor), threading.Event()
 
@@ -58,19 +59,11 @@ class Endpoints:
             while executor.context.ok() and time.monotonic() < until and not taken.wait(_NUDGE):
                 executor.wake()
 
-        self._awaited.append(taken)
         try:
             submit(do)
             return await future
         finally:
             taken.set()
-            self._awaited.remove(taken)
-
-    def settle(self, patience: float) -> None:
-        """Wait until nothing is awaited any more, for so many seconds at most."""
-        until = time.monotonic() + patience
-        for each in list(self._awaited):
-            each.wait(until - time.monotonic())
 
     def service(self, kind: type, name: str, callback: Callable[..., Any]) -> None:
         """Offer a service; the callback may be a coroutine."""
