@@ -190,8 +190,18 @@ class Repeat(Gate):
         self._times = times
 
     def initialise(self) -> None:
-        self._done = 0
-        self._limit, self._of = _whole(self._times, self._counts, self._least)
+        self._done, self._of = 0, ""
+        self._limit: int | None = None
+        if self._times is None:
+            return
+        try:
+            limit = self._times()
+        except ValueError as error:
+            raise ValueError(f"{self._counts}: {error}") from error
+        if isinstance(limit, bool) or not isinstance(limit, int) or limit < self._least:
+            wanted = f"a whole number of at least {self._least} is needed"
+            raise ValueError(f"{self._counts}: {wanted}, not {shorten(limit, 60)}")
+        self._limit, self._of = limit, f" of {limit}"
 
     def gate(self) -> Status | None:
         if self._limit == 0:
@@ -299,17 +309,3 @@ class ForEach(Repeat):
             self._write(self._items[self._done], self._done)
         except ValueError as error:
             raise ValueError(f"item {self._done}: {error}") from error
-
-
-def _whole(given: Number, what: str, least: int) -> tuple[int | None, str]:
-    """A whole number, and how it is told; None where none is given. May raise ValueError."""
-    if given is None:
-        return None, ""
-    try:
-        value = given()
-    except ValueError as error:
-        raise ValueError(f"{what}: {error}") from error
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        wanted = f"a whole number of at least {least}"
-        raise ValueError(f"{what}: {wanted} is needed, not {shorten(value, 60)}")
-    return value, f" of {value}"

@@ -72,7 +72,7 @@ class ActionWithPorts(PortsMixin, ActionBehaviour):
         action_name: str = "",
         timeout: float | str | None = None,
         attempts: int | str = 1,
-        behaviour_class_name: str | None = None,
+        **ports: Any,
     ) -> None:
         super().__init__(
             name,
@@ -81,7 +81,7 @@ class ActionWithPorts(PortsMixin, ActionBehaviour):
             self._read_goal,
             timeout=None if timeout is None else parse_duration(timeout),
             retry=int(attempts),  # an XML attribute is a text
-            behaviour_class_name=behaviour_class_name,
+            **ports,
         )
 
     def _read_goal(self) -> dict[str, object]:
