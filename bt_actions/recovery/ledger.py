@@ -189,10 +189,9 @@ def directory(*, make: bool = True) -> Path:
     if make:
         found.mkdir(mode=0o700, parents=True, exist_ok=True)
     seen = found.lstat()
-    if not stat.S_ISDIR(seen.st_mode):
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(found))
-    if seen.st_uid != os.geteuid() or seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PermissionError(errno.EPERM, "others may write there", str(found))
+    is_ours = stat.S_ISDIR(seen.st_mode) and seen.st_uid == os.geteuid()
+    if not is_ours or seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(errno.EPERM, "others may write there, or it is no folder", str(found))
     return found
 
 
