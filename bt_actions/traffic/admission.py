@@ -41,7 +41,7 @@ def left_near(handle: GoalHandle) -> list[GoalHandle]:
     return [
         each
         for each in handle.endpoint.domain.handles()
-        if (each.goal.lost or not each.goal.claims_resources)
+        if not each.goal.claims_resources
         and (each.endpoint.action == action or each.goal.resources & exclusive)
     ]
 
