@@ -21,12 +21,10 @@ It carries messages and decides nothing. It uses the low-level handle of rclpy's
 from __future__ import annotations
 
 import contextlib
-import functools
-import itertools
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,8 +44,8 @@ from bt_actions.servers.reachability import Reachability
 from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request
 from bt_actions.utilities.plain_text import raised
 
-TAKE_AT_MOST = 200
-"""Messages of one kind taken at a time, so that a flood of feedback starves nobody."""
+FEEDBACK_AT_MOST = 200
+"""Messages of feedback taken at a time, so that a flood of them starves nobody."""
 DEPTH = 100
 """Of our end of the services; with the default of 10 a burst of answers is lost silently."""
 
@@ -127,8 +125,9 @@ class RosTransport:
         with self._lock:
             number = getattr(self.handle, f"send_{kind}_request")(request)
             question = self._questions[kind, number] = _Question(goal_id)
-            same = [key for key, asked in self._questions.items() if asked.goal_id == goal_id]
-            for oldest in [key for key in same if key[0] == kind][:-ASKED_KEPT]:
+            asked = self._questions.items()
+            same = [key for key, each in asked if key[0] == kind and each.goal_id == goal_id]
+            for oldest in same[:-ASKED_KEPT]:
                 del self._questions[oldest]
         return question.asked
 
@@ -158,23 +157,21 @@ class RosTransport:
             put, tell = self._inbox.append, self._listener
             status_type, read_statuses = status_reader()
             with handle:
-                for number, answer in _all(
-                    handle.take_goal_response, impl.SendGoalService.Response
-                ):
-                    self._file("goal", number, answer.accepted)
-                for message in _all(handle.take_feedback, impl.FeedbackMessage, None):
+                while (taken := handle.take_goal_response(impl.SendGoalService.Response))[1]:
+                    self._file("goal", taken[0], taken[1].accepted)
+                for _ in range(FEEDBACK_AT_MOST):
+                    if (message := handle.take_feedback(impl.FeedbackMessage)) is None:
+                        break
                     put((tell.feedback_came, (bytes(message.goal_id.uuid), message.feedback), None))
-                for number, answer in _all(handle.take_cancel_response, CancelGoal.Response):
-                    code = answer.return_code
-                    if code == CANCEL_ACCEPTED and not answer.goals_canceling:
+                while (taken := handle.take_cancel_response(CancelGoal.Response))[1]:
+                    code = taken[1].return_code
+                    if code == CANCEL_ACCEPTED and not taken[1].goals_canceling:
                         code = CANCEL_REJECTED  # as rclpy's servers have it
-                    self._file("cancel", number, code)
-                for number, answer in _all(
-                    handle.take_result_response, impl.GetResultService.Response
-                ):
-                    result = answer.result if answer.status else None
-                    self._file("result", number, (answer.status, result))
-                for message in _all(handle.take_status, status_type, None):
+                    self._file("cancel", taken[0], code)
+                while (taken := handle.take_result_response(impl.GetResultService.Response))[1]:
+                    status = taken[1].status
+                    self._file("result", taken[0], (status, taken[1].result if status else None))
+                while (message := handle.take_status(status_type)) is not None:
                     put((tell.statuses_came, (read_statuses(message),), None))
 
     def _file(self, kind: Request, number: int, answer: Any) -> None:
@@ -235,8 +232,3 @@ class RosTransport:
             self.closed = True
         self._on_close(self)
         self.handle.destroy_when_not_in_use()
-
-
-def _all(take: Callable[[Any], Any], kind: Any, nothing: Any = (None, None)) -> Iterator[Any]:
-    """Take all that has come of a kind, but not too many at a time; `nothing` ends it."""
-    return itertools.islice(iter(functools.partial(take, kind), nothing), TAKE_AT_MOST)

@@ -24,7 +24,7 @@ from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeRunner
 from bt_actions.goals.asking import ASK_AGAIN
-from bt_actions.ros.action_transport import TAKE_AT_MOST
+from bt_actions.ros.action_transport import FEEDBACK_AT_MOST
 from bt_actions.simulation.journal import live_intervals
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.handle import FEEDBACK_KEPT
@@ -179,7 +179,7 @@ def test_a_flood_while_the_tree_does_not_read(
         finally:
             holds.let_go.set()
         assert runner.wait(9.0) is Status.SUCCESS
-    at_most = FEEDBACK_KEPT + TAKE_AT_MOST + 2
+    at_most = FEEDBACK_KEPT + FEEDBACK_AT_MOST + 2
     assert 0 < kept <= at_most, "those that wait to be read, and one take of what is under way"
     assert journal.ends() == ["succeeded"]
     record.outcome = f"SUCCEEDED; the newest {FEEDBACK_KEPT} messages were kept, and no more"
