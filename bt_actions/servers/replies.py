@@ -144,26 +144,27 @@ class Replies:
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
+        by_each = len(answers) >= _answers_wanted(watch)
+        is_fresh = asked >= self._fresh_since
         ended = [answer for answer in answers if answer[0] in ENDS]
         if ended:
             done = ended[-1]
             if not self._runs_anew:  # else this is most likely whoever ran it, too
                 done = next((each for each in ended if each[0] == STATUS_SUCCEEDED), done)
             if len(self.sent_to) > 1:
-                if asked < self._fresh_since:
+                if not is_fresh:
                     return None
-                if len(answers) < _answers_wanted(watch) and self._may_be_at_two(watch):
+                if not by_each and self._may_be_at_two(watch):
                     self._ended = done
                     return None
             if len(ended) > 1 and not self._told_of_two:  # both ran it
                 watch.two_answered()
                 return Event.SERVER_AMBIGUOUS, done
             return Event.RESULT, done
-        by_each = len(answers) >= _answers_wanted(watch)
-        if watch.changed(self.sent_to) and not (by_each and asked >= self._fresh_since):
+        if watch.changed(self.sent_to) and not (by_each and is_fresh):
             return self._denied(now)
         by_all = by_each or watch.state(now) is Server.READY
-        return (Event.RESULT_UNKNOWN, None) if by_all and asked >= self._fresh_since else None
+        return (Event.RESULT_UNKNOWN, None) if by_all and is_fresh else None
 
     def shown(self, watch: ServerWatch, now: float, status: int) -> Told:
         """Take the status that one server publishes of the goal."""

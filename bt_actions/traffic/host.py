@@ -73,9 +73,6 @@ class Record:
 class Trace:
     """Is told of every step of every goal, under the lock; this one takes no note."""
 
-    def begun(self, handle: GoalHandle) -> None:
-        """A goal was begun."""
-
     def tells(self, handle: GoalHandle, event: Event) -> None:
         """A goal is about to be told what happened."""
 

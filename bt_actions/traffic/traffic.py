@@ -49,11 +49,8 @@ class Traffic:
             if endpoint is None:
                 endpoint = self._open_to((action_type, name))
             elif endpoint.action[0] is not action_type:
-                types = (
-                    f"{each.__module__}.{each.__name__}"
-                    for each in (endpoint.action[0], action_type)
-                )
-                raise TypeError(f"{name} is used with two types: {' and '.join(types)}")
+                types = f"{endpoint.action[0]} and {action_type}"
+                raise TypeError(f"{name} is used with two types: {types}")
             endpoint.users += 1
             endpoint.watcher.look_early(self.host.steady())
             return endpoint
@@ -114,7 +111,6 @@ class Traffic:
                 goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback
             )
             handle.begun_at = self.host.steady()
-            self.host.trace.begun(handle)
             endpoint.take_in(handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
             if answer is None:

@@ -175,14 +175,12 @@ class Witness(Trace):
         self._caller, self._judge = caller, caller.judge
         self._before: Before | None = None
 
-    def begun(self, handle: traffic.GoalHandle) -> None:
-        self._caller.begun(handle)
-
     def shows_time(self, handle: traffic.GoalHandle) -> None:
         if known := self._caller.known(handle.goal):
             self._caller.judge.sees_clock(known)
 
     def tells(self, handle: traffic.GoalHandle, event: Event) -> None:
+        self._caller.begun(handle)
         self._caller.steps.add((handle.goal.state, event))
         known = self._caller.known(handle.goal)
         self._before = None if known is None else self._caller.judge.before(known)
@@ -313,7 +311,9 @@ class Caller:
         return found
 
     def begun(self, real: traffic.GoalHandle) -> None:
-        """Take note of a goal that was begun."""
+        """Take note of a goal, when it is first told something, or queues."""
+        if real.goal.id in self.seen:
+            return
         handle = self.seen[real.goal.id] = GoalHandle(real, self._next_name)
         self.judge.begins(handle)
 
@@ -344,6 +344,7 @@ class Caller:
             self._next_name = f"{leaf.name}.{leaf.visits}.{leaf.attempts.attempt}"
             wants = leaf.plan.timeouts, leaf.plan.resources, leaf.plan.busy
             leaf.handle = of_node.begin(to_action, leaf, *wants)
+            self.begun(leaf.handle)
         of_node.advance(leaf.handle, self._message)
 
     def _message(self) -> str:
