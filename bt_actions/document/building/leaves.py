@@ -60,15 +60,17 @@ def _terms(
 ) -> dict[str, Any]:
     """What a goal is sent and judged by, whatever it says."""
     saved = context.saved(settings.get("save"), root, result)
-    given = settings.get("resources")
-    resources = given if isinstance(given, list) else []
-    return {
+    terms: dict[str, Any] = {
         "retry": _retry(settings, context),
-        "expect": context.condition(settings.get("expect"), root),
         "save": {context.scope.key(name): part for name, part in saved.items()},
-        "busy": text_of(settings, "busy") or "wait",
-        "resources": [context.joined(settings, str(each)) for each in resources],
     }
+    if "expect" in settings:
+        terms["expect"] = context.condition(settings["expect"], root)
+    if "busy" in settings:
+        terms["busy"] = settings["busy"]
+    if isinstance(resources := settings.get("resources"), list):
+        terms["resources"] = [context.joined(settings, str(each)) for each in resources]
+    return terms
 
 
 @lru_cache(maxsize=1024)

@@ -206,8 +206,8 @@ class Checker:
         def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):
                 given = self.expression(item, {})
-                said = item.expression.text.strip()
                 if not fits(given, wanted):
+                    said = item.expression.text.strip()
                     if isinstance(given, Either):
                         given = next(kind for kind in given.kinds if not fits(kind, wanted))
                         said = f"in one item {said}"
@@ -215,7 +215,8 @@ class Checker:
                     self.source.report("BT204", span_of(item.node), text)
                 elif texts := misfits(given, wanted):
                     for text in texts:
-                        self.source.report("BT204", span_of(item.node), f"{said}{text}")
+                        text = f"{item.expression.text.strip()}{text}"
+                        self.source.report("BT204", span_of(item.node), text)
                 elif (constant := constant_of(item)) is not None:
                     for problem in examine(wanted, constant):
                         self.source.report("BT204", span_of(item.node), problem.text)

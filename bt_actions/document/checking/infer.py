@@ -30,6 +30,7 @@ __all__ = [
     "type_of_literal",
 ]  # fmt: skip
 
+_NUMBERS = frozenset({*INTEGERS, *FLOATS})
 BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
 Wrong = tuple[str, str, int, int]
 """A rule's code, a message, and the columns in the expression's text."""
@@ -105,7 +106,7 @@ def named(kind: FieldType | None) -> str:
 
 
 def _is_number(kind: FieldType | None) -> bool:
-    return isinstance(kind, Scalar) and (kind.name in INTEGERS or kind.name in FLOATS)
+    return isinstance(kind, Scalar) and kind.name in _NUMBERS
 
 
 def _is_text(kind: FieldType | None) -> bool:

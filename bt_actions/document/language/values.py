@@ -110,10 +110,11 @@ def read_value(node: Node, source: Source) -> object:
     """Plain data with `Computed` and `Interpolated` in it, or BAD after reporting what is wrong."""
     if isinstance(node, Scalar):
         value = _read_scalar(node, source)
-        if isinstance(value, (str, Interpolated)):
+        if isinstance(value, Computed):
+            if value.start:  # $name alone may be a number
+                warn_cut(node, source, "expression")
+        elif isinstance(value, (str, Interpolated)):
             warn_cut(node, source, "text")
-        elif isinstance(value, Computed) and value.start:  # $name alone may be a number
-            warn_cut(node, source, "expression")
         return value
     bad = False
     if isinstance(node, Listing):
@@ -138,12 +139,12 @@ def _read_scalar(node: Scalar, source: Source) -> object:
             source.report("BT204", span_of(node), f"{text} does not fit a float64")
             return BAD
         return node.value
-    if names_file(text):
-        return _read_file(node, source)
-    if text.startswith("= "):
-        return _computed(node, source, text[2:], 2)
     if names_value(text):
         return _computed(node, source, text, 0)
+    if text.startswith("= "):
+        return _computed(node, source, text[2:], 2)
+    if names_file(text):
+        return _read_file(node, source)
     if node.plain and _lacks_space(text):
         span = inner_span(node, source, 0, 1)
         quotes = "" if "$" in text else ", or put it in quotes to mean the text"

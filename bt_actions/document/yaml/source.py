@@ -31,6 +31,7 @@ MAX_ERRORS = 1000
 """After so many errors in a file the checker stops: each costs time to explain."""
 SUFFIXES = (".yaml", ".yml", ".json")
 """How the files end that a tree may name."""
+_CHUNK = 65_536
 PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
 Char = tuple[str, int, int]
@@ -198,10 +199,10 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
             return source_of(_read_pipe(path, name), name, path)
         if not stat.S_ISREG(mode):
             raise _unreadable(name, "this is no regular file")
-        with path.open("rb") as stream:
+        with path.open("rb", buffering=0) as stream:
             data = stream.read(size + 1)  # to ask for more takes that much memory at once
-            if len(data) > size:  # it has grown, or nobody knows how large it is
-                data += stream.read(MAX_BYTES + 1 - len(data))
+            while len(data) <= MAX_BYTES and (more := stream.read(_CHUNK)):
+                data += more  # it has grown, or nobody knows how large it is
     except DocumentError:  # is a ValueError, too
         raise
     except FileNotFoundError:
