@@ -58,6 +58,15 @@ def _parts(cls: type | None, kind: str) -> tuple[str, FieldType | None, Types]:
     return key, Message(getattr(cls, asked)), {"result": Message(getattr(cls, answered))}
 
 
+@lru_cache(maxsize=4096)
+def _noted(*_key: object) -> list[tuple[FieldType | None, list[Wrong]]]:
+    """Where the type is noted of expressions of one form that read the same types, if all is right.
+
+    Kept for other trees, as the form is.
+    """
+    return []
+
+
 class Checker:
     """What is known of one document; the trees that it includes have their own."""
 
@@ -79,7 +88,6 @@ class Checker:
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
         self._classes: dict[str, type | None] = {}
-        self._inferred: dict[tuple[object, ...], tuple[FieldType | None, list[Wrong]]] = {}
 
     def interface(
         self, name: str, kind: str, node: Node, source: Source | None = None
@@ -290,18 +298,16 @@ class Checker:
     def infer(
         self, expression: Expression, roots: Types, reader: object
     ) -> tuple[FieldType | None, list[Wrong]]:
-        """The type of an expression, and what is wrong with it.
-
-        Worked out once for all of its form and with such types, where nothing is.
-        """
+        """The type of an expression, and what is wrong with it."""
         variable = self._types_at(reader) if self._items else self.variables.get
-        key = (expression.form, *roots.values(), *map(variable, expression.variables))
-        known = self._inferred.get(key)
-        if known is None:
-            known = infer(expression, roots, variable, types=self.types)
-            if not known[1]:
-                self._inferred[key] = known
-        return known
+        kinds = map(variable, expression.variables)
+        noted = _noted(expression.form, self.types, *roots.values(), *kinds)
+        if not noted:
+            kind, wrong = infer(expression, roots, variable, types=self.types)
+            if wrong:
+                return kind, wrong
+            noted.append((kind, wrong))
+        return noted[0]
 
     def _unknown(self, computed: Computed) -> None:
         """Report the variables that an expression reads and nobody declares or writes."""
