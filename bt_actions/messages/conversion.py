@@ -95,8 +95,8 @@ def examine(
 ) -> list[Problem]:
     """What is wrong with the data; makes nothing.
 
-    `hole` is asked first about each value, with the type it must have: True means that it is
-    settled there (a variable, whose type the caller checks).
+    `hole` is asked first about each value but a mapping, with the type it must have: True means
+    that it is settled there (a variable, whose type the caller checks).
     """
     filler = _Filler(time.time_ns, hole)
     filler.convert(kind, data, ())
@@ -139,7 +139,8 @@ class _Filler:
 
     def convert(self, kind: FieldType, value: object, path: Path) -> Any:
         """What the field has to hold; None where the value is settled elsewhere, or wrong."""
-        if self._hole is not None and self._hole(value, kind, path):
+        hole = None if isinstance(value, dict) else self._hole
+        if hole is not None and hole(value, kind, path):
             return None
         try:
             if isinstance(kind, Message):

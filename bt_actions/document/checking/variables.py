@@ -54,7 +54,7 @@ def type_of(write: Write, known: Known) -> FieldType | None:
         return Scalar("string")
     if not isinstance(write.value, Computed):
         return type_of_literal(write.value)
-    roots = {} if write.root is None else {write.root: root_type(write.node, write.root, known)}
+    roots = {write.root: root_type(write.node, write.root, known)} if write.root else {}
     return known.infer(write.value.expression, roots, write.node)[0]
 
 

@@ -174,8 +174,6 @@ def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
     found: list[str] = []
 
     def hole(item: object, kind: FieldType, path: tuple[str | int, ...]) -> bool:
-        if isinstance(item, dict):  # the mapping itself
-            return False
         inner = item if isinstance(item, FieldType) else None
         kinds = inner.kinds if isinstance(inner, Either) else (inner,)
         wrong = [one for one in kinds if one != _TEXT and not fits(one, kind)]
