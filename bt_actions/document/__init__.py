@@ -6,7 +6,7 @@ puts them together. Importing this imports neither rclpy nor any message package
 """
 
 from bt_actions.document.findings import (
-    PLACE,
+    NODE,
     DocumentError,
     Finding,
     Place,
@@ -63,5 +63,5 @@ __all__ = [
 
 def place_of(behaviour: object) -> Place | None:
     """Where a behaviour was written, or None for one that no document made."""
-    place = getattr(behaviour, PLACE, None)
+    place = getattr(getattr(behaviour, NODE, None), "place", None)
     return place if isinstance(place, Place) else None

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
-from bt_actions.document.findings import PLACE
+from bt_actions.document import place_of
 from bt_actions.render.graphviz import RenderError, draw
 from bt_actions.render.look import (
     DOWN_UP_TO,
@@ -136,11 +136,10 @@ def _label(row: Row) -> str:
 
 
 def _tooltip(node: Behaviour) -> str:
-    place = getattr(node, PLACE, None)
-    file, line = getattr(place, "file", None), getattr(place, "line", None)
-    if file is None or line is None:
+    place = place_of(node)
+    if place is None:
         return clean(node.name)
-    return f"{clean(node.name)} ({Path(str(file)).name}:{line})"
+    return f"{clean(node.name)} ({Path(place.file).name}:{place.line})"
 
 
 def _quoted(name: str) -> str:

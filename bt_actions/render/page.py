@@ -23,12 +23,12 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
-from bt_actions.document.findings import PLACE
+from bt_actions.document import place_of
 from bt_actions.render.card import Table, describe, interface_of, tables
 from bt_actions.render.graphviz import RenderError
 from bt_actions.render.look import Row, action_of, direction_of, kind, label, look, rows
 from bt_actions.render.outline import text
-from bt_actions.render.written import Written, own_text
+from bt_actions.render.written import document_of, node_of, own_text
 from bt_actions.utilities.plain_text import clean
 
 __all__ = ["MOST_NODES", "OPEN_UP_TO", "page"]
@@ -62,7 +62,7 @@ def page(root: Behaviour, *, direction: str | None = None, depth: int | None = N
         "title": html.escape(clean(root.name)),
         "style": style,
         "script": script,
-        "data": _json(_data(root, nodes, direction, depth)),
+        "data": _json(_data(nodes, direction, depth)),
         "outline": html.escape(text(root)),
     }
     return _PLACEHOLDER.sub(lambda found: parts[found[1]], _file("page.html"))
@@ -78,16 +78,8 @@ def open_depth(nodes: Sequence[Row], most: int) -> int:
     return max(depth, 1)
 
 
-def _data(
-    root: Behaviour, nodes: Sequence[Row], direction: str | None, depth: int | None
-) -> dict[str, object]:
+def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dict[str, object]:
     """What the script draws. Tables are shared by number: nodes of one action say the same."""
-    above = []
-    behaviour: Behaviour | None = root.parent
-    while behaviour is not None:  # `root` may be a part of a loaded tree
-        above.append(behaviour)
-        behaviour = behaviour.parent
-    written = Written([*above, *(row.node for row in nodes)])
     shared: dict[Table, int] = {}
     types: dict[object, list[Table]] = {}
     numbers: dict[int, int] = {}
@@ -95,8 +87,8 @@ def _data(
     for number, row in enumerate(nodes):
         node = row.node
         numbers[id(node)] = number
-        source = written.node(node)
-        said = list(tables(node, source, written.document(node)))
+        source = node_of(node)
+        said = list(tables(node, source, document_of(node)))
         interface = interface_of(node, source)
         if interface is not None:
             if interface not in types:
@@ -114,7 +106,7 @@ def _data(
             "fill": fill,
             "tables": [shared.setdefault(table, len(shared)) for table in said],
         }
-        place = getattr(node, PLACE, None)
+        place = place_of(node)
         more = {
             "font": font,
             "place": None if place is None else str(place),

@@ -1,24 +1,22 @@
 """Where in a document a behaviour comes from, and the lines that made it.
 
-Works from what a loaded tree remembers (the attributes PLACE and LOADED) and reads no
+Works from what a loaded tree remembers (the attributes NODE and LOADED) and reads no
 file again. A behaviour made in Python was not written, and has nothing here.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from py_trees.behaviour import Behaviour
 
-from bt_actions.document.findings import LOADED, PLACE
+from bt_actions.document.findings import LOADED, NODE
 
 if TYPE_CHECKING:
-    from bt_actions.document.findings import Place
     from bt_actions.document.reading.tree import Document, TreeNode
 
-__all__ = ["Written", "own_text"]
+__all__ = ["document_of", "node_of", "own_text"]
 
 _MOST_CHARACTERS = 4000
 _FAR = 1 << 30
@@ -26,36 +24,16 @@ _Position = tuple[int, int]
 """Line and column, both from 1."""
 
 
-class Written:
-    """The documents behind some behaviours."""
+def node_of(behaviour: Behaviour) -> TreeNode | None:
+    """The node of a document that `behaviour` was made from."""
+    return getattr(behaviour, NODE, None)
 
-    def __init__(self, behaviours: Iterable[Behaviour]) -> None:
-        self._loaded: dict[int, Document] = {}
-        self._nodes: dict[Place, TreeNode] = {}
-        for behaviour in behaviours:
-            document = getattr(getattr(behaviour, LOADED, None), "document", None)
-            if document is not None:
-                self._loaded[id(behaviour)] = document
-                self._take(document)
 
-    def node(self, behaviour: Behaviour) -> TreeNode | None:
-        """The node of a document that `behaviour` was made from."""
-        place = getattr(behaviour, PLACE, None)
-        return None if place is None else self._nodes.get(place)
-
-    def document(self, behaviour: Behaviour) -> Document | None:
-        """The tree whose inputs and outputs are `behaviour`'s: a loaded root, or a subtree."""
-        node = self.node(behaviour)
-        return self._loaded.get(id(behaviour)) or (None if node is None else node.included)
-
-    def _take(self, document: Document) -> None:
-        waiting, seen = [document], {id(document)}
-        while waiting:
-            for node in waiting.pop().nodes():
-                self._nodes[node.place] = node
-                if node.included is not None and id(node.included) not in seen:
-                    seen.add(id(node.included))
-                    waiting.append(node.included)
+def document_of(behaviour: Behaviour) -> Document | None:
+    """The tree whose inputs and outputs are `behaviour`'s: a loaded root, or a subtree."""
+    document: Document | None = getattr(getattr(behaviour, LOADED, None), "document", None)
+    node = node_of(behaviour)
+    return document or (None if node is None else node.included)
 
 
 def own_text(node: TreeNode) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import weakref
 from pathlib import Path
+from types import SimpleNamespace
 
 import py_trees
 import pytest
@@ -18,7 +19,7 @@ from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.table import summary, table, verdict
 from bt_actions.cli.views.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
-from bt_actions.document.findings import PLACE
+from bt_actions.document.findings import NODE
 from bt_actions.events import Event, TreeFinished
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
@@ -234,7 +235,7 @@ def fail(story: Story, leaf: FakeAction, reason: str = "") -> list[Event]:
 
 def test_the_summary_names_path_attempts_outcome_reason_and_place(story: Story) -> None:
     leaf = FakeAction("Move")
-    setattr(leaf, PLACE, Place("trees/x.yaml", 14, 9))
+    setattr(leaf, NODE, SimpleNamespace(place=Place("trees/x.yaml", 14, 9)))
     root = Sequence("Deliver", memory=True, children=[leaf])
     report = told(
         root,

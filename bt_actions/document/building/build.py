@@ -22,7 +22,7 @@ from bt_actions.behaviours.topics import TopicValue, patient
 from bt_actions.document.building.context import Context, plain_name, table_of, written_text
 from bt_actions.document.building.leaves import LEAVES, build_action
 from bt_actions.document.building.scope import Scope
-from bt_actions.document.findings import PLACE
+from bt_actions.document.findings import NODE
 from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.values import computed_in
@@ -45,7 +45,7 @@ def build(
     python: Python = True,
     once: bool = False,
 ) -> Behaviour:
-    """The behaviours of a document; each has the place it was written at in `place`.
+    """The behaviours of a document; each has its node.
 
     With `once` no more will be made of it: its YAML is let go of on the way. What cannot be made is
     reported to the document's source, as is every ``python:`` node that `python` does not allow.
@@ -101,7 +101,7 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
         names = {name for each in computed_in(written) for name in each.expression.names}
         if read := [topic for name, topic in context.topics.items() if name in names]:
             patient(behaviour, read)
-    setattr(behaviour, PLACE, node.place)
+    setattr(behaviour, NODE, node)
     if context.once:
         node.release()
     return behaviour

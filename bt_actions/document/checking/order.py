@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Sequence, Set
 from functools import cached_property
 from itertools import chain
-from typing import NamedTuple
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Span
@@ -30,18 +29,13 @@ _TURNED = frozenset({"fallback", "invert"})
 """Go on when a child fails. Of all other kinds nothing is known."""
 
 
-class _Written(NamedTuple):
-    """Names that may have been written below a node when it has succeeded, and when it has failed.
+_Written = tuple[Set[str], Set[str]]
+"""Names that may have been written below a node when it has succeeded, and when it has failed.
 
-    What has been written meanwhile is in both: a node that is stopped has written no more than if
-    it had failed.
-    """
-
-    succeeded: Set[str]
-    failed: Set[str]
-
-
-_SILENT = _Written(_NOTHING, _NOTHING)
+What has been written meanwhile is in both: a node that is stopped has written no more than if it
+had failed.
+"""
+_SILENT: _Written = (_NOTHING, _NOTHING)
 
 
 def find_early_reads(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
@@ -87,7 +81,7 @@ class _Order:
             return _SILENT
         kind = node.kind.name if node.kind is not None else ""
         if not node.children:
-            return _Written(own, own if kind == "subtree" else _NOTHING)
+            return own, own if kind == "subtree" else _NOTHING
         if kind == "repeat":  # a read in its first round has nothing yet
             later |= self._below(node)
         elif kind in _LOOPS or node.values.get("memory") is False:
@@ -100,7 +94,7 @@ class _Order:
         self._known |= added
         succeeded, failed = self._children(node, kind, around, later)
         self._known -= added
-        return _Written(succeeded | own, failed | own)
+        return succeeded | own, failed | own
 
     def _children(
         self, node: TreeNode, kind: str, around: frozenset[str], later: frozenset[str]
@@ -125,7 +119,7 @@ class _Order:
                 added |= succeeded - self._known
                 self._known |= succeeded
         self._known -= added
-        return _Written(ended, onward) if kind == "fallback" else _Written(onward, ended)
+        return (ended, onward) if kind == "fallback" else (onward, ended)
 
     def _below(self, node: TreeNode) -> frozenset[str]:
         return _NOTHING.union(*(self._own.get(id(inner), _NOTHING) for inner in node.walk()))

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-PLACE = "_bt_actions_place"
+NODE = "_bt_actions_node"
 LOADED = "_bt_actions_loaded"
-"""The attribute of a behaviour that says where it was written, and that of a loaded root which has
-its document. Not such as a user's own class may have."""
+"""The attribute of a behaviour that has the node it was made from, and that of a loaded root which
+has its document. Not such as a user's own class may have."""
 
-__all__ = ["LOADED", "PLACE", "DocumentError", "Finding", "Place", "Related", "Severity", "Span"]
+__all__ = ["LOADED", "NODE", "DocumentError", "Finding", "Place", "Related", "Severity", "Span"]
 
 
 class Place(NamedTuple):
