@@ -19,7 +19,7 @@ from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
 from bt_actions.servers.replies import DENIALS
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.handle import Action, Domain, GoalHandle, wake
+from bt_actions.traffic.handle import Action, GoalHandle, wake
 from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import warn_of_dead
 from bt_actions.traffic.route import Route
@@ -41,19 +41,19 @@ class ActionEndpoint:
         self,
         host: Host,
         participant: Participant,
-        domain: Domain,
         unused: Callable[[ActionEndpoint], None],
         action: Action,
     ) -> None:
         """`unused` is told when there may be neither a user nor an open goal any more."""
         self._host = host
-        self.participant, self.domain, self._unused = participant, domain, unused
+        self.participant, self._unused = participant, unused
+        self.domain = host.domain(participant.domain)
         self.action, self.name = action, action[1]
         self.users = 0
         self._forks = host.forks
         self.goals: dict[bytes, GoalHandle] = {}
         self.watch = ServerWatch()
-        self.cancels = domain.cancels[action]
+        self.cancels = self.domain.cancels[action]
         self.orphaned = False
         self.heard_at = host.steady()
         self._probes = itertools.count(PROBES_KEPT)
@@ -100,8 +100,7 @@ class ActionEndpoint:
         if handle is None:
             self._ended.runs(goal_id)
             return
-        now = self.heard_at = self._host.steady()
-        self.watch.heard_at = now
+        now = self.heard_at = self.watch.heard_at = self._host.steady()
         handle.replies.spoke(self.watch, now)
         self.tell(handle, Event.FEEDBACK, feedback)
         if handle.keeps_feedback and handle.goal.outcome is None:

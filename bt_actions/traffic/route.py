@@ -89,9 +89,8 @@ class Route:
         runs on an absent server is lost.
         """
         endpoint, now = self._endpoint, self._host.steady()
-        if endpoint.orphaned or not endpoint.goals:
-            return False
-        if now - endpoint.participant.seen_since < TOO_NEW:
+        is_new = now - endpoint.participant.seen_since < TOO_NEW
+        if endpoint.orphaned or is_new or not endpoint.goals:
             return False
         if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.handles):
             return False  # nobody here wants it; it is remembered, as what is parked is

@@ -58,7 +58,7 @@ class Traffic:
     def _open_to(self, action: Action) -> ActionEndpoint:
         """Return a new endpoint to an action, with no user yet."""
         endpoint = self._endpoints[action[1]] = ActionEndpoint(
-            self.host, self.participant, self._domain, self.drop_if_unused, action
+            self.host, self.participant, self.drop_if_unused, action
         )
         handover.adopt(endpoint, self.host)
         return endpoint

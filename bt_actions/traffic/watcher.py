@@ -125,7 +125,7 @@ class Watcher:
         if not alive:
             self._orphan()
         if watch.is_crowded:  # before silence is judged
-            if self._host.stalls.answers_take(self._host.steady()):
+            if self._host.stalls.answers_take(now):
                 watch.stood_still(now)
             endpoint.deliver_arrived()
         if endpoint.transport.closed:  # by what came, and nobody used the endpoint
@@ -175,7 +175,7 @@ class Watcher:
             if gone and now < handle.not_gone_before:
                 continue  # it has not been discovered yet, though its status may have come already
             in_sight = handle.replies.sent_to <= watch.gids and not gone
-            if not in_sight and self._host.stalls.servers_take(self._host.steady()) > 0.0:
+            if not in_sight and self._host.stalls.servers_take(now) > 0.0:
                 continue  # as this process stood still
             if handle.goal.sent:
                 if gone and not handle.goal.lost:
@@ -209,6 +209,6 @@ class Watcher:
             handle.goal.deadlines.disarm(Event.LOOK_OUT_DUE)  # from here nobody sees it come back
             if handle.goal.outcome is None:
                 endpoint.tell(handle, Event.INTERRUPTED)
-        silent = self._host.steady() - endpoint.heard_at > SILENT_FOR
-        if silent and not self._host.stalls.answers_take(self._host.steady()):
+        silent = now - endpoint.heard_at > SILENT_FOR
+        if silent and not self._host.stalls.answers_take(now):
             handover.park(endpoint, all_of_them=True)
