@@ -9,7 +9,6 @@ import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from types import MappingProxyType
 from typing import Any
 
 from bt_actions.messages.interfaces import short_name
@@ -84,9 +83,7 @@ def describe(cls: type) -> Mapping[str, FieldType]:
     """The fields of a message class in order, with their types."""
     generated: Any = cls
     names = generated.get_fields_and_field_types()
-    return MappingProxyType(
-        {name: _type(slot) for name, slot in zip(names, generated.SLOT_TYPES, strict=True)}
-    )
+    return {name: _type(slot) for name, slot in zip(names, generated.SLOT_TYPES, strict=True)}
 
 
 def no_field(cls: type, name: str) -> str:
@@ -99,13 +96,11 @@ def no_field(cls: type, name: str) -> str:
 def constants(cls: type) -> Mapping[str, object]:
     """The constants that a message class declares; one that is a byte as a number."""
     # rosidl keeps them on the metaclass, as properties and in a private dictionary.
-    return MappingProxyType(
-        {
-            name: scalar(getattr(cls, name))
-            for name in vars(type(cls))
-            if name.isupper() and not name.startswith("_") and not name.endswith("__DEFAULT")
-        }
-    )
+    return {
+        name: scalar(getattr(cls, name))
+        for name in vars(type(cls))
+        if name.isupper() and not name.startswith("_") and not name.endswith("__DEFAULT")
+    }
 
 
 def _type(slot: Any) -> FieldType:
