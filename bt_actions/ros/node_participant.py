@@ -131,13 +131,13 @@ class NodeParticipant:
                 f"its parts: {part}, cancel_goal, get_result, feedback and status"
             )
 
-    def seek(self, seeker: Seeker, name: str) -> None:
+    def seek(self, seeker: Seeker) -> None:
         """Have a new participant look for what is missed.
 
         Not where remapping rules give our node another server than that would find.
         """
-        if not self._is_remapped(name):
-            look_for(seeker, name, self.domain, self._enclave)
+        if not self._is_remapped(seeker.name):
+            look_for(seeker, self.domain, self._enclave)
 
     @functools.cached_property
     def _enclave(self) -> str:

@@ -79,14 +79,14 @@ class SecondParticipant:
         participant.close(self.node)
 
 
-def look_for(seeker: Seeker, action: str, domain: int, enclave: str) -> None:
+def look_for(seeker: Seeker, domain: int, enclave: str) -> None:
     """Look for the servers that it misses, until it misses none; the caller holds the lock.
 
     In the enclave of its node, which may be allowed to look where others are not.
     Whatever pause between two looks for others has been reached begins anew.
     """
     rediscovery = _by_domain.setdefault((domain, enclave), Rediscovery(domain, enclave))
-    rediscovery.add(seeker, action)
+    rediscovery.add(seeker)
 
 
 class Rediscovery:
@@ -99,17 +99,17 @@ class Rediscovery:
 
     def __init__(self, domain: int, enclave: str) -> None:
         self._where = domain, enclave
-        self._missing: dict[Seeker, str] = {}  # and the action's name
+        self._missing: list[Seeker] = []
         self._participants: list[SecondParticipant] = []
         self._thread: threading.Thread | None = None
         self._wanted: set[tuple[Seeker, bool]] = set()  # and whether for a goal that waits
         self._pause = FIRST_AFTER
         self._look_at = math.inf
 
-    def add(self, seeker: Seeker, action: str) -> None:
+    def add(self, seeker: Seeker) -> None:
         """Look for what this one misses, too."""
         if seeker not in self._missing:
-            self._missing[seeker] = action
+            self._missing.append(seeker)
             _bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             thread = threading.Thread(target=self._run, name="bt_actions-rediscovery", daemon=True)
@@ -158,8 +158,7 @@ class Rediscovery:
         return [each for each in self._participants if not each.users]
 
     def _still_missing(self) -> bool:
-        missing = self._missing.items()
-        self._missing = {seeker: action for seeker, action in missing if seeker.misses()}
+        self._missing = [seeker for seeker in self._missing if seeker.misses()]
         return bool(self._missing)
 
     def _look(self) -> bool:
@@ -174,8 +173,8 @@ class Rediscovery:
                 with host.lock:
                     if _closing or not self._still_missing():
                         break
-                    for seeker, action in self._missing.items():
-                        if seeker not in tried and servers(second.node, action):
+                    for seeker in self._missing:
+                        if seeker not in tried and servers(second.node, seeker.name):
                             tried[seeker] = seeker.try_in(second)
                         if seeker in tried and tried[seeker].ready():
                             ready_since.setdefault(seeker, now)

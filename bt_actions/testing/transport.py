@@ -190,5 +190,5 @@ class VirtualParticipant:
             return "; no action server at all is on this network"
         return did_you_mean(name, served)
 
-    def seek(self, seeker: Seeker, name: str) -> None:
+    def seek(self, seeker: Seeker) -> None:
         """Look for nothing: a second participant would see the same."""

@@ -35,7 +35,7 @@ class Route:
     """How one endpoint reaches its server (a transport.Seeker)."""
 
     def __init__(self, endpoint: Endpoint, host: Host) -> None:
-        self._endpoint, self._host = endpoint, host
+        self._endpoint, self._host, self.name = endpoint, host, endpoint.name
         self.elsewhere = False
         """The transport is not in our node's participant: nobody spins it."""
         self._long_stalls = endpoint.participant.long_stalls
@@ -78,7 +78,7 @@ class Route:
     def seek(self) -> None:
         """Have another way looked for, where this one fails."""
         if self.misses():
-            self._endpoint.participant.seek(self, self._endpoint.name)
+            self._endpoint.participant.seek(self)
 
     # What whoever looks for it asks, and does
 
@@ -166,13 +166,12 @@ class Route:
         transport.on_trial = False
         self.elsewhere = True
         endpoint.replace_transport(transport)
-        name = endpoint.name
         if blind:
             self._host.log.info(
-                f"{name}: out of sight of this node though it runs; a new one sees it"
+                f"{self.name}: out of sight of this node though it runs; a new one sees it"
             )
             return
-        self._host.log.info(f"{name}: does not hear this node any more; a new one is heard")
+        self._host.log.info(f"{self.name}: does not hear this node any more; a new one is heard")
         for handle in endpoint.handles:
             if handle.replies.sent_to & seen:  # it may be shown later than another of its name
                 handle.not_gone_before = max(handle.not_gone_before, now + LEASE)

@@ -112,6 +112,9 @@ class ActionTransport(Protocol):
 class Seeker(Protocol):
     """Who has lost sight of a server, or is not heard by it any more (route.py)."""
 
+    name: str
+    """The full name of the action."""
+
     def misses(self) -> bool:
         """Whether a server is wanted, and is not in sight, or does not answer, by now."""
 
@@ -172,7 +175,7 @@ class Participant(Opener, Protocol):
     def instead(self, action_type: Any, name: str) -> str:
         """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
 
-    def seek(self, seeker: Seeker, name: str) -> None:
+    def seek(self, seeker: Seeker) -> None:
         """Have another participant look for what is missed, soon.
 
         Does nothing where there can be no other, or where it would find another server than ours.

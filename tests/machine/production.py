@@ -149,7 +149,7 @@ class ModelParticipant:
     def instead(self, action_type: Any, name: str) -> str:
         return ""
 
-    def seek(self, seeker: Any, name: str) -> None:
+    def seek(self, seeker: Any) -> None:
         """There is nothing that is out of sight for good."""
 
 

@@ -145,7 +145,7 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
 
     enclaves = list[str]()
     monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name))
-    monkeypatch.setattr(node_participant, "look_for", lambda *to: enclaves.append(to[3]))
+    monkeypatch.setattr(node_participant, "look_for", lambda *to: enclaves.append(to[2]))
     context = Context()
     context.init(args=["--ros-args", flag, "/kitchen/robot"], domain_id=domain)
     leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
