@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from operator import attrgetter
 from typing import Any
@@ -44,6 +44,8 @@ class Context:
     python: Python = True
     """Which ``python:`` nodes may be made."""
     once: bool = False
+    terms: dict[str | None, dict[str, Any]] = field(default_factory=dict)
+    """By actions: what their nodes have in common that say but a goal and a `save` of their own."""
 
     def read(self, name: str) -> object:
         """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.

@@ -30,47 +30,62 @@ __all__ = ["LEAVES", "build_action"]
 def build_action(node: TreeNode, context: Context) -> Behaviour:
     """The behaviour of an action, by its name in the document or in place."""
     settings = settings_of(node, context.document)
+    says_more = len(node.values) - ("goal" in node.values) - ("save" in node.values) > 1
+    terms = None if says_more else context.terms.get(node.alias)
+    if terms is None:
+        terms = {
+            "action_type": _interface(settings["type"], "action", context),
+            "action_name": context.name(settings, "server"),
+            **_terms(settings, context, "result"),
+        }
+        if not says_more:
+            context.terms[node.alias] = terms
     goal = settings.get("goal", {})
-    action = _interface(settings["type"], "action", context)
+    result = terms["action_type"].Result if context.types else None
     return ActionBehaviour(
         node.name,
-        action,
-        context.name(settings, "server"),
-        context.value(goal) if computed_in(goal) else goal,
-        timeout=_timeouts(tuple(table_of(settings.get("timeout")).items())),
-        **_terms(settings, context, "result", action.Result if context.types else None),
+        goal=context.value(goal) if computed_in(goal) else goal,
+        save=_save(settings, context, "result", result),
+        **terms,
     )
 
 
 def _run_tree(node: TreeNode, context: Context) -> Behaviour:
     settings = settings_of(node, context.document)
-    timeout = {"cancel": CANCEL, **table_of(settings.get("timeout"))}
     return RunTree(
         node.name,
         context.value(settings["tree"]),
         context.value(settings.get("inputs", {})),
         server=context.joined(settings, server_of(settings)),
-        timeout=_timeouts(tuple(timeout.items())),
-        **_terms(settings, context, roots_of),
+        save=_save(settings, context, roots_of),
+        **_terms(settings, context, roots_of, {"cancel": CANCEL}),
     )
 
 
 def _terms(
+    settings: Mapping[str, object],
+    context: Context,
+    root: Root,
+    timeout: Mapping[str, float] = MappingProxyType({}),
+) -> dict[str, Any]:
+    """What a goal is sent and judged by, whatever it says; `timeout` where nothing else is said."""
+    given = settings.get("resources")
+    resources = given if isinstance(given, list) else []
+    return {
+        "timeout": _timeouts(tuple({**timeout, **table_of(settings.get("timeout"))}.items())),
+        "retry": _retry(settings, context),
+        "expect": context.condition(settings.get("expect"), root),
+        "busy": text_of(settings, "busy") or "wait",
+        "resources": [context.joined(settings, str(each)) for each in resources],
+    }
+
+
+def _save(
     settings: Mapping[str, object], context: Context, root: Root, result: type | None = None
 ) -> dict[str, Any]:
-    """What a goal is sent and judged by, whatever it says."""
+    """What is kept of a result, by the blackboard's key."""
     saved = context.saved(settings.get("save"), root, result)
-    terms: dict[str, Any] = {
-        "retry": _retry(settings, context),
-        "save": {context.scope.key(name): part for name, part in saved.items()},
-    }
-    if "expect" in settings:
-        terms["expect"] = context.condition(settings["expect"], root)
-    if "busy" in settings:
-        terms["busy"] = settings["busy"]
-    if isinstance(resources := settings.get("resources"), list):
-        terms["resources"] = [context.joined(settings, str(each)) for each in resources]
-    return terms
+    return {context.scope.key(name): part for name, part in saved.items()}
 
 
 @lru_cache(maxsize=1024)

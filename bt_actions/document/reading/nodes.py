@@ -204,13 +204,12 @@ class _Reader:
             name = key.text
             if key is node.key:
                 written[name] = inner
-                hint = None
-                if not isinstance(inner, Scalar):
-                    hint = self._below_name(node, inner, kind, keys, beside)
-                if hint is None:
+                if isinstance(inner, Scalar):
                     value = kind.value.read(inner, source)
-                else:
+                elif hint := self._below_name(node, inner, kind, keys, beside):
                     value = wrong_form(kind.value, inner, source, hint=hint)
+                else:
+                    value = kind.value.read(inner, source)
                 values[name] = value
                 if isinstance(value, str) and kind.named_by_value:
                     node.name = value
