@@ -1,4 +1,4 @@
-"""Which servers of an action the ROS graph shows to a node, and what it says of that node itself.
+"""What a node sees of an action's servers in the ROS graph, and what is known of the node itself.
 
 A server is known by the GID of its reader of goal requests: who has one takes what is sent, from
 the moment on that it is shown; the rest of a server that opens follows (within 18 ms, in 12
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 
@@ -25,6 +26,18 @@ def servers(node: Node, action: str) -> frozenset[bytes]:
             node.handle, f"rq{service}Request", True
         )
     return frozenset(bytes(info["endpoint_gid"]) for info in found)
+
+
+def is_valid(node: Node) -> bool:
+    """Whether the node is there, and its context was not shut down.
+
+    Asked without the lock of its context, which rclpy holds while it calls back on shutdown.
+    """
+    try:
+        with node.handle, node.context.handle:
+            return bool(node.context.handle.ok())
+    except InvalidHandle:  # either was destroyed
+        return False
 
 
 def enclave(node: Node) -> str:

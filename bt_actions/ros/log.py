@@ -57,6 +57,9 @@ class Log:
         self._logger.addHandler(_StandardError())
         self._logger.setLevel(logging.INFO)
         self._logger.propagate = False  # others' handlers may be added to this one
+        self.info = partial(self._put, self._logger.info)
+        self.warning = partial(self._put, self._logger.warning)
+        self.error = partial(self._put, self._logger.error)
         self._begin()
         atexit.register(self.flush)
         os.register_at_fork(after_in_child=self._begin)  # what waits is the parent's to write
@@ -67,18 +70,6 @@ class Log:
         self._thread: threading.Thread | None = None
         self._dropped = 0
         self._patience = WITHIN
-
-    def info(self, text: str) -> None:
-        """Log something worth knowing."""
-        self._put(self._logger.info, text)
-
-    def warning(self, text: str) -> None:
-        """Log something that may need attention."""
-        self._put(self._logger.warning, text)
-
-    def error(self, text: str) -> None:
-        """Log something that needs attention."""
-        self._put(self._logger.error, text)
 
     def by(self, name: str, level: str, text: str) -> None:
         """Log a line of a tree by rclpy's logger of this name; `level` is one of `LEVELS`."""

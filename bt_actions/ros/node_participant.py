@@ -18,12 +18,11 @@ from rclpy.node import Node
 from bt_actions.goals.terms import NEVER
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
-from bt_actions.ros.alive import is_valid
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.connections import Publisher, Service, Subscription
 from bt_actions.ros.environment import sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
-from bt_actions.ros.graph import enclave
+from bt_actions.ros.graph import enclave, is_valid
 from bt_actions.ros.host import host
 from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.log import log

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
-from bt_actions.ros.alive import is_valid
+from bt_actions.ros.graph import is_valid
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.utilities.plain_text import raised

@@ -23,7 +23,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.node import Node
 from rclpy.task import Task
 
-from bt_actions.ros.alive import is_valid
+from bt_actions.ros.graph import is_valid
 from bt_actions.ros.naming import named_node
 from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.workarounds import participant
