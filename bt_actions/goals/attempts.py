@@ -57,8 +57,6 @@ class AttemptRecord:
 class Attempts:
     """The tries of one visit to a leaf."""
 
-    __slots__ = ("_resume_at", "_ros_seen", "_when", "history", "retry")
-
     def __init__(self, retry: Retry, when: Callable[[Any], bool] | None) -> None:
         """`when` is `retry.when` made callable; if it raises, that counts as no."""
         self.retry = retry

@@ -91,25 +91,22 @@ class Drain:
             if now < self._gives_up_at and any(requests):
                 self._deliver_arrived()
                 return Sleep(LOOK)
-            return Done(self._finish())
+            for each in self._waits:  # all at once, though a server's queue drops what is too much
+                each.endpoint.cancels.send_now(each.goal.id)
+            for each in self._waits:
+                each.endpoint.tell(each, Event.DRAIN_GAVE_UP)
+            return Done([each for each in self._wanted if not each.is_over])
 
     def _deliver_arrived(self) -> None:
         for endpoint in dict.fromkeys(handle.endpoint for handle in self._waits):
             endpoint.deliver_arrived()
 
-    def _finish(self) -> list[GoalHandle]:
-        for handle in self._waits:  # all at once, though a server's queue drops what is too much
-            handle.endpoint.cancels.send_now(handle.goal.id)
-        for handle in self._waits:
-            handle.endpoint.tell(handle, Event.DRAIN_GAVE_UP)
-        return [handle for handle in self._wanted if not handle.is_over]
-
     def _is_over(self, now: float) -> bool:
         """Whether nobody waits any longer."""
         if not self._waits:
             return True
-        doubts = (handle.endpoint.in_doubt(now) for handle in self._waits)
-        if max(self._host.stalls.answers_take(now), *doubts, 0.0) > 0.0:
+        in_doubt = any(handle.endpoint.in_doubt(now) for handle in self._waits)
+        if in_doubt or self._host.stalls.answers_take(now):
             self._not_before = now + ASK_AGAIN
         self._allow(now)
         looks_out = any(handle.looked_out_for for handle in self._waits)

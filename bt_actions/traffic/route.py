@@ -69,9 +69,10 @@ class Route:
 
     def _reachability(self, now: float) -> Reachability:
         """Return that of our transport, which knows of all stalls by now."""
-        reachability = self._endpoint.transport.reachability
-        if self._host.stalls.long_times != self._long_stalls:
-            self._long_stalls = self._host.stalls.long_times
+        reachability, stalls = self._endpoint.transport.reachability, self._host.stalls
+        stalls.lives(now)  # whoever asks may be the first to run again
+        if stalls.long_times != self._long_stalls:
+            self._long_stalls = stalls.long_times
             reachability.doubt(now)
         return reachability
 
