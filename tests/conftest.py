@@ -287,7 +287,7 @@ def no_leaks(domain: int) -> Iterator[None]:
 
     def open_goals() -> list[Any]:
         with process.lock:
-            endpoints = [endpoint for each in process.domains for endpoint in each.open]
+            endpoints = [endpoint for each in process.domains.values() for endpoint in each.open]
             goals = [handle.goal for each in endpoints for handle in each.goals.values()]
         return [goal for goal in goals if not goal.lost]
 

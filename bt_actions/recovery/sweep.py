@@ -234,7 +234,7 @@ class Cleanup:
         now = time.monotonic()
         for call in map(self._call, self._sight.actions()):
             if call not in self._views:
-                self._views[call] = self._sight.view(call.action)
+                self._views[call] = ActionView(self._sight.node, call.action)
         for call, view in self._views.items():
             call.sees(view.servers(), now)
         self._find()

@@ -31,7 +31,7 @@ def close_process() -> None:
             host.closing = True
             left = [
                 handle
-                for domain in host.domains
+                for domain in host.domains.values()
                 for endpoint in domain.open
                 for handle in endpoint.handles
                 if not handle.goal.lost or handle.looked_out_for

@@ -44,19 +44,15 @@ class RosHost:
         self.trace = Trace()
         self.forks = 0
         self.closing = False
-        self._domains: dict[int, Domain] = {}
+        self.domains: dict[int, Domain] = {}
+        """Those of ROS that goals were ever begun in, by their numbers."""
         self._bell = threading.Condition(self.lock)
         self._thread: threading.Thread | None = None
-
-    @property
-    def domains(self) -> list[Domain]:
-        """All ROS domains that goals were ever begun in."""
-        return list(self._domains.values())
 
     def domain(self, number: int) -> Domain:
         """Return what is shared in the ROS domain of this number."""
         with self.lock:
-            return self._domains.setdefault(number, Domain())
+            return self.domains.setdefault(number, Domain())
 
     def appears(self) -> None:
         """Take note that this process begins to see others now; the caller holds the lock."""
@@ -71,7 +67,7 @@ class RosHost:
         self.scheduler.clear()
         self._thread = None
         self.stalls.rests(self.steady())
-        self._domains.clear()
+        self.domains.clear()
         self.record.disown()
 
     # The alarm

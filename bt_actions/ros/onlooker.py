@@ -28,7 +28,7 @@ DEPTH = 100
 
 
 class ActionView:
-    """One action, as one node sees it; what has come in is taken by hand, nobody spins."""
+    """One action, as one node sees it from now on; what has come in is taken by hand."""
 
     def __init__(self, node: Node, action: str) -> None:
         self._node = node
@@ -90,21 +90,17 @@ class Onlooker:
     """What one participant has in sight."""
 
     def __init__(self, node: Node) -> None:
-        self._node = node
+        self.node = node
         self.domain = int(node.context.get_domain_id())
 
     def full_name(self, name: str) -> str:
         """Return the name as a run means it."""
-        return str(self._node.resolve_topic_name(name, only_expand=True))
+        return str(self.node.resolve_topic_name(name, only_expand=True))
 
     def actions(self) -> list[str]:
         """Return the names of the actions that anybody serves, or is a client of."""
-        topics = [topic for topic, _types in self._node.get_topic_names_and_types()]
+        topics = [topic for topic, _types in self.node.get_topic_names_and_types()]
         return [topic.removesuffix(STATUS) for topic in topics if topic.endswith(STATUS)]
-
-    def view(self, action: str) -> ActionView:
-        """Look at one of them from now on."""
-        return ActionView(self._node, action)
 
 
 @contextlib.contextmanager

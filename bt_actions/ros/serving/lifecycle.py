@@ -35,13 +35,14 @@ class Lifecycle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
         self._events = endpoints.publisher(TransitionEvent, "~/transition_event", 10)
         endpoints.service(ChangeState, "~/change_state", self._on_change)
-        for name, kind, what in (
-            ("get_state", GetState, "current_state"),
-            ("get_available_states", GetAvailableStates, "available_states"),
-            ("get_available_transitions", GetAvailableTransitions, "available_transitions"),
-            ("get_transition_graph", GetAvailableTransitions, "transition_graph"),
+        for kind, what in (
+            (GetState, "current_state"),
+            (GetAvailableStates, "available_states"),
+            (GetAvailableTransitions, "available_transitions"),
+            (GetAvailableTransitions, "transition_graph"),
         ):
-            endpoints.service(kind, f"~/{name}", functools.partial(self._tell, what))
+            name = f"~/get_{what.removeprefix('current_')}"
+            endpoints.service(kind, name, functools.partial(self._tell, what))
 
     @property
     def state(self) -> str:

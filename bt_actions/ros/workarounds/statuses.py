@@ -23,13 +23,9 @@ ID, ENTRY, STATUS = 16, 28, 24
 
 
 class _Sequence(ctypes.Structure):
-    """action_msgs__msg__GoalStatus__Sequence, which is all of a GoalStatusArray."""
+    """action_msgs__msg__GoalStatus__Sequence without its capacity: all of a GoalStatusArray."""
 
-    _fields_ = (
-        ("data", ctypes.c_void_p),
-        ("size", ctypes.c_size_t),
-        ("capacity", ctypes.c_size_t),
-    )
+    _fields_ = (("data", ctypes.c_void_p), ("size", ctypes.c_size_t))
 
 
 def _read(message: int) -> dict[bytes, int]:
