@@ -76,7 +76,8 @@ class NodeName:
                 hint="tools that draw trees take 'a:b' for a port of the node 'a'",
             )  # fmt: skip
             return BAD
-        if (odd := _odd(text)) is not None:
+        if not text.isprintable():
+            odd = _odd(text)
             source.report("BT113", span_of(node), f"{odd} cannot stand in a node's name")
             return BAD
         if len(text) > _NAME_LIMIT:

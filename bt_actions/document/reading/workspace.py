@@ -12,6 +12,7 @@ from pathlib import Path
 
 from bt_actions.document.findings import DocumentError, Finding, Related, Span
 from bt_actions.document.findings.elsewhere import package_here
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.reading.find import TreeNotFoundError, find_tree
 from bt_actions.document.reading.nodes import read_root
 from bt_actions.document.reading.read import read_document
@@ -27,6 +28,7 @@ MAX_TREE_NODES = 1_000_000
 MAX_LEVELS = 200
 """Nodes inside each other after all that a tree includes was unfolded: py_trees ticks and stops a
 tree by recursion, and Python has 1,000 levels of that for everything."""
+_SUBTREE = KINDS["subtree"]
 _MAX_CHAIN = 50
 _MAX_FILES = 2 * _MAX_CHAIN
 """Trees inside each other, and then files that import each other."""
@@ -108,7 +110,7 @@ class Workspace:
             size += 1
             if node.level > height:
                 height = node.level
-            if node.kind is not None and node.kind.name == "subtree":
+            if node.kind is _SUBTREE:
                 node.included = self._include(node, chain)
                 if node.included is not None:
                     size += self._sizes.get(id(node.included), 0)
