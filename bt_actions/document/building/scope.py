@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import weakref
 from collections import deque
 from collections.abc import Mapping
 
@@ -35,6 +34,7 @@ class Scope:
     def __init__(self, prefix: str) -> None:
         self.prefix = prefix
         self._outer: Scope | None = None
+        self._gone: deque[str] | None = None
         self._children: dict[str, int] = {}
 
     def __repr__(self) -> str:
@@ -57,8 +57,12 @@ class Scope:
             for key in [key for key in list(Blackboard.metadata) if key.startswith(prefix)]:
                 Blackboard.metadata.pop(key, None)
         scope = cls(f"/bt/{_safe(tree)}/{next(loads.numbers)}")
-        weakref.finalize(scope, loads.gone.append, scope.prefix).atexit = False
+        scope._gone = loads.gone
         return scope
+
+    def __del__(self) -> None:
+        if self._gone is not None:
+            self._gone.append(self.prefix)
 
     def inner(self, tree: str) -> Scope:
         """The scope of a tree included in this one."""
