@@ -6,11 +6,11 @@ import contextlib
 import gc
 import os
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from bt_actions.document.checking.check import check_document
 from bt_actions.document.checking.checker import Checker
@@ -44,6 +44,8 @@ __all__ = [
 ]
 
 PathLike = str | os.PathLike[str]
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,19 +56,23 @@ class Loaded:
     scope: Scope
 
 
-@contextlib.contextmanager
-def _no_collecting() -> Iterator[None]:
+def _no_collecting(call: Callable[P, T]) -> Callable[P, T]:
     """Leave the garbage collector out while a document is made: nothing of it becomes garbage.
 
     For 10,000 nodes it would otherwise take as long as all the rest.
     """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
+
+    @wraps(call)
+    def collecting_nothing(*args: P.args, **kwargs: P.kwargs) -> T:
+        was_on = gc.isenabled()
+        gc.disable()
+        try:
+            return call(*args, **kwargs)
+        finally:
+            if was_on:
+                gc.enable()
+
+    return collecting_nothing
 
 
 class Tree:
@@ -166,6 +172,7 @@ def load_tree(
     return _built(workspace, document, inputs, types=types, python=python, once=True)
 
 
+@_no_collecting
 def _built(
     workspace: Workspace,
     document: Document,
@@ -181,7 +188,7 @@ def _built(
     values = check_inputs(document, inputs or {}, types=types)
     scope = Scope.of_load(document.name)
     scope.write_all(values)
-    with _no_collecting(), workspace.as_it_was():
+    with workspace.as_it_was():
         try:
             root = build(document, scope, types=types, python=python, once=once)
         except TooManyErrors:
@@ -226,7 +233,7 @@ def tree_outputs(root: Behaviour) -> dict[str, object]:
     return found
 
 
-@_no_collecting()
+@_no_collecting
 def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> list[Finding]:
     """Everything that is wrong with a tree, and with all that it includes and imports.
 
@@ -244,7 +251,7 @@ def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> li
     return _checked(workspace, types=types, python=python)
 
 
-@_no_collecting()
+@_no_collecting
 def check_source(source: Source, *, types: bool = True, python: bool = True) -> list[Finding]:
     """As `check_file`, for a text that was read already."""
     workspace = Workspace()
@@ -272,7 +279,7 @@ def _all_tried(document: Document, doubts: Doubts) -> bool:
     return not has_unread and not doubts.any
 
 
-@_no_collecting()
+@_no_collecting
 def _open(
     path: PathLike,
     *,

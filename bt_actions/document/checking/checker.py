@@ -36,7 +36,7 @@ from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.messages.conversion import examine
-from bt_actions.messages.fields import FieldType, Message
+from bt_actions.messages.fields import FieldType, Message, describe
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
@@ -56,6 +56,28 @@ def _parts(cls: type | None, kind: str) -> tuple[str, FieldType | None, Types]:
     if cls is None:
         return key, None, {"result": None}
     return key, Message(getattr(cls, asked)), {"result": Message(getattr(cls, answered))}
+
+
+def _all_computed(
+    kind: FieldType, value: object, types: MappingType[int, FieldType | None]
+) -> bool:
+    """Whether a message's fields are all read from variables that fit: nothing is wrong there."""
+    if not isinstance(value, dict) or not isinstance(kind, Message):
+        return False
+    parts = value.values()
+    if not all(isinstance(part, Computed) and part.expression.variables for part in parts):
+        return False
+    return _fill(kind, tuple(value), *[types[id(part)] for part in parts])
+
+
+@lru_cache(maxsize=4096)
+def _fill(kind: Message, names: tuple[str, ...], *given: FieldType | None) -> bool:
+    """Whether values of such types fit the fields of these names."""
+    wanted = describe(kind.cls)
+    return all(
+        name in wanted and fits(one, wanted[name]) and not misfits(one, wanted[name])
+        for name, one in zip(names, given, strict=True)
+    )
 
 
 @lru_cache(maxsize=4096)
@@ -206,14 +228,13 @@ class Checker:
         """As `value`; what is `known` may be meant by a bare name where the value does not fit."""
         if value is BAD:
             return
-        if kind is None:
-            for computed in computed_in(value):
-                self.expression(computed, {})
+        types = {id(part): self.expression(part, {}) for part in computed_in(value)}
+        if kind is None or _all_computed(kind, value, types):
             return
 
         def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):
-                given = self.expression(item, {})
+                given = types[id(item)]
                 if not fits(given, wanted):
                     said = item.expression.text.strip()
                     if isinstance(given, Either):
@@ -230,8 +251,6 @@ class Checker:
                         self.source.report("BT204", span_of(item.node), problem.text)
                 return True
             if isinstance(item, Interpolated):
-                for part in computed_in(item):
-                    self.expression(part, {})
                 if not fits(TEXT, wanted):
                     text = f"{named(wanted)} is needed, and this is a text"
                     self.source.report("BT204", span_of(item.node), text)

@@ -45,6 +45,9 @@ class _Hazards:
         self._held: dict[tuple[int, str], dict[str, TreeNode]] = {}
         self._slow: dict[int, bool] = {}
         self._anew: dict[int, TreeNode | None] = {}
+        names = (None, *checker.document.actions)
+        self._bounded = {one for one in names if _bounds(shared_settings(one, checker.document))}
+        """Actions whose goals have a deadline wherever they are used; None: all without a name."""
         self._unbounded: dict[str, TreeNode] = {}
         self._used: set[str] = set()
 
@@ -99,11 +102,7 @@ class _Hazards:
     # BT301
 
     def _look_at_action(self, node: TreeNode) -> None:
-        timeout = node.values.get("timeout", {})
-        if not isinstance(timeout, dict) or "result" in timeout:
-            return
-        shared = shared_settings(node.alias, self._document).get("timeout", {})
-        if not isinstance(shared, dict) or "result" in shared:
+        if node.alias in self._bounded or _bounds(node.values):
             return
         if self._doubts.below(node):
             return
@@ -302,3 +301,9 @@ class _Hazards:
 
     def _own(self, table: dict[str, Declared]) -> Iterator[str]:
         return (name for name, declared in table.items() if declared.source is self._source)
+
+
+def _bounds(settings: Mapping[str, object]) -> bool:
+    """Whether settings give the result a deadline, or say that there is none."""
+    timeout = settings.get("timeout", {})
+    return not isinstance(timeout, dict) or "result" in timeout

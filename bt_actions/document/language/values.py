@@ -318,6 +318,8 @@ def computed_in(value: object) -> list[Computed]:
         return [part for part in value.parts if isinstance(part, Computed)]
     if isinstance(value, dict):
         value = [*value.values()]
+    elif isinstance(value, list) and numbers_only(value):
+        return []
     return [each for item in value for each in computed_in(item)] if isinstance(value, list) else []
 
 
