@@ -101,7 +101,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.goal = goal
         self.timeouts = Timeouts.of(timeout)
         self.retry = Retry.of(retry)
-        self.busy = Busy(busy)
+        self.busy = busy if isinstance(busy, Busy) else Busy(busy)
         self.resources = frozenset(resources or ())
         self.on_feedback = on_feedback
         self.expect = expect

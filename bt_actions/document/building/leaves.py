@@ -21,7 +21,7 @@ from bt_actions.document.language.values import Computed, computed_in
 from bt_actions.document.reading.settings import server_of, settings_of, text_of
 from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.yaml.nodes import span_of
-from bt_actions.goals.policy import Retry, Timeouts
+from bt_actions.goals.policy import Busy, Retry, Timeouts
 from bt_actions.messages.interfaces import interface
 
 __all__ = ["LEAVES", "build_action"]
@@ -75,7 +75,7 @@ def _terms(
         "timeout": _timeouts(tuple({**timeout, **table_of(settings.get("timeout"))}.items())),
         "retry": _retry(settings, context),
         "expect": context.condition(settings.get("expect"), root),
-        "busy": text_of(settings, "busy") or "wait",
+        "busy": Busy(text_of(settings, "busy") or "wait"),
         "resources": [context.joined(settings, str(each)) for each in resources],
     }
 

@@ -83,7 +83,8 @@ class NodeName:
         if len(text) > _NAME_LIMIT:
             source.report("BT113", span_of(node), "a name is one line of up to 200 characters")
             return BAD
-        warn_cut(node, source, "name")
+        if source.commented:
+            warn_cut(node, source, "name")
         return text
 
     def schema(self) -> Schema:
@@ -274,7 +275,8 @@ class Condition:
         expression = read_expression(node, source, node.text, 0, self.roots)
         if expression is None:
             return BAD
-        warn_cut(node, source, "expression")
+        if source.commented:
+            warn_cut(node, source, "expression")
         return Computed(expression, node)
 
     def schema(self) -> Schema:
