@@ -286,8 +286,9 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
 
         Also those that a second server has taken when they had ended here.
         """
-        here = [] if self._own is None else self._own.goals_of(self)
-        ours = dict.fromkeys([*self._left_behind, self._handle, *here])
+        here = [] if self._own is None else self._own.handles
+        taken = [handle for handle in here if handle.owner is self]
+        ours = dict.fromkeys([*self._left_behind, self._handle, *taken])
         return [handle for handle in ours if handle is not None and not handle.is_over]
 
     # What a leaf for actions of one type may know better

@@ -62,23 +62,18 @@ def is_clear(handle: GoalHandle, left: Iterable[GoalHandle], now: float) -> bool
 def why_not(handle: GoalHandle) -> str:
     """Say, as the end of a sentence, what kept back a goal that was given up unsent."""
     if handle.goal.outcome is Outcome.SERVER_BUSY:
-        return _in_use(handle)
+        for other in handle.endpoint.domain.resources.holders(handle.goal.resources):
+            if other.paused:
+                return f": it is the turn of {other.name}, whose tree is paused"
+            if other.goal.outcome is not None and not other.accounted_for:
+                told = other.goal.cancel_said
+                return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
+        return ""  # one that just runs has it
     if any(each.goal.outstanding for each in left_near(handle)):
         return ": what it would use still has a goal that was given up, and would run both"
     if _may_overtake(handle):
         return ": it has not answered another goal's request, and might run that one last"
     return handle.endpoint.participant.instead(*handle.endpoint.action)
-
-
-def _in_use(handle: GoalHandle) -> str:
-    """Say who has what the goal waited for, where that is not a goal that just runs."""
-    for other in handle.endpoint.domain.resources.holders(handle.goal.resources):
-        if other.paused:
-            return f": it is the turn of {other.name}, whose tree is paused"
-        if other.goal.outcome is not None and not other.accounted_for:
-            told = other.goal.cancel_said
-            return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
-    return ""
 
 
 def _may_overtake(handle: GoalHandle) -> bool:

@@ -207,10 +207,6 @@ class ActionEndpoint:
             self.watcher.rest()
             self._unused(self)
 
-    def goals_of(self, owner: Any) -> list[GoalHandle]:
-        """Return a leaf's goals that are open here, also what a second server took."""
-        return [handle for handle in self.handles if handle.owner is owner]
-
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""
         self.transport.close()
