@@ -19,6 +19,7 @@ from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery import ledger as module
 from bt_actions.recovery.ledger import KEPT_FOR, LENGTH, Ledger, Sent, left_behind
 from bt_actions.traffic.host import Entry
+from tests.support import records
 
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
 LEAVES = """
@@ -60,6 +61,12 @@ def ledger(complaints: list[str]) -> Iterator[Ledger]:
     ours.disown()
 
 
+def on_record(directory: Path) -> list[Any]:
+    """What is there."""
+    [path] = directory.iterdir()
+    return records.on_record(path)
+
+
 troubles: list[OSError] = []
 """What could not be read in this test."""
 
@@ -76,14 +83,6 @@ def found() -> list[Sent]:
     every = list(left_behind())
     troubles.extend(each for each in every if isinstance(each, OSError))
     return [each for each in every if isinstance(each, Sent)]
-
-
-def on_record(directory: Path) -> list[Any]:
-    """What is there."""
-    [path] = directory.iterdir()
-    text = path.read_bytes()
-    slots = (text[at : at + LENGTH].strip(b"\0") for at in range(0, len(text), LENGTH))
-    return [json.loads(slot) for slot in slots if slot]
 
 
 def test_what_a_dead_process_left_is_found(directory: Path) -> None:
@@ -289,6 +288,21 @@ def test_who_ends_leaves_nothing_unless_a_goal_is_open(ledger: Ledger, directory
     ledger.strike(answered)
     ledger.close()
     assert len(on_record(directory)) == 1
+
+
+def test_a_file_is_as_old_as_what_is_on_it(
+    ledger: Ledger, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    [path] = directory.iterdir()
+    os.utime(path, (0.0, 0.0))
+    monkeypatch.setattr(ledger, "_touched_at", 0.0)
+    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    assert time.time() - path.stat().st_mtime < KEPT_FOR
+    path.unlink()  # as who logs out may have all of /dev/shm removed
+    monkeypatch.setattr(ledger, "_touched_at", 0.0)
+    ledger.enter(new_goal_id(), Entry("/move", 1, SERVERS))
+    assert [each["domain"] for each in on_record(directory)] == [1]
 
 
 def test_what_is_elsewhere_is_told_apart(directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,8 +56,9 @@ class Message(FieldType):
     def __new__(cls, of: type) -> Message:
         made = _MESSAGES.get(of)
         if made is None:
-            made = _MESSAGES[of] = super().__new__(cls)
+            made = super().__new__(cls)
             made.cls = of
+            made = _MESSAGES.setdefault(of, made)
         return made
 
     def __str__(self) -> str:

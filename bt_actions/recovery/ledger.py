@@ -36,9 +36,12 @@ SERVERS_AT_MOST = 8
 """Servers of a goal on record; where there are more, none is."""
 KEPT_FOR = 86400.0
 """Seconds after which a file is removed that nobody has cleaned up."""
+_TOUCHED_EVERY = 1.0
+"""Seconds: what is written to a map does not show in the file's time; nor, that it was removed."""
 _MORE = 16 * LENGTH
 _SUFFIX = ".goals"
-_BLANK = b"\0" * LENGTH
+_BLANK = b"\0"
+"""A slot begins with it where nothing counts: not yet, while it is written."""
 _AUTHOR = 12
 """Bytes of a goal's id that tell its process."""
 
@@ -82,6 +85,7 @@ class Ledger(Record):
         self._path = Path()
         self._file: int | None = None
         self._map: mmap.mmap | None = None
+        self._touched_at = 0.0
         self._slots: dict[bytes, int] = {}
         self._free: list[int] = []
 
@@ -94,12 +98,15 @@ class Ledger(Record):
         if len(entry.servers) > SERVERS_AT_MOST:
             entry = replace(entry, servers=frozenset())
         try:
-            at = self._slots.get(goal_id)
-            if at is None:
-                if not self._free:
-                    self._grow(goal_id)
-                at = self._slots[goal_id] = self._free.pop()
-            self._fill(at, _slot(goal_id, entry))
+            self._touch()
+            if self._map is None or not self._free:
+                self._map = self._grown(goal_id)
+            before, at = self._slots.get(goal_id), self._free.pop()
+            self._slots[goal_id], slot = at, _slot(goal_id, entry)
+            self._map[at + 1 : at + LENGTH] = slot[1:]
+            self._map[at] = slot[0]
+            if before is not None:
+                self._blank(before)
         except OSError as error:
             if not self._complained:
                 self._complained = True
@@ -108,7 +115,16 @@ class Ledger(Record):
                     f"be cleaned up: they cannot be put on record: {error}"
                 )
 
-    def _grow(self, goal_id: bytes) -> None:
+    def _touch(self) -> None:
+        now = time.time()
+        if self._file is not None and now - self._touched_at > _TOUCHED_EVERY:
+            self._touched_at = now
+            if os.fstat(self._file).st_nlink:
+                os.utime(self._file)
+            else:  # who logs out may have all of /dev/shm removed
+                self.disown()
+
+    def _grown(self, goal_id: bytes) -> mmap.mmap:
         if self._file is None:
             home = directory()
             _tidy(home)
@@ -116,19 +132,18 @@ class Ledger(Record):
             self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         size = os.fstat(self._file).st_size
         os.posix_fallocate(self._file, size, _MORE)  # where there is no room, a map would crash
-        self._map = mmap.mmap(self._file, size + _MORE)
         self._free = [*range(size, size + _MORE, LENGTH)][::-1]
-
-    def _fill(self, at: int, slot: bytes) -> None:
-        if self._map is not None:
-            self._map[at : at + LENGTH] = slot
+        return mmap.mmap(self._file, size + _MORE)
 
     def strike(self, goal_id: bytes) -> None:
         """Take a goal off the record, if it is there."""
-        at = self._slots.pop(goal_id, None)
-        if at is not None:
-            self._fill(at, _BLANK)
-            self._free.append(at)
+        if (at := self._slots.pop(goal_id, None)) is not None:
+            self._blank(at)
+
+    def _blank(self, at: int) -> None:
+        assert self._map is not None
+        self._map[at] = 0
+        self._free.append(at)
 
     def close(self) -> None:
         """Remove the file, as the process ends, unless there is a goal on it."""
@@ -171,8 +186,8 @@ def left_behind(passed_over: Collection[Path] = ()) -> Iterator[Sent | OSError]:
             yield error
             continue
         for at in range(0, len(text), LENGTH):
-            if (slot := text[at : at + LENGTH]).strip(_BLANK):
-                yield _read(slot, author, path, at)
+            if text[at]:
+                yield _read(text[at : at + LENGTH], author, path, at)
 
 
 def directory(*, make: bool = True) -> Path:
@@ -233,7 +248,7 @@ def _read(slot: bytes, author: Author, path: Path, at: int) -> Sent | OSError:
 
 
 def _is_blank(path: Path) -> bool:
-    return not path.read_bytes().strip(_BLANK)
+    return not any(path.read_bytes()[::LENGTH])
 
 
 def _tidy(directory: Path) -> None:

@@ -49,8 +49,9 @@ FEEDBACK_AT_MOST = 200
 DEPTH = 100
 """Of our end of the services; with the default of 10 a burst of answers is lost silently."""
 
-ASKED_KEPT = 10
-"""Questions of one kind about one goal whose answers are waited for: the newest."""
+ASKED_KEPT = ANSWERS_KEPT = 10
+"""Questions of one kind about one goal whose answers are waited for: the newest; and the answers to
+one that are told: more servers of one name answer nothing new."""
 
 
 @dataclass(slots=True)
@@ -94,6 +95,7 @@ class RosTransport:
         self._impl = action_type.Impl
         services = feedback = QoSProfile(depth=DEPTH)
         profiles = services, services, services, feedback, qos_profile_action_status_default
+        self._counted = node.resolve_service_name(f"{action_name}/_action/send_goal")
         with node.handle:
             self.handle = rclpy_implementation.ActionClient(
                 node.handle,
@@ -178,7 +180,7 @@ class RosTransport:
         """Put an answer into the inbox, with those before it; none that nobody waits for."""
         key = kind, number
         question = self._questions.get(key) or self._past.get(key)
-        if question is None:
+        if question is None or len(question.answers) >= ANSWERS_KEPT:
             return
         question.answers.append(answer)
         told = kind, question.goal_id, question.asked, tuple(question.answers)
@@ -188,7 +190,7 @@ class RosTransport:
         """Deliver what has been taken."""
         with host.lock:
             any_came = bool(self._inbox)
-            while self._inbox:
+            while self._inbox and not self.closed:
                 tell, what, asked = self._inbox.popleft()
                 if asked is not None:
                     self.reachability.answered(asked=asked)
@@ -217,7 +219,7 @@ class RosTransport:
         """How many readers of goal requests are shown, at a tenth of the cost of `servers`."""
         node = self._node.handle
         with node:
-            return int(node.get_count_services(f"{self._name}/_action/send_goal"))
+            return int(node.get_count_services(self._counted))
 
     def ready(self) -> bool:
         """Whether all parts of a server are in sight; raises InvalidHandle as well."""

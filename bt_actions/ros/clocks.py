@@ -23,7 +23,7 @@ class Clocks:
 
     def __init__(self, node: Any) -> None:
         self._clock = node.get_clock()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a signal handler may ask, too
         self._simulated = False
         self._offset = 0.0
         self._last = time.monotonic()

@@ -7,6 +7,7 @@ is opened before its node is needed, and what it has seen by then counts; nobody
 from __future__ import annotations
 
 import itertools
+import os
 import re
 import unicodedata
 from typing import Any
@@ -51,7 +52,7 @@ class Outlook:
 
     def __init__(self) -> None:
         """Raises what rclpy raises where ROS cannot start."""
-        self._node = own_node("bt_actions_outlook", use_global_arguments=False)
+        self._node = own_node(f"bt_actions_{os.getpid()}_outlook", use_global_arguments=False)
         self.context: Context = self._node.context
 
     def hand_over(self) -> None:

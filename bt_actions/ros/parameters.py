@@ -7,11 +7,12 @@ rcl reads the words: whatever it takes, finds in a file for this node, or refuse
 from __future__ import annotations
 
 import ast
+import os
 import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -39,7 +40,7 @@ def parameters_in(words: Sequence[str], namespace: str = "", name: str = "") -> 
     """
     try:
         node = own_node(
-            name or "bt_actions_parameters",
+            name or f"bt_actions_{os.getpid()}_parameters",
             args=["--ros-args", *words],
             namespace=namespace,
             automatically_declare_parameters_from_overrides=True,
@@ -106,6 +107,9 @@ def _shown(
     if limits:
         least, most = limits[0], min(limits[1], _MOST)
         descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]
+    elif scalar == "float32":
+        limit = FLOATS[scalar]
+        descriptor.floating_point_range = [FloatingPointRange(from_value=-limit, to_value=limit)]
     yield Parameter(name, its_type, value), descriptor
 
 

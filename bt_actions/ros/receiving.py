@@ -1,10 +1,10 @@
 """The thread that receives what comes for the actions of a node, whoever spins that.
 
 An executor builds its wait set anew for each spin, with all else of the node in it, and hands what
-came to a thread of its pool. Nothing of a user's is called here, so one wait set is kept, with the
-clients of the actions alone. All that has arrived is taken, then delivered under one hold of the
-lock, so that a tree is ticked once for all of it. What is delivered, and to whom, is the
-transports' business.
+came to a thread of its pool. Nothing of a user's is called here, so a wait set with the clients of
+the actions alone will do. All that has arrived is taken, then delivered under one hold of the lock,
+so that a tree is ticked once for all of it. What is delivered, and to whom, is the transports'
+business.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import atexit
 import os
 import threading
 import weakref
-from typing import Any, Protocol
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 
+from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.graph import is_valid
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
@@ -30,44 +30,31 @@ _receivers: weakref.WeakSet[Receiver] = weakref.WeakSet()
 os.register_at_fork(after_in_child=_receivers.clear)  # their threads are the parent's
 
 
-class Receiving(Protocol):
-    """A transport, as it is waited for."""
-
-    handle: Any
-    """rclpy's low-level action client."""
-
-    def take_data(self) -> None:
-        """Take all that has arrived."""
-
-    def deliver(self) -> None:
-        """Deliver what was taken."""
-
-
 class Receiver:
     """Its thread runs as long as there is a transport; no client is destroyed in its wait."""
 
     def __init__(self, node: Node) -> None:
         self._node, context = node, node.context
         with context.handle:
-            self._guard = rclpy_implementation.GuardCondition(context.handle)
+            self._guard = _rclpy.GuardCondition(context.handle)
         context.on_shutdown(self._wake)
         _receivers.add(self)
         self._let_go = threading.Condition()
-        self._members: tuple[Receiving, ...] = ()
-        self._waits_for: tuple[Receiving, ...] = ()
+        self._members: tuple[RosTransport, ...] = ()
+        self._waits_for: tuple[RosTransport, ...] = ()
         self._thread: threading.Thread | None = None
 
-    def join(self, transport: Receiving) -> None:
+    def join(self, transport: RosTransport) -> None:
         """Receive for this one, too."""
         with self._let_go:
             self._members += (transport,)
-            if self._thread is None:
+            if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._run, name="bt_actions-receive")
                 self._thread.daemon = True
                 self._thread.start()
         self._wake()
 
-    def leave(self, transport: Receiving) -> None:
+    def leave(self, transport: RosTransport) -> None:
         """Receive no more for this one, which may be destroyed then."""
         with self._let_go:
             self._members = tuple(each for each in self._members if each is not transport)
@@ -87,39 +74,39 @@ class Receiver:
         self._guard.trigger_guard_condition()
 
     def _run(self) -> None:
-        members: tuple[Receiving, ...] = ()
-        wait_set: Any = None
         while True:
             with self._let_go:
                 if not self._members or not is_valid(self._node):
                     self._thread = None
                     return
                 self._waits_for = self._members
-            if members is not self._waits_for:
-                members = self._waits_for
-                wait_set = self._wait_set(len(members))
-            wait_set.clear_entities()
-            wait_set.add_guard_condition(self._guard)
-            for each in members:
-                each.handle.add_to_waitset(wait_set)
-            wait_set.wait(AT_MOST)
-            ready = [each for each in members if True in each.handle.is_ready(wait_set)]
-            for each in ready:
-                try:
-                    each.take_data()
-                except Exception as error:  # noqa: BLE001 - the others still want to hear
-                    log.error(f"what came for an action was not taken in: {raised(error)}")
-            with self._let_go:
-                self._waits_for = ()
-                self._let_go.notify_all()
+            try:
+                ready = self._take(self._waits_for)
+            finally:
+                with self._let_go:
+                    self._waits_for = ()
+                    self._let_go.notify_all()
             with host.lock:
                 for each in ready:
                     each.deliver()
 
-    def _wait_set(self, number: int) -> Any:
+    def _take(self, members: tuple[RosTransport, ...]) -> list[RosTransport]:
+        """Wait, take what has arrived, and return for whom."""
         context = self._node.context.handle
         with context:
-            return rclpy_implementation.WaitSet(2 * number, 1, 0, 3 * number, 0, 0, context)
+            wait_set = _rclpy.WaitSet(2 * len(members), 1, 0, 3 * len(members), 0, 0, context)
+        wait_set.clear_entities()
+        wait_set.add_guard_condition(self._guard)
+        for each in members:
+            each.handle.add_to_waitset(wait_set)
+        wait_set.wait(AT_MOST)
+        ready = [each for each in members if True in each.handle.is_ready(wait_set)]
+        for each in ready:
+            try:
+                each.take_data()
+            except Exception as error:  # noqa: BLE001 - the others still want to hear
+                log.error(f"what came for an action was not taken in: {raised(error)}")
+        return ready
 
 
 @atexit.register

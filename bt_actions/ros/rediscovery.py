@@ -131,7 +131,8 @@ class Rediscovery:
                     found = self._look()
                 except Exception as error:  # noqa: BLE001 - no resources, no permission, rclpy's
                     found = False
-                    log.warning(f"no second look for lost servers: {raised(error)}")
+                    if self._pause == FIRST_AFTER:
+                        log.warning(f"no second look for lost servers: {raised(error)}")
                 self._pause = FIRST_AFTER if found else min(2 * self._pause, LONGEST_PAUSE)
                 self._look_at = time.monotonic() + self._pause
             for second in self._unused():

@@ -144,6 +144,8 @@ class Replies:
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
+        if runs := [answer[0] for answer in answers if answer[0] not in (0, *ENDS)]:
+            return Event.STATUS, runs[-1]  # told too soon, by a server that is none of rclpy's
         by_each = len(answers) >= _answers_wanted(watch)
         is_fresh = asked >= self._fresh_since
         ended = [answer for answer in answers if answer[0] in ENDS]

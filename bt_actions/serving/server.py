@@ -6,6 +6,7 @@ turns.py's, and a run its own (run.py); here is what they have to do with ROS.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 import time
@@ -150,7 +151,8 @@ class TreeServer:
         if self.lifecycle is not None:
             self.lifecycle.stop()
         self.halt(Ending.DEACTIVATED)
-        wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
+        with contextlib.suppress(RuntimeError):  # of an interpreter that ends
+            wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
         time.sleep(_LINGER)
         self._is_drained = True
 

@@ -246,6 +246,18 @@ def test_what_cannot_be_taken_keeps_nothing_else_from_being_heard(
     assert next(taken, None) is None
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_wait_that_fails_keeps_nobody_waiting(
+    client: RosTransport, node: Node, name: str, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(NodeParticipant.of(node)._receiver, "_take", lambda _: [][0])
+        until(lambda: not NodeParticipant.of(node)._receiver._waits_for)
+    transport_to(node, f"{name}_2", heard).close()
+    request(client, "result")
+    until(lambda: heard.results)
+
+
 def test_a_destroyed_client_is_silent_and_refuses_to_send(
     client: RosTransport, heard: Heard
 ) -> None:

@@ -5,7 +5,6 @@ No status tells of such a goal; what its sender had on record does (bt_actions/r
 
 from __future__ import annotations
 
-import json
 import signal
 import time
 from collections.abc import Callable
@@ -15,6 +14,7 @@ import pytest
 
 from tests.scenarios.conftest import Launch
 from tests.support.processes import HostFactory, Journal, Process
+from tests.support.records import on_record
 from tests.support.reliability import Record
 from tests.support.waiting import until
 
@@ -132,7 +132,7 @@ def test_a_server_that_was_restarted_has_nothing_to_await(
     record.took(time.monotonic() - began, 15.0)
     assert [line.split("  ")[-1] for line in cleanup.lines] == ["its server is gone"], cleanup
     [left] = ledger.iterdir()
-    assert json.loads(left.read_text().strip("\0"))["lost"] is True
+    assert [each["lost"] for each in on_record(left)] == [True]
     assert journal.count("received") == 1
     record.outcome = "its server is gone; exit code 0"
 
@@ -195,7 +195,7 @@ def test_what_was_known_to_be_lost_is_not_told_again(
     run.send(signal.SIGKILL)
     run.wait()
     [record_of_run] = ledger.iterdir()
-    assert json.loads(record_of_run.read_text().strip("\0"))["lost"] is True
+    assert [each["lost"] for each in on_record(record_of_run)] == [True]
     new_host().open(f"{name}/another")
     cleanup = launch("cleanup")
     assert cleanup.wait(60.0) == 0, cleanup

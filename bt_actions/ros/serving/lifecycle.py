@@ -64,7 +64,7 @@ class Lifecycle:
                 log.error(f"{self._node.get_name()}: {state} failed: {in_words(error)}")
                 how = "failure"
             self._trigger(f"transition_{how}")
-        except KeyError:
+        except (KeyError, RuntimeError):  # rclpy's RCLError: the context was shut down
             return False
         finally:
             self._changes.release()
