@@ -63,8 +63,7 @@ class TreeServer:
             another thread than the one that makes or closes this; any executor will do.
         trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Nothing
             outside of them is read.
-        policy: what to do with a goal while another runs: "reject", "queue", "replace" or
-            "parallel".
+        policy: what to do with a goal while another runs: "reject", "queue", "replace", "parallel".
         most: how many goals may wait (queue), or run (parallel).
         python: the packages whose classes the trees' ``python:`` nodes may name.
         managed: be unconfigured at first, and have the services of a managed node; `lifecycle`
@@ -145,8 +144,8 @@ class TreeServer:
     def drain(self) -> None:
         """Accept nothing more for good, end all runs, and answer their goals.
 
-        Returns when every goal of the trees has ended, or its `timeout.cancel` has passed. While
-        the node is spun, and not on a thread of its executor.
+        Returns when every goal has ended, or its `timeout.cancel` has passed; not on a thread of
+        the node's executor, which is to be spun.
         """
         if self.lifecycle is not None:
             self.lifecycle.stop()
@@ -159,8 +158,7 @@ class TreeServer:
     def close(self) -> None:
         """Drain, where that has not been done, and be gone.
 
-        Who can, drains, stops the executor, and closes then: rclpy's executors may end with an
-        error where what they wait for is destroyed.
+        Who can, drains, stops the executor, then closes: rclpy's executors fail over what is gone.
         """
         if not self._is_drained:
             self.drain()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import uuid
 from collections.abc import Callable, Iterator
@@ -10,7 +9,6 @@ from typing import Any
 
 import pytest
 from rclpy.context import Context
-from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
@@ -59,7 +57,7 @@ class LateFiling:
     """rclpy's low-level client, which returns from sending when the answer may have arrived.
 
     The number of a request is filed when sending returns. Here that is when the answer has been
-    taken by the executor, or after `patience` seconds where it cannot be taken.
+    taken, or after `patience` seconds where it cannot be taken.
     """
 
     def __init__(self, handle: Any, kind: str, patience: float) -> None:
@@ -121,26 +119,6 @@ def client(node: Node, host: Host, name: str, heard: Heard) -> Iterator[RosTrans
     host.close_server(name)
 
 
-@contextlib.contextmanager
-def spinning(node: Node, executor: Any) -> Iterator[None]:
-    """Spin `node` on another thread."""
-    executor.add_node(node)
-    thread = threading.Thread(target=executor.spin, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        executor.shutdown()
-        thread.join()
-        if isinstance(executor, MultiThreadedExecutor):
-            executor._executor.shutdown(wait=True)
-        node.executor = None
-
-
-def single(node: Node) -> Any:
-    return spinning(node, SingleThreadedExecutor(context=node.context))
-
-
 def request(client: RosTransport, kind: str) -> bytes:
     """Send a request that is answered at once, and return the goal's id."""
     goal_id = uuid.uuid4().bytes
@@ -155,21 +133,19 @@ def request(client: RosTransport, kind: str) -> bytes:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_answer_that_arrives_before_its_request_is_filed_is_not_lost(
-    client: RosTransport, node: Node, heard: Heard, kind: str
+    client: RosTransport, heard: Heard, kind: str
 ) -> None:
     client.handle = LateFiling(client.handle, kind, patience=0.02)
     asked: list[bytes] = []
-    with single(node):
-        for _ in range(TIMES):
-            asked.append(request(client, kind))
-            until(lambda: len(asked) - len(heard.answers(kind)) < 8)  # a server's queue holds ten
-        until(lambda: len(heard.answers(kind)) == TIMES)
+    for _ in range(TIMES):
+        asked.append(request(client, kind))
+        until(lambda: len(asked) - len(heard.answers(kind)) < 8)  # a server's queue holds ten
+    until(lambda: len(heard.answers(kind)) == TIMES)
     assert [answer[0] for answer in heard.answers(kind)] == asked
 
 
-@pytest.mark.parametrize("executor", [SingleThreadedExecutor, MultiThreadedExecutor])
 def test_every_answer_reaches_its_goal_when_several_threads_send(
-    client: RosTransport, node: Node, heard: Heard, executor: Any
+    client: RosTransport, heard: Heard
 ) -> None:
     asked: list[bytes] = []
 
@@ -178,13 +154,12 @@ def test_every_answer_reaches_its_goal_when_several_threads_send(
             asked.append(request(client, "result"))
             until(lambda: len(asked) - len(heard.results) < 4)
 
-    with spinning(node, executor(context=node.context)):
-        threads = [threading.Thread(target=send) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        until(lambda: len(heard.results) == 4 * TIMES)
+    threads = [threading.Thread(target=send) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    until(lambda: len(heard.results) == 4 * TIMES)
     assert sorted(result[0] for result in heard.results) == sorted(asked)
 
 
@@ -220,7 +195,7 @@ def test_a_listener_that_raises_does_not_end_the_spin(
             raise RuntimeError("on purpose")
         heard.results.append((b"", 0, None))
 
-    with monkeypatch.context() as patch, single(node):
+    with monkeypatch.context() as patch:
         patch.setattr(heard, "answered", fails)
         request(client, "cancel")
         request(client, "result")
@@ -250,9 +225,10 @@ def test_what_cannot_be_taken_keeps_nothing_else_from_being_heard(
 def test_a_wait_that_fails_keeps_nobody_waiting(
     client: RosTransport, node: Node, name: str, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    receiver: Any = NodeParticipant.of(node)._receiver
     with monkeypatch.context() as patch:
-        patch.setattr(NodeParticipant.of(node)._receiver, "_take", lambda _: [][0])
-        until(lambda: not NodeParticipant.of(node)._receiver._waits_for)
+        patch.setattr(receiver, "_take", lambda _: [][0])
+        until(lambda: not receiver._thread.is_alive())
     transport_to(node, f"{name}_2", heard).close()
     request(client, "result")
     until(lambda: heard.results)
@@ -264,23 +240,20 @@ def test_a_destroyed_client_is_silent_and_refuses_to_send(
     request(client, "result")
     client.close()
     client.close()
+    heard.results.clear()
     client.deliver_arrived()
     assert not heard.results
     with pytest.raises(Exception, match=r"(?i)destroy|invalid|pointer"):
         request(client, "goal")
 
 
-@pytest.mark.parametrize("times", [200])
-def test_clients_come_and_go_under_a_spinning_executor(
-    node: Node, name: str, heard: Heard, times: int
+def test_clients_come_and_go_while_others_are_waited_for(
+    client: RosTransport, node: Node, name: str, heard: Heard
 ) -> None:
-    alive = threading.Event()
-    executor = MultiThreadedExecutor(2, context=node.context)
-    with spinning(node, executor):
-        for number in range(times):
-            transport_to(node, f"{name}_{number % 5}", heard).close()
-        executor.create_task(alive.set)
-        assert alive.wait(5.0)
+    for number in range(200):
+        transport_to(node, f"{name}_{number % 5}", heard).close()
+    request(client, "result")
+    until(lambda: heard.results)
 
 
 # Shared per node, name and type
