@@ -96,12 +96,12 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         super().__init__(name)
         if isinstance(resources, str):
             raise ValueError("resources must be a collection of names, not one text")
-        self.action_type: type | str = action_type
+        self.action_type = action_type
         self.action_name = action_name
         self.goal = goal
         self.timeouts = Timeouts.of(timeout)
         self.retry = Retry.of(retry)
-        self.busy = busy if isinstance(busy, Busy) else Busy(busy)
+        self.busy = Busy(busy)
         self.resources = frozenset(resources or ())
         self.on_feedback = on_feedback
         self.expect = expect
@@ -135,7 +135,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     def attempt(self) -> int:
         """The number of the attempt of this visit, from 1; 0 before the first."""
         under_way = self._handle is not None and not self._filed(self._handle)
-        return len(self._attempts.history) + under_way
+        return len(self.history) + under_way
 
     @property
     def history(self) -> list[AttemptRecord]:
@@ -273,8 +273,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         if self._backend is None:
             return
         traffic = self._backend.traffic
-        tree = root_of(self).iterate()
-        leaves = [leaf for leaf in tree if isinstance(leaf, ActionBehaviour)]
+        leaves = [leaf for leaf in root_of(self).iterate() if isinstance(leaf, ActionBehaviour)]
         for leaf in leaves:
             ActionBehaviour.terminate(leaf, Status.INVALID)
         drain(traffic.host, [handle for leaf in leaves for handle in leaf.open_handles()])
@@ -358,8 +357,8 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
 
     def _finish(self, record: AttemptRecord) -> Status:
         self._outcome = record.outcome
-        number, of = record.attempt, self.retry.attempts
-        tries = f" (attempt {number} of {of})" if number > 1 else ""
+        number = record.attempt
+        tries = f" (attempt {number} of {self.retry.attempts})" if number > 1 else ""
         told = f": {record.reason}" if record.reason else ""
         self.feedback_message = f"{record.outcome}{tries}{told}"
         return Status.SUCCESS if record.outcome is Outcome.SUCCEEDED else Status.FAILURE

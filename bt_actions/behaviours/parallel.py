@@ -38,13 +38,6 @@ class Parallel(PyTreesParallel):
         for child in self.children:
             if child.status not in (Status.SUCCESS, Status.FAILURE):
                 yield from child.tick()
-        new_status = self._judge()
-        if new_status is not Status.RUNNING:
-            self.stop(new_status)
-        self.status = new_status
-        yield self
-
-    def _judge(self) -> Status:
         needed = len(self.children) if self.at_least is None else self.at_least
         count = Counter(child.status for child in self.children)
         done, failed = count[Status.SUCCESS], count[Status.FAILURE]
@@ -54,4 +47,7 @@ class Parallel(PyTreesParallel):
         for child in self.children:
             if child.status is status:
                 self.current_child = child
-        return status
+        if status is not Status.RUNNING:
+            self.stop(status)
+        self.status = status
+        yield self

@@ -36,7 +36,7 @@ class Reading:
     ) -> None:
         """Raises ValueError for what is neither a function nor an expression."""
         self._names = names
-        self._written: tuple[tuple[str, Expression], ...] = ()  # what was given as text
+        self._written = list[tuple[str, Expression]]()  # what was given as text
         self._wanted = (
             expect if isinstance(expect, str) else getattr(expect, "text", "something else")
         )
@@ -58,7 +58,7 @@ class Reading:
             expression = Expression(given, roots=self._names(None))
         except ExpressionError as error:
             raise ValueError(f"{what}: {error}") from error
-        self._written += ((what, expression),)
+        self._written.append((what, expression))
         compute = expression.evaluate if what == "save" else expression.holds
         return lambda result: compute(self._names(result), read)
 

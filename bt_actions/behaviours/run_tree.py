@@ -63,14 +63,7 @@ class RunTree(ActionBehaviour):
 
         if not isinstance(timeout, Timeouts):
             timeout = Timeouts(result=timeout, cancel=CANCEL)
-        super().__init__(
-            name,
-            RUN_TREE,
-            server,
-            goal,
-            timeout=timeout,
-            **kwargs,
-        )
+        super().__init__(name, RUN_TREE, server, goal, timeout=timeout, **kwargs)
 
     def names(self, result: Any) -> Mapping[str, object]:
         """The result, and the outputs of the tree."""

@@ -82,19 +82,18 @@ class CallService(Connected[Service], Limited):
     def do(self) -> Status:
         backend, client = self._there()
         call = self._call
-        if call is not None and call.done():
-            self._call, self._response = None, call.result()
-            self._read(self._response)
-            return Status.SUCCESS
         if call is not None:
+            if call.done():
+                self._call, self._response = None, call.result()
+                self._read(self._response)
+                return Status.SUCCESS
             self.feedback_message = f"waiting for an answer of {client.name}"
             if self.left() <= 0.0:
                 self._drop()
                 raise ValueError(f"no answer within {self._patience:g} s")
         elif client.ready:
             try:
-                fields = self._request()
-                request: Any = fill(self.service_type.Request, fields, now=backend.stamp)
+                request = fill(self.service_type.Request, self._request(), now=backend.stamp)
             except ValueError:
                 self._tries = self.retry.attempts  # no other try would get further
                 raise

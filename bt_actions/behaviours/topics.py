@@ -223,8 +223,7 @@ class Publish(Connected[Publisher], Limited):
                 )
             self.feedback_message = f"waiting for who listens on {topic}"
             return Status.RUNNING
-        message: Any = fill(self._type, self._data(), now=backend.stamp)
-        publisher.publish(message)
+        publisher.publish(fill(self._type, self._data(), now=backend.stamp))
         why = "" if listeners else f"nobody listens on {topic}{publisher.why_nobody()}"
         self.feedback_message = self.warning = why
         return Status.SUCCESS

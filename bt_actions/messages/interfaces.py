@@ -17,7 +17,7 @@ from bt_actions.utilities.suggest import did_you_mean, what_it_has
 RUN_TREE = "bt_actions_interfaces/action/RunTree"
 """The action of servers of trees."""
 Kind = Literal["action", "srv", "msg"]
-_WORDS: dict[str, str] = {"action": "action", "srv": "service", "msg": "message"}
+_WORDS = {"action": "action", "srv": "service", "msg": "message"}
 PARTS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
                           "Request": "srv", "Response": "srv"}  # fmt: skip
 """The messages that an interface consists of, and of which kind it is then."""

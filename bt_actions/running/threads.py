@@ -41,7 +41,7 @@ class WakeUp:
     """Ends one thread's sleep; wake-ups that come before it coalesce."""
 
     def __init__(self) -> None:
-        self._queue: queue.SimpleQueue[None] = queue.SimpleQueue()  # put() is safe in a handler
+        self._queue = queue.SimpleQueue[None]()  # put() is safe in a handler
         self._is_set = False
 
     def set(self) -> None:
