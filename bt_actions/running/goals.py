@@ -86,9 +86,10 @@ class RunGoals:
             and (handle.goal.outcome is not None or not self.run_goes_on)
         ]
 
-    def close(self) -> None:
-        """Take note of nothing any more."""
+    def close(self, now: float) -> None:
+        """Take note of nothing any more, and tell what has only now become known."""
         self._run.tell = lambda handle: None
+        self.tell(now)
 
     def _note(self, handle: GoalHandle | None) -> None:
         if handle is not None:

@@ -84,7 +84,9 @@ class TickLoop:
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
         self._observers: list[Observer] = []
-        self.goals = RunGoals(self._emit, wake, lambda: self.watchdog.watch())
+        self.goals = RunGoals(
+            self._emit, wake, lambda: self._traffic.host.scheduler.add(self.watchdog)
+        )
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
         self._left = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
@@ -109,7 +111,7 @@ class TickLoop:
     def interrupt(self, now: float, *, abandon: bool = False) -> None:
         """End the run, or the next one; with `abandon`, also the drain. Safe in a handler."""
         self._abandoned |= abandon
-        self.watchdog.end_by(now)
+        self.watchdog.ends_at = min(self.watchdog.ends_at, now)
         self._stop_wanted = True  # after it: where this run ends in between, the next is stopped
         self._wake()
 
@@ -345,11 +347,6 @@ class TickLoop:
             except Exception as error:  # noqa: BLE001 - the user's: any
                 self._raised("shutdown of a behaviour raised", error)
         drain(self._traffic.host, self.goals.not_over)
-
-    def close(self, now: float) -> None:
-        """Listen to goals no more, and tell what has only now become known of them."""
-        self.goals.close()
-        self.goals.tell(now)
 
     # Who is told
 

@@ -173,8 +173,7 @@ class Report:
         """Return the row of an action leaf, a new one at its first event."""
         if behaviour not in self._rows:
             server = str(getattr(behaviour, "server", ""))
-            row = Row(behaviour, path_of(behaviour), place_of(behaviour), server)
-            self._rows[behaviour] = row
+            self._rows[behaviour] = Row(behaviour, path_of(behaviour), place_of(behaviour), server)
         return self._rows[behaviour]
 
     def elapsed(self) -> float:

@@ -332,7 +332,7 @@ class TreeRunner:
                 self._started.join()
             guests = self._close_guests if self._on_close else None
             with contextlib.ExitStack() as last:
-                last.callback(lambda: self._loop.close(time.monotonic()))
+                last.callback(lambda: self._loop.goals.close(time.monotonic()))
                 last.callback(self._spinner.stop, self._wake_up.set, guests)
                 self._loop.shutdown()
             self._log.flush()  # what was said is written, whatever becomes of the process

@@ -28,7 +28,7 @@ class Watchdog:
     def __init__(self, traffic: Traffic, goals: RunGoals) -> None:
         self._traffic, self._host, self._goals = traffic, traffic.host, goals
         self.ends_at = math.inf
-        """When the run is to end (seconds, steady clock)."""
+        """When the run is to end (seconds, steady clock); an interrupt makes it earlier."""
         self._ticks_on: int | None = None
         self.gave_up = False
         """Whether it was so in this run: what the tree says since is of no account."""
@@ -36,10 +36,6 @@ class Watchdog:
     def begin(self, ends_at: float) -> None:
         """A run begins on this thread, which is to end at `ends_at` (seconds, steady clock)."""
         self._ticks_on, self.ends_at, self.gave_up = threading.get_ident(), ends_at, False
-
-    def end_by(self, moment: float) -> None:
-        """The run is to end by then; safe in a signal handler."""
-        self.ends_at = min(self.ends_at, moment)
 
     def end(self) -> None:
         """The last tick is over, and so is all that a behaviour does when it is stopped."""
@@ -55,19 +51,11 @@ class Watchdog:
             self._give_up()  # else it is for `run_due`, which bears with stalls
         return self.gave_up
 
-    def _give_up(self) -> None:
-        if not self.gave_up:
-            self.gave_up = True
-            self._host.log.warning(
-                f"{self._stuck_in()} does not return from its tick: canceling all goals"
-            )
-
-    def watch(self) -> None:
-        """Look at the goals until none is wanted; the caller holds the lock."""
-        self._host.scheduler.add(self)
-
     def run_due(self, now: float) -> float:
-        """Cancel what is wanted where the last tick is overdue; return the seconds until a look."""
+        """Cancel what is wanted where the last tick is overdue; return the seconds until a look.
+
+        Is run no more, until it is scheduled again, where none is wanted.
+        """
         wanted = self._goals.wanted
         if not wanted:
             self._host.scheduler.remove(self)
@@ -77,12 +65,15 @@ class Watchdog:
                 self._traffic.interrupt(handle)
         return LOOK
 
-    def _stuck_in(self) -> str:
-        """Name the innermost behaviour that the ticking thread is in."""
+    def _give_up(self) -> None:
+        """Warn, and name the innermost behaviour that the ticking thread is in; once."""
+        if self.gave_up:
+            return
+        self.gave_up, stuck = True, "the tree"
         frame = sys._current_frames().get(self._ticks_on or 0)  # noqa: SLF001 - documented
         while frame is not None:
-            behaviour = frame.f_locals.get("self")
-            if isinstance(behaviour, Behaviour):
-                return "/".join(path_of(behaviour))
+            if isinstance(behaviour := frame.f_locals.get("self"), Behaviour):
+                stuck = "/".join(path_of(behaviour))
+                break
             frame = frame.f_back
-        return "the tree"
+        self._host.log.warning(f"{stuck} does not return from its tick: canceling all goals")

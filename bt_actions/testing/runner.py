@@ -145,7 +145,7 @@ class VirtualRunner:
         """Shut the leaves down, and see to what they left, as a program that ends does."""
         self._loop.shutdown()
         self.backend.traffic.destroy()
-        self._loop.close(self.now)
+        self._loop.goals.close(self.now)
 
     def _note(self, event: Event) -> None:
         self.events.append(event)
