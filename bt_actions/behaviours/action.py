@@ -180,7 +180,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     def due_in(self) -> float | None:
         """Return the seconds until this leaf needs a tick though nothing has happened."""
         if self._backend is None or self._handle is None or not self._filed(self._handle):
-            return None  # while a goal is open, traffic/traffic.py applies its deadlines
+            return None  # while a goal is open, traffic/driver.py applies its deadlines
         return self._attempts.pause_left(self._backend.now())
 
     # py_trees' contract

@@ -10,7 +10,7 @@ The rules this lives by:
 - After what comes with DONE nothing is sent.
 
 A leaf is free as soon as `outcome` is set. The goal itself may live on until it is DONE: somebody
-(traffic/traffic.py) keeps feeding it events. Whether to try again is decided in attempts.py, who
+(traffic/driver.py) keeps feeding it events. Whether to try again is decided in attempts.py, who
 may have a resource in resources.py.
 """
 
@@ -65,6 +65,7 @@ class Goal(Facts):
         What only an accepted goal has shows that its acceptance was lost, or overtaken; and of one
         that went out of sight with its server, that it is back.
         """
+        # An answer shows no more than the acceptance, which of some LOST goals is known already
         denied = event is Event.CANCEL_ANSWERED and (self.accepted or detail == CANCEL_UNKNOWN_GOAL)
         if event in SHOWS_ACCEPTANCE and self.state in MAY_TURN_UP and not denied:
             return self.on(Event.ACCEPTED, now) + self.on(event, now, detail)
@@ -76,12 +77,13 @@ class Goal(Facts):
         self.detail = detail
         state = step(self)
         assert state is previous or state in step.to, f"{event} took {self!r} to {state}"
-        if state is State.DONE and previous is not State.DONE:
-            self.deadlines.clear()
-            self.release()
-        if state is not previous and previous is not State.LOST:
-            self.last_live = previous
-        self.state = state
+        if state is not previous:
+            if state is State.DONE:
+                self.deadlines.clear()
+                self.release()
+            if previous is not State.LOST:
+                self.last_live = previous
+            self.state = state
         commands, self.commands = tuple(self.commands), []
         return commands
 

@@ -1,7 +1,7 @@
 """How long to wait, how often to try, on what, and what to do when the server is taken.
 
 Values only: frozen, checked when made, compared by content. No ROS, no clock, no behaviour;
-nothing here decides what happens to a goal (that is goal.py) or when to try again (attempts.py).
+nothing here decides what happens to a goal (table.py, steps/), or when to try again (attempts.py).
 """
 
 from __future__ import annotations

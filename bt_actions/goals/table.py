@@ -72,8 +72,6 @@ _in(
 _in(
     State.EXECUTING,
     State.REPLACED,
-    STATUS=running.status,
-    RESULT_UNKNOWN=running.denied,
     POLL_DUE=running.ask_for_result,
     INTERRUPTED=canceling.cancel(Outcome.CANCELED, "interrupted by the tree"),
     REPLACED=running.replaced,
@@ -94,6 +92,9 @@ _in(
     SERVER_AMBIGUOUS=canceling.cancel(Outcome.CANCELED, _TWO),
 )
 
+# Accepted, wanted or not
+_in(*ACCEPTED, STATUS=running.status, RESULT_UNKNOWN=running.denied)
+
 # Not wanted any more
 _in(
     State.CANCELING,
@@ -109,8 +110,6 @@ _in(
     State.CANCELING,
     RESULT=canceling.finished,
     FEEDBACK=running.still_runs,
-    STATUS=running.status,
-    RESULT_UNKNOWN=running.denied,
     CANCEL_DUE=canceling.cancel_due,
 )
 _in(
@@ -122,16 +121,11 @@ _in(
 _in(State.UNWANTED, SEND_FAILED=requested.send_failed, ACCEPT_DUE=requested.accept_due)
 _in(State.UNCONFIRMED, ACCEPT_DUE=requested.presume)
 _in(  # a denial: by any other answer `Goal.on` has made it accepted first
-    State.PRESUMED_NOT_RECEIVED,
-    CANCEL_ANSWERED=requested.denied_again,
+    State.PRESUMED_NOT_RECEIVED, CANCEL_ANSWERED=requested.denied_again
 )
 
 # Who is there to ask
-_in(
-    *ACCEPTED,
-    *MAY_STILL_BE_ACCEPTED,
-    SERVER_CHANGED=canceling.ask_another,
-)
+_in(*ACCEPTED, *MAY_STILL_BE_ACCEPTED, SERVER_CHANGED=canceling.ask_another)
 _in(
     State.SENDING,
     *ACCEPTED,
@@ -140,7 +134,7 @@ _in(
     SERVER_LOST=canceling.server_lost,
     PARKED=canceling.parked,
 )
-_in(State.NOT_RECEIVED, ABANDONED=canceling.abandoned)
+_in(State.NOT_RECEIVED, State.LOST, ABANDONED=canceling.abandoned)
 _in(
     State.LOST,
     SERVER_LOST=canceling.server_lost,
@@ -148,5 +142,4 @@ _in(
     ACCEPTED=canceling.runs,
     RESULT=canceling.finished,
     DRAIN_GAVE_UP=canceling.drain_gave_up,
-    ABANDONED=canceling.abandoned,
 )

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.policy import End
+from bt_actions.goals.terms import NEVER
 
 GONE = "its server is gone"
 ASK_AGAIN = 1.0
@@ -43,7 +44,7 @@ class Answers:
         """Begin anew, in a new participant, say, whose numbers begin anew, too."""
         self._asked: dict[int, tuple[float, frozenset[bytes]]] = {}
         self._count = Counter[int]()
-        self._last = float("-inf"), frozenset[bytes]()  # question that all have answered
+        self._last = NEVER, frozenset[bytes]()  # question that all have answered
         self.lasted = 0.0
         """Seconds for which all have answered it, the last time too."""
 
@@ -77,7 +78,7 @@ class RollCall:
         self._settle = SETTLE
         self._answers = Answers()
         self._asked_at = 0.0  # last; 0: not since one came in sight
-        self._heard_at = self._complete_at = float("-inf")  # from any server, and from the last
+        self._heard_at = self._complete_at = NEVER  # from any server, and from the last
         self.begin()
 
     def begin(self) -> None:
@@ -151,7 +152,7 @@ class LeftBehind:
     goal_id: bytes
     pid: int
     shown: End = End.UNKNOWN
-    asked_at: float = float("-inf")
+    asked_at: float = NEVER
     takes: float = DENIED_FOR_GOOD
     """Seconds for which it has to be denied until it will not turn up any more."""
     awaited: bool = False

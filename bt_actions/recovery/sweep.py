@@ -24,7 +24,7 @@ from typing import Any
 from bt_actions.goals.asking import DENIED_FOR_GOOD
 from bt_actions.goals.ids import Author, author_of
 from bt_actions.goals.policy import End
-from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS
+from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS, NEVER
 from bt_actions.recovery.ledger import Sent, left_behind
 from bt_actions.recovery.roll_call import ASK_AGAIN, GONE, SETTLE, LeftBehind, RollCall
 from bt_actions.ros.onlooker import ActionView, CannotStart, Onlooker, onlooker
@@ -287,8 +287,7 @@ class Cleanup:
                 self._left[goal_id].judge(known=call.known, gone=gone)
             elif not (sent.lost and gone):
                 takes = max(DENIED_FOR_GOOD, self.accept, sent.accept)
-                pid = sent.author.pid
-                self._is_left(LeftBehind(call, goal_id, pid, takes=takes, awaited=True))
+                self._is_left(LeftBehind(call, goal_id, sent.author.pid, takes=takes, awaited=True))
 
     def _is_left(self, left: LeftBehind) -> None:
         self._left[left.goal_id] = left
@@ -314,7 +313,7 @@ class Cleanup:
     def _turns_up(self, left: LeftBehind) -> None:
         """A server has it: it tells the end in a status."""
         if left.awaited or left.nothing_left:
-            left.awaited, left.nothing_left, left.asked_at = False, "", float("-inf")
+            left.awaited, left.nothing_left, left.asked_at = False, "", NEVER
             if left.end is End.UNKNOWN:
                 self.found(left)
 
@@ -327,10 +326,9 @@ class Cleanup:
             if view is None or left.is_over or now - left.asked_at < ASK_AGAIN:
                 continue
             asked[call] += 1
-            if asked[call] > CANCELS_A_TURN:
+            if asked[call] > CANCELS_A_TURN or (question := view.cancel(left.goal_id)) is None:
                 continue
-            if (question := view.cancel(left.goal_id)) is not None:
-                left.asked_at = now
-                if left.awaited:
-                    self._questions[call, question] = left
-                    left.denials.asked(question, call.servers, now)
+            left.asked_at = now
+            if left.awaited:
+                self._questions[call, question] = left
+                left.denials.asked(question, call.servers, now)

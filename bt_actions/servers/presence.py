@@ -81,15 +81,12 @@ class ServerWatch:
         """
         if self.state(now) is Server.ABSENT:
             self.in_sight_since = now
-        if ready:
-            self._unready_since = math.inf
-        elif self._unready_since == math.inf:
-            self._unready_since = now
+        self._unready_since = math.inf if ready else min(now, self._unready_since)
         if gids != self.gids:
             self.alone, self._most_answers = False, 0
             self._probes.clear()
-            self.crowded_since = now if len(gids) > 1 else math.inf
             self.gids = gids
+            self.crowded_since = now if self.is_crowded else math.inf
         is_open = concludes and not self.both_live and now >= self._not_alone_before
         if is_open and now - self.crowded_since >= SLOWEST_START:
             self.alone = self._answered_once(now, self.crowded_since)

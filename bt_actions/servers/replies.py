@@ -264,4 +264,4 @@ def _answers_wanted(watch: ServerWatch) -> int:
 
 
 def _is_crowded(watch: ServerWatch) -> bool:
-    return len(watch.gids) > 1 and not watch.alone
+    return watch.is_crowded and not watch.alone

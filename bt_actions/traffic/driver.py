@@ -1,8 +1,8 @@
 """Tells the goals of one endpoint what happens, and does what they decide.
 
 A goal decides at once, whoever tells it something. What follows waits in one queue of its domain
-(`Effects`), so nothing is done by recursion. What was true at the decision is looked at again
-when it is done, and what fails is told to the goal. All under the host's lock.
+(`Effects`), so nothing is done by recursion. Only a cancel looks again at what is true by then. A
+goal request that does not leave is told to the goal. All under the host's lock.
 """
 
 from __future__ import annotations
@@ -28,10 +28,7 @@ class Driver:
     """Drives the goals of one endpoint."""
 
     def __init__(
-        self,
-        endpoint: Endpoint,
-        host: Host,
-        failed: Callable[[str, Exception], None],
+        self, endpoint: Endpoint, host: Host, failed: Callable[[str, Exception], None]
     ) -> None:
         """`failed` is told what could not be done, which is asked for again later."""
         self._endpoint, self._host, self._failed = endpoint, host, failed
@@ -239,7 +236,12 @@ class Driver:
             self._put_on_record(handle)
 
     def _put_on_record(self, handle: GoalHandle) -> None:
-        goal, servers, endpoint = handle.goal, handle.replies.sent_to, self._endpoint
-        domain, accept = endpoint.participant.domain, goal.timeouts.accept or 0.0
-        entry = Entry(endpoint.name, domain, servers, accept, goal.lost)
+        goal, endpoint = handle.goal, self._endpoint
+        entry = Entry(
+            endpoint.name,
+            endpoint.participant.domain,
+            handle.replies.sent_to,
+            goal.timeouts.accept or 0.0,
+            goal.lost,
+        )
         self._host.record.enter(goal.id, entry)

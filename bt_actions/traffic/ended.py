@@ -62,7 +62,7 @@ class EndedGoals:
         if len(self._ended) > GOALS_KEPT:
             oldest = next(iter(self._ended))
             del self._ended[oldest]
-            self._endpoint.transport.forget(oldest)
+            endpoint.transport.forget(oldest)
 
     def answered(
         self, request: Request, goal_id: bytes, asked: float, answers: Sequence[Any]
@@ -75,8 +75,7 @@ class EndedGoals:
         if ended is None:
             return
         if request == "cancel":
-            knows_it = answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED)
-            if knows_it and asked > ended.since:
+            if asked > ended.since and answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
                 self._turns_up(goal_id, ended)
         elif request == "goal" and answers[-1]:
             is_news = not ended.accepted and sum(answers) == 1

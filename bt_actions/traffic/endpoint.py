@@ -61,12 +61,11 @@ class ActionEndpoint:
         self._left_by_dead: set[bytes] = set()
         self._ended = EndedGoals(self, host)
         self.transport = participant.open_transport(*action, self)
-        self.route = Route(self, host)
-        self.watcher = Watcher(self, host, self.route)
-        self.in_doubt, self.holds_back = self.route.in_doubt, self.route.holds_back
-        self.observe, self.observe_and_tell = self.watcher.observe, self.watcher.observe_and_tell
-        self.recent_state = self.watcher.recent_state
-        self.run_due = self.watcher.run_due
+        route = Route(self, host)
+        self.in_doubt, self.holds_back = route.in_doubt, route.holds_back
+        self.watcher = watcher = Watcher(self, host, route)
+        self.observe, self.observe_and_tell = watcher.observe, watcher.observe_and_tell
+        self.recent_state, self.run_due = watcher.recent_state, watcher.run_due
         self.driver = driver = Driver(self, host, self._warn_once)
         self.tell, self.pass_on = driver.tell, driver.pass_on
         self.apply_deadlines, self.ask_to_cancel = driver.apply_deadlines, driver.ask_to_cancel

@@ -1,7 +1,8 @@
 """Goals of dead bt_actions processes that still run at a server: said once, for cleanup.
 
 A process that is killed cancels nothing, and whoever starts the next one may not know. Touches none
-of them: `bt-actions cleanup`, or `run --cleanup-first`, does (cleanup.py), when a user wants it.
+of them: `bt-actions cleanup`, or `run --cleanup-first`, does (recovery/sweep.py), when a user wants
+it.
 """
 
 from __future__ import annotations

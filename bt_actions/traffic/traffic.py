@@ -1,4 +1,4 @@
-"""Carries out what goals and resources decide, for every goal of this process, until it is done.
+"""What leaves ask of the goals of one node: to begin, send and interrupt them, and close it all.
 
 A leaf begins a goal here and advances it at its ticks. From the moment the request is out, the
 goal is driven by what arrives, whether or not anybody ticks: answers, deadlines and the watch over
@@ -102,10 +102,10 @@ class Traffic:
         end is UNKNOWN.
         """
         with self.host.lock:
-            held = frozenset(self._full_name(each) for each in resources)
             goal = Goal(
                 self.host.new_goal_id(), endpoint.name, timeouts, self.participant.now(),
-                resources=held, busy=busy, accounts_for_all=accounts_for_all,
+                resources=frozenset(self._full_name(each) for each in resources),
+                busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
             handle = GoalHandle(
                 goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback
@@ -151,8 +151,8 @@ class Traffic:
         try:
             message = make_message()
         except Exception as error:  # noqa: BLE001 - the user's: any
-            reason = in_words(error)  # which may run code of the user's
-            endpoint.tell(handle, Event.INVALID, reason)
+            # in_words may run code of the user's: before `tell` takes the lock
+            endpoint.tell(handle, Event.INVALID, in_words(error))
             return
         with self.host.lock:
             if self._may_send(handle):

@@ -155,9 +155,8 @@ class Watcher:
             endpoint.domain.ever_lost_sight |= state is Server.ABSENT
             endpoint.domain.known.add(endpoint.action)
             if state is Server.AMBIGUOUS:
-                name = endpoint.name
                 self._host.log.warning(
-                    f"{name}: two action servers answer to this name; no more is sent"
+                    f"{endpoint.name}: two action servers answer to this name; no more is sent"
                 )
         self._route.seek()
         return state

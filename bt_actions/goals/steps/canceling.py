@@ -15,13 +15,7 @@ from bt_actions.goals.asking import ASK_AGAIN, LOOKED_OUT_FOR
 from bt_actions.goals.facts import Facts, Step, leads_to
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.steps import requested
-from bt_actions.goals.terms import (
-    CANCEL_REJECTED,
-    STATUS_SUCCEEDED,
-    Command,
-    Event,
-    State,
-)
+from bt_actions.goals.terms import CANCEL_REJECTED, STATUS_SUCCEEDED, Command, Event, State
 
 NEVER_DONE = (Outcome.CANCELED, Outcome.SERVER_AMBIGUOUS)
 """Outcomes that a goal was canceled for and that stand, should it succeed all the same."""
