@@ -107,7 +107,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.expect = expect
         self.save = dict(save or {})
         self._reading = Reading(expect, self.save, self.retry.when, self.names)
-        self._shown_feedback: tuple[Any, str] = (None, "")
+        self._shown_feedback = None, ""
         self._handle: GoalHandle | None = None
         self._left_behind: list[GoalHandle] = []
         self._attempts = Attempts(self.retry, self._reading.when)

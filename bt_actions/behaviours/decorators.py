@@ -38,8 +38,7 @@ class Gate(Timed, Decorator):
         return None
 
     def update(self) -> Status:
-        status: Status = self.decorated.status
-        return status
+        return self.decorated.status
 
     def due_in(self) -> float | None:
         """Seconds until the child can begin anew, none where nothing was given; None if it runs."""
@@ -209,7 +208,7 @@ class Repeat(Gate):
         return None if self.left() <= 0.0 else Status.RUNNING
 
     def update(self) -> Status:
-        status: Status = self.decorated.status
+        status = self.decorated.status
         return self.count() if status is self._again else status
 
     def count(self) -> Status:
@@ -287,7 +286,7 @@ class ForEach(Repeat):
             self._hand_over()
 
     def update(self) -> Status:
-        status: Status = self.decorated.status
+        status = self.decorated.status
         if status not in (Status.SUCCESS, Status.FAILURE):
             return status
         if status is Status.FAILURE:

@@ -78,18 +78,15 @@ class ActionWithPorts(PortsMixin, ActionBehaviour):
             name,
             self.ACTION_TYPE,
             action_name or self.SERVER,
-            self._read_goal,
+            # A port without data makes it INVALID_GOAL
+            lambda: {port: self.get_input(port) for port in self.input_ports()},
             timeout=None if timeout is None else parse_duration(timeout),
             retry=int(attempts),  # an XML attribute is a text
             **ports,
         )
 
-    def _read_goal(self) -> dict[str, object]:
-        """The goal from the input ports; a port without data makes it INVALID_GOAL."""
-        return {port: self.get_input(port) for port in self.input_ports()}
-
     def update(self) -> Status:
-        status: Status = super().update()
+        status = super().update()
         if status is Status.SUCCESS:
             for port in self.output_ports():
                 self._set_output(port, getattr(self.result, port))

@@ -57,8 +57,9 @@ def read(name: str) -> Any:
             else:
                 value = value[int(step)] if step.isdigit() else getattr(value, step)
         except (LookupError, TypeError, AttributeError):
-            kind = type(value).__name__
-            raise MissingVariable(f"variable {name!r}: {step!r} is no field of a {kind}") from None
+            raise MissingVariable(
+                f"variable {name!r}: {step!r} is no field of a {type(value).__name__}"
+            ) from None
     return value
 
 

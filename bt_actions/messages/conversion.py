@@ -160,7 +160,7 @@ class _Filler:
         if not isinstance(value, (dict, Mapping)):
             raise ValueError(f"the fields of a {short_name(cls)} are needed, not {show(value)}")
         known = describe(cls)
-        message: Any = cls() if self._hole is None else None
+        message = cls() if self._hole is None else None
         outer, self._owner = self._owner, cls
         for name, item in value.items():
             kind = known.get(name)

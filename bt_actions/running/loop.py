@@ -294,7 +294,7 @@ class TickLoop:
             except BaseException as error:  # noqa: BLE001 - a user's terminate; ours must be reached all the same
                 self._raised("terminate of a behaviour raised", error)
                 self._let_go(culprit_of(error))
-        self.watchdog.end()
+        self.watchdog.ticks_on = None
         return Drain(self._traffic.host, self.goals.not_over)
 
     def _let_go(self, culprit: Behaviour | None) -> None:
@@ -352,8 +352,7 @@ class TickLoop:
 
     def _tell(self, changes: dict[Behaviour, Status]) -> None:
         for node, status in changes.items() if self._observers else ():
-            message = node.feedback_message
-            self._emit(NodeChanged(self._now, path_of(node), node, status, message))
+            self._emit(NodeChanged(self._now, path_of(node), node, status, node.feedback_message))
 
     def _emit(self, event: Event) -> None:
         for observer in list(self._observers):

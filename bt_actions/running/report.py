@@ -16,7 +16,7 @@ from py_trees.composites import Selector
 
 from bt_actions import document
 from bt_actions.behaviours.decorators import Gate
-from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
+from bt_actions.events import Event, GoalChanged, NodeChanged, TreeStarted
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.utilities.places import path_of
 
@@ -75,8 +75,7 @@ class Row:
     @property
     def waited_for(self) -> int:
         """How many goals of this leaf a run that is over waits for."""
-        in_doubt = (each.end is End.NEVER_STARTED for each in self._goals.values())
-        return len(self.live) + sum(in_doubt)
+        return len(self.live) + sum(each.end is End.NEVER_STARTED for each in self._goals.values())
 
     def observe(self, event: GoalChanged) -> None:
         """Take in one event of a goal of this leaf."""
@@ -165,7 +164,7 @@ class Report:
                 self._rows[node].settle()
         elif isinstance(event, GoalChanged):
             self.row(event.behaviour).observe(event)
-        elif isinstance(event, TreeFinished):
+        else:  # TreeFinished
             self.status = event.status
             self.finished = True
 

@@ -99,7 +99,7 @@ class TreeRunner:
             self._spinner.node,
             heartbeat=heartbeat,
             wake=self._wake_up.set,
-            ready=self._spin,
+            ready=lambda: self._spinner.start(lambda: self._loop.is_to_end(time.monotonic())),
             check=self._check,
             misbehaved=self._spinner.taken_away,
         )
@@ -364,9 +364,6 @@ class TreeRunner:
                     self._loop.fail(error)
         finally:
             self._release()
-
-    def _spin(self) -> None:
-        self._spinner.start(lambda: self._loop.is_to_end(time.monotonic()))
 
     def _check(self) -> None:
         self._spinner.check()

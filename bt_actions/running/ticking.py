@@ -120,7 +120,7 @@ class ChangeVisitor(VisitorBase):
     def finish(self) -> dict[Behaviour, Status]:
         """Return the changes of a tick, also of one that raised: what it visited and stopped."""
         visited, before = self._visited, self._visited_before
-        stopped: list[Behaviour] = []
+        stopped = []
         if visited != before:
             seen, known = set(visited), self._known
             stopped = [n for n in before if n not in seen and known.get(n) is Status.RUNNING]

@@ -29,21 +29,18 @@ class Watchdog:
         self._traffic, self._host, self._goals = traffic, traffic.host, goals
         self.ends_at = math.inf
         """When the run is to end (seconds, steady clock); an interrupt makes it earlier."""
-        self._ticks_on: int | None = None
+        self.ticks_on: int | None = None
+        """The thread, until the last tick is over and what behaviours do when they are stopped."""
         self.gave_up = False
         """Whether it was so in this run: what the tree says since is of no account."""
 
     def begin(self, ends_at: float) -> None:
         """A run begins on this thread, which is to end at `ends_at` (seconds, steady clock)."""
-        self._ticks_on, self.ends_at, self.gave_up = threading.get_ident(), ends_at, False
-
-    def end(self) -> None:
-        """The last tick is over, and so is all that a behaviour does when it is stopped."""
-        self._ticks_on = None
+        self.ticks_on, self.ends_at, self.gave_up = threading.get_ident(), ends_at, False
 
     def is_overdue(self, now: float) -> bool:
         """Whether the last tick should have been over for long; safe in a signal handler."""
-        return self._ticks_on is not None and now - self.ends_at >= GRACE
+        return self.ticks_on is not None and now - self.ends_at >= GRACE
 
     def gives_up(self) -> bool:
         """Whether nobody waits for the rest of this thread's tick any more."""
@@ -70,7 +67,7 @@ class Watchdog:
         if self.gave_up:
             return
         self.gave_up, stuck = True, "the tree"
-        frame = sys._current_frames().get(self._ticks_on or 0)  # noqa: SLF001 - documented
+        frame = sys._current_frames().get(self.ticks_on or 0)  # noqa: SLF001 - documented
         while frame is not None:
             if isinstance(behaviour := frame.f_locals.get("self"), Behaviour):
                 stuck = "/".join(path_of(behaviour))

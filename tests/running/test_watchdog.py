@@ -68,7 +68,7 @@ def test_an_interrupt_ends_the_run_earlier_and_no_end_never(run: Guarded) -> Non
 
 
 def test_a_tick_that_has_returned_is_not_guarded(run: Guarded) -> None:
-    run.dog.end()
+    run.dog.ticks_on = None
     assert not run.look_until(ENDS_AT + 9.0)
 
 
