@@ -47,8 +47,7 @@ class Deadlines:
 
     def take_passed(self, event: Event, now: Now) -> bool:
         """Whether this one is still set and has passed; it is forgotten then."""
-        suspended = now.steady < self._not_before
-        if event not in self._due or suspended or self._left(event, now) > 0.0:
+        if event not in self._due or now.steady < self._not_before or self._left(event, now) > 0.0:
             return False
         del self._due[event]
         return True

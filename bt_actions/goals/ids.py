@@ -68,8 +68,8 @@ def author_of(goal_id: bytes) -> Author | None:
 
 
 def _machine() -> bytes:
-    named = os.environ.get(MACHINE)
-    return hashlib.sha256((named or _name_of_machine(os.getpid())).encode()).digest()[:3]
+    name = os.environ.get(MACHINE) or _name_of_machine(os.getpid())
+    return hashlib.sha256(name.encode()).digest()[:3]
 
 
 @functools.lru_cache(maxsize=1)

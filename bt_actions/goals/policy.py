@@ -134,8 +134,7 @@ class Timeouts:
         for field in self.__dataclass_fields__:
             value = getattr(self, field)
             if value is not None:
-                checked = _seconds(f"timeout.{field}", value, zero=False)
-                object.__setattr__(self, field, checked)
+                object.__setattr__(self, field, _seconds(f"timeout.{field}", value, zero=False))
 
     @classmethod
     def of(cls, value: Timeouts | float | None) -> Timeouts:

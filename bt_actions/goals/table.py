@@ -57,10 +57,8 @@ _in(
 # Sent, and wanted
 _in(
     State.SENDING,
-    SEND_FAILED=requested.send_failed,
     ACCEPTED=requested.begin,
     REJECTED=requested.rejected,
-    ACCEPT_DUE=requested.accept_due,
     INTERRUPTED=requested.withdraw(
         Outcome.CANCELED, "interrupted by the tree before the goal was accepted"
     ),
@@ -118,7 +116,12 @@ _in(
     ACCEPTED=requested.turned_up,
     REJECTED=requested.rejected,
 )
-_in(State.UNWANTED, SEND_FAILED=requested.send_failed, ACCEPT_DUE=requested.accept_due)
+_in(
+    State.SENDING,
+    State.UNWANTED,
+    SEND_FAILED=requested.send_failed,
+    ACCEPT_DUE=requested.accept_due,
+)
 _in(State.UNCONFIRMED, ACCEPT_DUE=requested.presume)
 _in(  # a denial: by any other answer `Goal.on` has made it accepted first
     State.PRESUMED_NOT_RECEIVED, CANCEL_ANSWERED=requested.denied_again

@@ -17,7 +17,7 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +53,11 @@ class Swept:
     """The others in sight, or wanted, each with the reason, in whose braces belongs its name."""
     domain: int
     """The ROS domain in force."""
-    trouble: OSError | None = None
+    trouble: OSError | None
     """Why nobody can read what was sent and is not answered."""
-    missing: list[str] = field(default_factory=list)
+    missing: list[str]
     """Those of `unknown` that were looked for in vain."""
-    elsewhere: dict[bytes, str] = field(default_factory=dict)
+    elsewhere: dict[bytes, str]
     """Unfinished goals of bt_actions processes on other machines, or in other containers, of which
     nobody here can tell whether they are alive: the action of each."""
 

@@ -112,7 +112,7 @@ class Replies:
                 return Event.ACCEPTED, None
             self._fresh_since = now  # one has shown it as accepted; this may be the other
             return Event.SERVER_CHANGED, None
-        if any(answers):
+        if accepted:
             return None  # it is refused here, and runs there
         by_some = len(answers) < len(self.sent_to)
         if by_some and self._may_be_at_two(watch):

@@ -117,8 +117,9 @@ class Drain:
         for handle in self._waits:
             is_back = handle in self._lost and not handle.goal.lost
             if not handle.looked_out_for:
-                until = now + handle.goal.drains_within + JUST_PAST
-                self._until.setdefault((handle, is_back), until)
+                self._until.setdefault(
+                    (handle, is_back), now + handle.goal.drains_within + JUST_PAST
+                )
             if handle.goal.lost:
                 self._lost.add(handle)
 

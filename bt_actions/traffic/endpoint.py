@@ -86,8 +86,7 @@ class ActionEndpoint:
             self.cancels.answered(goal_id, now)
         handle = self._heard_of(goal_id, denies=answers[-1] in DENIALS)
         if handle is not None:
-            told = handle.replies.answered(request, self.watch, now, asked, answers)
-            self.pass_on(handle, told)
+            self.pass_on(handle, handle.replies.answered(request, self.watch, now, asked, answers))
         elif self.watch.probe_answered(now, goal_id):
             wake(self.handles)
         else:

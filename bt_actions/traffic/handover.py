@@ -43,8 +43,8 @@ def adopt(endpoint: Endpoint, host: Host) -> None:
     for handle in endpoint.domain.lost.pop(endpoint.action, []):
         saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at
         if handle.endpoint.participant is not endpoint.participant and not saw_it:
-            first = handle.not_gone_before == NEVER  # a later node need only have discovered
-            until = host.steady() + (LEASE if first else TOO_NEW)
+            # A later node need only have discovered
+            until = host.steady() + (LEASE if handle.not_gone_before == NEVER else TOO_NEW)
             handle.not_gone_before = max(handle.not_gone_before, until)
         endpoint.take_in(handle)
 

@@ -46,7 +46,7 @@ def test_a_goal_that_may_be_running_counts_more_than_an_output_that_is_lost(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: int, end: End
 ) -> None:
     left = LeftBehind(RollCall("/move"), bytes(16), 1, shown=end)
-    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([left], ["/move"], {}, 0))
+    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([left], ["/move"], {}, 0, None, [], {}))
     monkeypatch.setattr(sys, "stdout", Unwritable(error))
     lost = {errno.ENOSPC: 2, errno.EPIPE: 141}[error]
     assert main(["cleanup"]) == (3 if end is End.UNKNOWN else lost)
@@ -59,7 +59,7 @@ def test_where_no_server_is_in_sight_nobody_says_that_nothing_is_left(
 ) -> None:
     """They may be stopped, or start later; or this is the wrong domain."""
     in_sight: list[str] = []
-    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], in_sight, {}, 7))
+    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], in_sight, {}, 7, None, [], {}))
     assert main(["cleanup"]) == 3
     said = capsys.readouterr()
     assert "no action is in sight in ROS domain 7" in said.err
@@ -78,7 +78,7 @@ def test_a_silent_server_counts_more_than_an_output_that_is_lost(
     monkeypatch: pytest.MonkeyPatch, error: int
 ) -> None:
     goal = LeftBehind(RollCall("/a"), bytes(16), 1, shown=End.CANCELED)
-    swept = Swept([goal], ["/a"], {"/b": "no server of {} answers"}, 0, missing=["/b"])
+    swept = Swept([goal], ["/a"], {"/b": "no server of {} answers"}, 0, None, ["/b"], {})
     monkeypatch.setattr(Cleanup, "run", lambda _: swept)
     monkeypatch.setattr(sys, "stdout", Unwritable(error))
     assert main(["cleanup"]) == 3
@@ -88,7 +88,7 @@ def test_what_nobody_wants_is_not_counted_where_it_is_silent(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     silent = {"/b": "no server of {} answers"}
-    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], ["/a"], silent, 7))
+    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], ["/a"], silent, 7, None, [], {}))
     assert sweep(0.1, 0.1, wanted=["/a"]) == 0
     said = capsys.readouterr()
     assert said.err == "no server of /b answers: nobody can see what was left there\n"
@@ -99,7 +99,7 @@ def test_where_the_records_cannot_be_read_nobody_says_that_nothing_is_left(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     trouble = PermissionError(errno.EPERM, "others may write there", "/records")
-    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], ["/a"], {}, 7, trouble))
+    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], ["/a"], {}, 7, trouble, [], {}))
     assert main(["cleanup"]) == 3
     said = capsys.readouterr()
     assert "nobody can see what was sent and not answered" in said.err
@@ -115,7 +115,7 @@ def test_an_action_that_is_named_is_wanted(
     def run(cleanup: Cleanup) -> Swept:
         wanted = list(cleanup.wanted or ())
         silent = dict.fromkeys(wanted, "no server of {} answers")
-        return Swept([], ["/a"], silent, 7, missing=wanted)
+        return Swept([], ["/a"], silent, 7, None, wanted, {})
 
     monkeypatch.setattr(Cleanup, "run", run)
     assert main(["cleanup", "/r1/move"]) == 3
@@ -177,7 +177,7 @@ TOO_LATE = """
 import os, signal, sys
 from bt_actions.cli import main
 from bt_actions.recovery import sweep as cleanup
-cleanup.Cleanup.run = lambda _: cleanup.Swept([], [], {}, 7)
+cleanup.Cleanup.run = lambda _: cleanup.Swept([], [], {}, 7, None, [], {})
 main(["cleanup"])
 os.kill(os.getpid(), signal.SIGTERM)
 signal.pause()
