@@ -34,15 +34,19 @@ def finds_server(handle: GoalHandle, now: float) -> bool:
 def left_near(handle: GoalHandle) -> list[GoalHandle]:
     """Return the goals of this process that were lost, or have given up their resources.
 
-    Those that share a server, or what this one must have for itself. One that was lost holds
-    nothing any more; should its server be back, it is canceled first.
+    Those that share its server, or resources with it, which a goal that may still run must not
+    where it may not run beside another. One that was lost holds nothing any more; should its server
+    be back, it is canceled first.
     """
-    action, exclusive = handle.endpoint.action, handle.goal.exclusive
+    goal, action = handle.goal, handle.endpoint.action
     return [
         each
         for each in handle.endpoint.domain.handles()
         if not each.goal.claims_resources
-        and (each.endpoint.action == action or each.goal.resources & exclusive)
+        and (
+            each.endpoint.action == action
+            or each.goal.resources & (goal.exclusive if each.goal.outstanding else goal.resources)
+        )
     ]
 
 
