@@ -59,11 +59,10 @@ class Driver:
             self.tell(handle, Event.RESULT, detail)
 
     def _rival_sent(self, handle: GoalHandle) -> bool:
-        """Whether a newer goal that replaces it at its server is on its way, or has arrived."""
+        """Whether a newer goal that replaces this one is on its way, or has arrived."""
         holders = self._endpoint.domain.resources.holders(handle.goal.resources)
         newer = holders[holders.index(handle) + 1 :] if handle in holders else []
-        rivals = (each for each in newer if each.endpoint.action == self._endpoint.action)
-        return any(each.goal.busy is Busy.REPLACE and each.goal.sent for each in rivals)
+        return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
 
     def apply_deadlines(self, handle: GoalHandle) -> None:
         """Let the goal's deadlines take effect, unless its tree is paused before sending.

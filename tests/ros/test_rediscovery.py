@@ -151,7 +151,7 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
     leaf.setup(node=secure)
     with process.lock:
-        leaf._own.route.seek()
+        leaf._own.watcher._route.seek()
     sight = SecondParticipant(domain, enclaves[0])
     assert {enclave(secure), enclave(sight.node)} == {"/kitchen/robot"}
     sight.close()
@@ -178,10 +178,10 @@ def test_where_names_are_remapped_nobody_looks(
     monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name))
     monkeypatch.setattr(node_participant, "look_for", lambda *to: looked_for.append(to))
     with process.lock:
-        leaf._own.route.seek()
+        leaf._own.watcher._route.seek()
         assert not looked_for
         monkeypatch.setattr(NodeParticipant, "_is_remapped", lambda *_: False)
-        leaf._own.route.seek()
+        leaf._own.watcher._route.seek()
         assert looked_for
     leaf.shutdown()
     remapped.destroy_node()

@@ -255,7 +255,7 @@ class TestABehaviourThatRaises:
             process.steady,
             warm._own,
         )  # nor is it in doubt since a stall in the tests before
-        at.route._long_stalls = process.stalls.long_times
+        at.watcher._route._long_stalls = process.stalls.long_times
         until(lambda: at.recent_state(now()) is Server.READY and not at.holds_back(now()))
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(leaf, Raises("culprit", method), name="root")
