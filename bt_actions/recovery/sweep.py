@@ -307,7 +307,7 @@ class Cleanup:
                 self._sent[sent.goal_id] = sent
             else:
                 self._elsewhere[sent.goal_id] = sent.action
-        if self._trouble is not None:  # to be told again
+        if self._trouble is not None and self._trouble.filename:  # to be told again
             self._read_before.discard(Path(self._trouble.filename))
 
     def _turns_up(self, left: LeftBehind) -> None:

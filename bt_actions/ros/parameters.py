@@ -7,6 +7,7 @@ rcl reads the words: whatever it takes, finds in a file for this node, or refuse
 from __future__ import annotations
 
 import ast
+import math
 import os
 import shlex
 from collections.abc import Iterator, Sequence
@@ -107,7 +108,7 @@ def _shown(
     if limits:
         least, most = limits[0], min(limits[1], _MOST)
         descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]
-    elif scalar == "float32":
+    elif scalar == "float32" and all(map(math.isfinite, values)):
         limit = FLOATS[scalar]
         descriptor.floating_point_range = [FloatingPointRange(from_value=-limit, to_value=limit)]
     yield Parameter(name, its_type, value), descriptor

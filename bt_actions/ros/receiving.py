@@ -82,6 +82,10 @@ class Receiver:
                 self._waits_for = self._members
             try:
                 ready = self._take(self._waits_for)
+            except RuntimeError:  # rclpy's RCLError: the context was shut down just now
+                if is_valid(self._node):
+                    raise
+                return
             finally:
                 with self._let_go:
                     self._waits_for = ()
