@@ -78,14 +78,14 @@ class Receiver:
             with self._let_go:
                 if not self._members or not is_valid(self._node):
                     self._thread = None
-                    return
+                    break
                 self._waits_for = self._members
             try:
                 ready = self._take(self._waits_for)
             except RuntimeError:  # rclpy's RCLError: the context was shut down just now
                 if is_valid(self._node):
                     raise
-                return
+                continue
             finally:
                 with self._let_go:
                     self._waits_for = ()
@@ -93,6 +93,8 @@ class Receiver:
             with host.lock:
                 for each in ready:
                     each.deliver()
+        if (executor := self._node.executor) is not None:
+            executor.wake()  # rclpy's may miss that a signal has shut its context down
 
     def _take(self, members: tuple[RosTransport, ...]) -> list[RosTransport]:
         """Wait, take what has arrived, and return for whom."""
