@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from robot_control_interfaces.action import MoveRobot as MoveRobotAction
 
@@ -20,7 +21,6 @@ from tests.support.processes import Host
 from tests.support.waiting import until
 
 TIMES = 20
-KINDS = ("goal", "result", "cancel")
 
 
 class Heard:
@@ -30,22 +30,16 @@ class Heard:
         self.goals: list[tuple[bytes, bool]] = []
         self.results: list[tuple[bytes, int, Any]] = []
         self.cancels: list[tuple[bytes, int]] = []
-        self.feedback: list[tuple[bytes, Any]] = []
-        self.statuses: list[dict[bytes, int]] = []
-        self.so_far: tuple[Any, ...] = ()
 
     def answered(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         told = answers[-1] if request == "result" else (answers[-1],)
         self.answers(request).append((goal_id, *told))
-        self.so_far = answers
 
-    def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
-        self.feedback.append((goal_id, feedback))
+    def feedback_came(self, goal_id: bytes, feedback: Any) -> None: ...
 
-    def statuses_came(self, statuses: dict[bytes, int]) -> None:
-        self.statuses.append(statuses)
+    def statuses_came(self, statuses: dict[bytes, int]) -> None: ...
 
     def all_delivered(self) -> None: ...
 
@@ -54,11 +48,8 @@ class Heard:
 
 
 class LateFiling:
-    """rclpy's low-level client, which returns from sending when the answer may have arrived.
-
-    The number of a request is filed when sending returns. Here that is when the answer has been
-    taken, or after `patience` seconds where it cannot be taken.
-    """
+    """rclpy's low-level client, which returns from sending, so that the request can be filed, when
+    the answer has been taken, or after `patience` seconds."""
 
     def __init__(self, handle: Any, kind: str, patience: float) -> None:
         self._handle = handle
@@ -131,7 +122,7 @@ def request(client: RosTransport, kind: str) -> bytes:
     return goal_id
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["goal", "result", "cancel"])
 def test_an_answer_that_arrives_before_its_request_is_filed_is_not_lost(
     client: RosTransport, heard: Heard, kind: str
 ) -> None:
@@ -180,15 +171,30 @@ def test_answers_are_taken_when_the_context_is_no_longer_valid(
     client.cancel(goal_id)
     client.ask_result(goal_id)
     until(lambda: heard.results, meanwhile=client.deliver_arrived)
-    assert heard.results[0][:2] == (goal_id, 5)
-    assert journal.ends() == ["canceled"]
+    assert (heard.results[0][:2], journal.ends()) == ((goal_id, 5), ["canceled"])
     client.close()
     node.destroy_node()
     host.close_server(name)
 
 
-def test_a_listener_that_raises_does_not_end_the_spin(
-    client: RosTransport, node: Node, heard: Heard, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_executor_ends_though_rclpy_does_not_wake_it(domain: int, name: str) -> None:
+    """rclpy's handler of SIGTERM shuts a context down in C++, and calls nobody back."""
+    context = Context()
+    context.init(domain_id=domain)
+    node, executor = Node("dying", context=context), SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    spinning = threading.Thread(target=executor.spin, daemon=True)
+    spinning.start()
+    transport_to(node, name, Heard())
+    with context.handle:
+        context.handle.shutdown()
+    until(lambda: not spinning.is_alive())
+    node.destroy_node()
+
+
+def test_a_listener_that_raises_is_told_all_the_same(
+    client: RosTransport, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(request: Request, *answer: Any) -> None:
         if request == "cancel":
@@ -217,8 +223,7 @@ def test_what_cannot_be_taken_keeps_nothing_else_from_being_heard(
 
     monkeypatch.setattr(client, "take_data", take_data)
     request(client, "result")
-    until(lambda: heard.results)
-    assert next(taken, None) is None
+    until(lambda: heard.results and next(taken, None) is None)
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
