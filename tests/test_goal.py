@@ -702,6 +702,9 @@ def test_a_new_server_is_asked_whether_it_knows_the_goal() -> None:
     life = executing()
     life.on(Event.INTERRUPTED)
     assert life.on(Event.SERVER_CHANGED) == [CANCEL, ASK], "which the first may not have heard"
+    replaced = executing()
+    replaced.on(Event.REPLACED)
+    assert replaced.on(Event.SERVER_CHANGED) == [ASK]
 
 
 def test_a_lone_server_is_believed_only_when_it_denies_the_goal_several_times() -> None:

@@ -19,6 +19,7 @@ from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Retry, Timeouts
 from bt_actions.behaviours.variables import read
 from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
+from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -177,6 +178,19 @@ class TestNoServer:
         assert second.outcome is Outcome.SERVER_AMBIGUOUS
         assert here.events() == ["received", "accepted", "succeeded"]
         assert there.events() == []
+
+    def test_a_second_server_that_came_between_two_goals_is_seen(self, world: World) -> None:
+        first = world.serve()
+        one, gate, two = MoveRobot("one", 0.1), Gate(), MoveRobot("two", 0.1)
+        with world.runner(in_sequence(one, gate, two)) as runner:
+            runner.start()
+            runner.until(lambda: one.status is Status.SUCCESS)
+            second = world.serve()
+            runner.advance(1.5 * LOOK_WHILE_RUNNING)
+            gate.passed = True
+            assert runner.wait(30.0) is Status.FAILURE
+        assert two.outcome is Outcome.SERVER_AMBIGUOUS
+        assert [first.count("received"), second.count("received")] == [1, 0]
 
 
 class TestBusy:
