@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tests.support.virtual import World
 
 DOMAINS = range(70, 90)
-OUR_OWN = ("bt_actions-alarm", "bt_actions-log", "bt_actions-receive", "bt_actions-rediscovery")
+OUR_OWN = [f"bt_actions-{name}" for name in ("alarm", "log", "receive", "rediscovery", "rest")]
 """Threads that outlive what they were started for, and end by themselves or with the process."""
 _names, _directories = itertools.count(1), itertools.count(1)
 STUCK = 900.0

@@ -9,6 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from typing import Any
 
 import py_trees
@@ -22,6 +23,8 @@ from rclpy.executors import SingleThreadedExecutor
 from bt_actions import End, MoveRobot, Outcome, TreeError, TreeRunner
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
 from bt_actions.ros import spinning
+from bt_actions.running import threads
+from bt_actions.running.threads import StartedRun
 from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
 from tests.support.trees import Gate, Raises, in_sequence, started, state, together
@@ -419,6 +422,35 @@ class TestStart:
         ):
             runner.start()
             assert runner.wait(5.0) is Status.SUCCESS
+
+    def test_a_run_takes_the_thread_of_one_that_is_over_until_that_ends(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(threads, "_at_rest", at_rest := list[Any]())
+        said, found = ContextVar("said", default="nothing"), list[tuple[str, threading.Thread]]()
+
+        def runs(at_once: int) -> None:
+            gate = threading.Barrier(at_once)
+
+            def work() -> Status:
+                gate.wait()
+                found.append((said.get(), threading.current_thread()))
+                said.set("something, in the context of this run alone")
+                return Status.SUCCESS
+
+            every = [StartedRun(work, print) for _ in range(at_once)]
+            for call in (StartedRun.start, StartedRun.join):
+                for each in every:
+                    call(each)
+
+        for at_once in (2, 1, 2):
+            runs(at_once)
+            until(lambda: len(at_rest) == 2)
+        monkeypatch.setattr(threads, "LINGER", 0.01)
+        runs(2)
+        assert [len({*each}) for each in zip(*found, strict=True)] == [1, 2]
+        until(lambda: not at_rest)
+        until(lambda: not any(thread.is_alive() for _, thread in found))
 
     def test_wait_gives_up_and_the_tree_goes_on(self, node: Any) -> None:
         gate = Gate()

@@ -328,7 +328,7 @@ class TreeRunner:
                 if not _runs_change.wait_for(lambda: not self.running, patience):
                     return
             self._is_down = True
-            if self._started not in (None, threading.current_thread()):  # as in a done callback
+            if self._started is not None:
                 self._started.join()
             guests = self._close_guests if self._on_close else None
             with contextlib.ExitStack() as last:
