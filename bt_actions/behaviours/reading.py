@@ -36,11 +36,9 @@ class Reading:
     ) -> None:
         """Raises ValueError for what is neither a function nor an expression."""
         self._names = names
-        self._written = list[tuple[str, Expression]]()  # what was given as text
-        self._wanted = (
-            expect if isinstance(expect, str) else getattr(expect, "text", "something else")
-        )
+        self._written: list[tuple[str, Expression]] = []  # what was given as text
         self._expect = None if expect is None else self._function(expect, "expect")
+        self._wanted = expect if isinstance(expect, str) else getattr(expect, "text", None)
         self.when = None if when is None else self._function(when, "retry.when")
         self._save = {key(name): self._function(place, "save") for name, place in save.items()}
 
@@ -82,7 +80,8 @@ class Reading:
         """Check the result, and save what is to be kept of it; or return what is wrong with it."""
         try:
             if self._expect is not None and not self._expect(result):
-                return f"{self._wanted} was expected, but the result is: {shorten(result)}"
+                wanted = self._wanted or "something else"
+                return f"{wanted} was expected, but the result is: {shorten(result)}"
         except ExpressionError as error:
             return str(error)
         try:

@@ -326,4 +326,4 @@ def _found(path: PathLike) -> Path:
 
 def _shown(path: PathLike, found: Path) -> str | None:
     """The name to show: as it was given where that is the file, else where it was found."""
-    return os.fspath(path) if Path(path) == found else None
+    return os.fspath(path) if path is found or Path(path) == found else None

@@ -59,15 +59,17 @@ def _parts(cls: type | None, kind: str) -> tuple[str, FieldType | None, Types]:
 
 
 def _all_computed(
-    kind: FieldType, value: object, types: MappingType[int, FieldType | None]
+    kind: FieldType | None, value: object, types: MappingType[int, FieldType | None]
 ) -> bool:
     """Whether a message's fields are all read from variables that fit: nothing is wrong there."""
     if not isinstance(value, dict) or not isinstance(kind, Message):
         return False
-    parts = value.values()
-    if not all(isinstance(part, Computed) and part.expression.variables for part in parts):
-        return False
-    return _fill(kind, tuple(value), *[types[id(part)] for part in parts])
+    given = []
+    for part in value.values():
+        if type(part) is not Computed or not part.expression.variables:
+            return False
+        given.append(types[id(part)])
+    return _fill(kind, tuple(value), *given)
 
 
 @lru_cache(maxsize=4096)
@@ -220,17 +222,21 @@ class Checker:
         In `prose` a variable's bare name is a word like any other.
         """
         errors = self.source.errors
-        self.fit(kind, value, node, self.variables)
-        if value is not BAD and self.source.errors == errors:
+        if self.fit(kind, value, node, self.variables) and self.source.errors == errors:
             warn_unmarked(node, self.source, self.variables, prose=prose)
 
-    def fit(self, kind: FieldType | None, value: object, node: Node, known: Container[str]) -> None:
-        """As `value`; what is `known` may be meant by a bare name where the value does not fit."""
+    def fit(self, kind: FieldType | None, value: object, node: Node, known: Container[str]) -> bool:
+        """As `value`; what is `known` may be meant by a bare name where the value does not fit.
+
+        Returns whether there is a text in it that may stand for something else.
+        """
         if value is BAD:
-            return
+            return False
         types = {id(part): self.expression(part, {}) for part in computed_in(value)}
-        if kind is None or _all_computed(kind, value, types):
-            return
+        if _all_computed(kind, value, types):
+            return False
+        if kind is None:
+            return True
 
         def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):
@@ -273,6 +279,7 @@ class Checker:
                 text = f"{at.text}: {problem}"
             meant = None if problem.at_key else marked_here(at, self.source, known)
             self.source.report(code, span_of(at), text, hint=_trap(at) or meant)
+        return True
 
     def finite(self, value: object, node: Node) -> None:
         """Check that no number of an input's value is infinite."""

@@ -31,7 +31,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
         return _in_package(wanted)
     if not wanted:
         raise TreeNotFoundError("the name of a tree is needed, not an empty text")
-    path = Path(wanted)
+    path = name_or_path if isinstance(name_or_path, Path) else Path(wanted)
     exact = path if beside is None else beside / path
     if _is_file(exact):
         return exact
