@@ -108,19 +108,15 @@ def runners() -> Figures:
     usage = _Usage()
     fleet = [TreeRunner(_robot(robot)) for robot in range(ROBOTS)]
 
+    threads = []
+
     def run() -> None:
         for runner in fleet:
             runner.start()
+        threads.append(_status("Threads"))
         _succeeds(runner.wait(120.0) for runner in fleet)
 
-    most = 0.0
-
-    def watch(_event: object) -> None:
-        nonlocal most
-        most = max(most, _status("Threads"))
-
-    fleet[-1].observe(watch)
-    figures = {**usage.figures(_timed(run)), "threads": most}
+    figures = {**usage.figures(_timed(run)), "threads": max(threads)}
     for runner in fleet:
         runner.shutdown()
     return figures
