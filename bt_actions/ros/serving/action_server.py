@@ -98,8 +98,7 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
     def add_future(self, future: Any) -> None:
         """Do nothing: a result is not the executor's."""
 
-    def remove_future(self, future: Any) -> None:
-        """Do nothing, as `add_future`."""
+    remove_future = add_future
 
     # Requests; on the executor's threads
 
