@@ -217,6 +217,9 @@ class TreeRunner:
     def start(self) -> None:
         """Run the tree on a thread of its own; see `wait` and `future`. For use in callbacks.
 
+        A run that is started when this one is over may take over the thread, with what is kept for
+        it (`threading.local`).
+
         Raises RuntimeError where the tree runs already, here or in another runner.
 
         A signal that ends the process while neither `wait` nor `shutdown` is on the main thread

@@ -9,6 +9,7 @@ import queue
 import threading
 from collections.abc import Callable
 from concurrent import futures
+from functools import partial
 
 from py_trees.common import Status
 
@@ -52,12 +53,13 @@ class StartedRun:
 
     def start(self) -> None:
         """Begin; raises RuntimeError where there can be no more threads."""
+        run = partial(contextvars.Context().run, self._run)
         try:
-            given = _at_rest.pop()
+            _at_rest.pop().put(run)
         except IndexError:
-            given = queue.SimpleQueue()
+            given = queue.SimpleQueue[Callable[[], None]]()
+            given.put(run)  # first: SIGINT may break off the wait for the thread
             threading.Thread(target=_work, args=[given], name=_AT_REST, daemon=True).start()
-        given.put(lambda: contextvars.Context().run(self._run))
 
     def join(self) -> None:
         """Wait until all done callbacks have returned; not in one of them."""

@@ -24,7 +24,6 @@ def finds_server(handle: GoalHandle, now: float) -> bool:
     return (
         handle.goal.state is State.WAITING_FOR_SERVER
         and not endpoint.orphaned
-        and endpoint.participant.alive()
         and not endpoint.holds_back(now)
         and endpoint.watch.state(now) is Server.READY
         and not _may_overtake(handle)

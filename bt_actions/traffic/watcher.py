@@ -36,7 +36,7 @@ class Watcher:
     def __init__(self, endpoint: Endpoint, host: Host, route: Route) -> None:
         self._endpoint, self._host, self._route = endpoint, host, route
         self._look_at = 0.0
-        self._looked_at = self._seen_at = NEVER  # at the first of these, and told
+        self._looked_at = NEVER  # and told
         self._counted = 0  # at the last look
         self._looked_like = Server.ABSENT
         self._held_back = (True, True)  # as a server has just come; by `Route.holds_back`
@@ -79,9 +79,9 @@ class Watcher:
         endpoint = self._endpoint
         is_new = now - self._looked_at < LOOK_AT_REST and self._is_alone
         is_new &= endpoint.action not in endpoint.domain.lost  # what was left is canceled first
-        if is_new and (now - self._seen_at < LOOK_WHILE_RUNNING or not self._counts_others(now)):
+        if is_new and endpoint.participant.alive() and not self._counts_others():
             if self._rests:
-                self._look_at = max(self._look_at, self._seen_at + LOOK_WHILE_RUNNING)
+                self._look_at = max(self._look_at, now + LOOK_WHILE_RUNNING)
             return Server.READY
         return self.observe_and_tell(now)
 
@@ -93,7 +93,7 @@ class Watcher:
         """
         endpoint, scheduler = self._endpoint, self._host.scheduler
         is_new = now - endpoint.transport.seen_since < TOO_NEW and not endpoint.transport.closed
-        if is_new and (self._counts_others(now) or self._counted):
+        if is_new and (self._counts_others() or self._counted):
             self.observe_and_tell(now)
         if is_new and self._looked_like is Server.ABSENT:
             scheduler.add(endpoint)
@@ -102,10 +102,9 @@ class Watcher:
             scheduler.remove(endpoint)
         return LOOK_WHILE_WAITING
 
-    def _counts_others(self, now: float) -> bool:
+    def _counts_others(self) -> bool:
         """Whether a server has come or gone since the last look, or our node was destroyed."""
         try:
-            self._seen_at = now
             return self._endpoint.transport.count() != self._counted
         except Exception:  # noqa: BLE001 - the middleware's: any
             return not self._endpoint.orphaned
@@ -186,10 +185,9 @@ class Watcher:
         """Observe who is in sight; what follows is for `observe_and_tell` to say."""
         watch = self._endpoint.watch
         with contextlib.suppress(Exception):
-            self._seen_at = now = self._host.steady()
             if self._endpoint.transport.servers() != watch.gids:
                 self._looked_at = NEVER
-                self._ask_discovery(now, concludes=False)
+                self._ask_discovery(self._host.steady(), concludes=False)
 
     def _ask_discovery(self, now: float, *, concludes: bool = True) -> None:
         """Let the watch see what discovery shows; raises where our node is gone."""

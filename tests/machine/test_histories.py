@@ -27,7 +27,6 @@ RARE = {(State.NOT_RECEIVED, event) for event in Event} | {
     (State.REPLACED, Event.PARKED),
     (State.REPLACED, Event.RESULT_UNKNOWN),
     (State.REPLACED, Event.SERVER_AMBIGUOUS),
-    (State.REPLACED, Event.SERVER_CHANGED),
     (State.UNWANTED, Event.SERVER_AMBIGUOUS),
 }
 """What comes in one of some thousand histories; test_goal.py has it."""

@@ -59,7 +59,7 @@ def _parts(cls: type | None, kind: str) -> tuple[str, FieldType | None, Types]:
 
 
 def _all_computed(
-    kind: FieldType | None, value: object, types: MappingType[int, FieldType | None]
+    kind: FieldType, value: object, types: MappingType[int, FieldType | None]
 ) -> bool:
     """Whether a message's fields are all read from variables that fit: nothing is wrong there."""
     if not isinstance(value, dict) or not isinstance(kind, Message):
@@ -222,21 +222,17 @@ class Checker:
         In `prose` a variable's bare name is a word like any other.
         """
         errors = self.source.errors
-        if self.fit(kind, value, node, self.variables) and self.source.errors == errors:
+        self.fit(kind, value, node, self.variables)
+        if value is not BAD and self.source.errors == errors:
             warn_unmarked(node, self.source, self.variables, prose=prose)
 
-    def fit(self, kind: FieldType | None, value: object, node: Node, known: Container[str]) -> bool:
-        """As `value`; what is `known` may be meant by a bare name where the value does not fit.
-
-        Returns whether there is a text in it that may stand for something else.
-        """
+    def fit(self, kind: FieldType | None, value: object, node: Node, known: Container[str]) -> None:
+        """As `value`; what is `known` may be meant by a bare name where the value does not fit."""
         if value is BAD:
-            return False
+            return
         types = {id(part): self.expression(part, {}) for part in computed_in(value)}
-        if _all_computed(kind, value, types):
-            return False
-        if kind is None:
-            return True
+        if kind is None or _all_computed(kind, value, types):
+            return
 
         def hole(item: object, wanted: FieldType, path: tuple[str | int, ...]) -> bool:
             if isinstance(item, Computed):
@@ -279,7 +275,6 @@ class Checker:
                 text = f"{at.text}: {problem}"
             meant = None if problem.at_key else marked_here(at, self.source, known)
             self.source.report(code, span_of(at), text, hint=_trap(at) or meant)
-        return True
 
     def finite(self, value: object, node: Node) -> None:
         """Check that no number of an input's value is infinite."""
