@@ -40,12 +40,9 @@ def left_near(handle: GoalHandle) -> list[GoalHandle]:
     goal, action = handle.goal, handle.endpoint.action
     return [
         each
-        for each in handle.endpoint.domain.handles()
-        if not each.goal.claims_resources
-        and (
-            each.endpoint.action == action
-            or each.goal.resources & (goal.exclusive if each.goal.outstanding else goal.resources)
-        )
+        for each in handle.endpoint.domain.left
+        if each.endpoint.action == action
+        or each.goal.resources & (goal.exclusive if each.goal.outstanding else goal.resources)
     ]
 
 

@@ -132,6 +132,8 @@ class Driver:
         if now.shown != before.shown:
             yield self.note
         if now.in_the_way != before.in_the_way:
+            if not handle.goal.claims_resources and handle.goal.id in self._endpoint.goals:
+                self._endpoint.domain.left[handle] = None
             yield self._wake_waiting
         for command in commands:
             yield self._commands[command]

@@ -183,6 +183,8 @@ class ActionEndpoint:
             handle.endpoint = self
             handle.replies.taken_over()
         self.goals[handle.goal.id] = handle
+        if not handle.goal.claims_resources:
+            self.domain.left[handle] = None
         self.domain.open[self] = None
         if not handle.goal.sent:
             self.domain.unsent[handle] = None
@@ -193,6 +195,7 @@ class ActionEndpoint:
         goal = handle.goal
         if self.goals.get(goal.id) is handle:  # and not what has turned up again
             del self.goals[goal.id]
+            self.domain.left.pop(handle, None)
             self.transport.forget(goal.id)
             if goal.end is End.UNKNOWN:
                 self.cancels.send_now(goal.id)  # nobody will ask again

@@ -6,7 +6,7 @@ Values, registers, and the protocols by which the parts of traffic/ know each ot
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -255,6 +255,8 @@ class Domain:
         """The endpoints with goals, of all nodes, in the order in which they came."""
         self.unsent: dict[GoalHandle, None] = {}
         """Goals that are to be sent, and some that were since (Driver drops them)."""
+        self.left: dict[GoalHandle, None] = {}
+        """Goals of these endpoints that hold no resources any more."""
         self.ever_lost_sight = False
         """A server went out of sight once: what else its process serves may have, too."""
         self.known: set[Action] = set()
@@ -263,8 +265,3 @@ class Domain:
         """Lost goals whose endpoint is gone: their server may be back for the next one."""
         self.cancels: dict[Action, Cancels] = defaultdict(Cancels)
         """The cancel requests of this process."""
-
-    def handles(self) -> Iterator[GoalHandle]:
-        """Yield the goals of all open endpoints."""
-        for endpoint in self.open:
-            yield from endpoint.goals.values()

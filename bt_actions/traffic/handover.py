@@ -27,7 +27,7 @@ def take_over(endpoint: Endpoint, now: float) -> None:
     watch = endpoint.watch
     if watch.state(now) is Server.ABSENT:
         return
-    for handle in list(endpoint.domain.handles()):
+    for handle in list(endpoint.domain.left):
         other, servers = handle.endpoint, handle.replies.sent_to
         not_others = other is endpoint or other.action != endpoint.action
         if not_others or not handle.goal.lost or not servers & watch.gids:
