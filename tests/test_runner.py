@@ -452,6 +452,23 @@ class TestStart:
         until(lambda: not at_rest)
         until(lambda: not any(thread.is_alive() for _, thread in found))
 
+    def test_sigint_while_its_thread_starts_leaves_a_run_that_can_be_ended(
+        self, node: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        start = threading.Thread.start
+
+        def interrupted(thread: threading.Thread) -> None:
+            is_ours = thread.name == "bt_actions-rest"
+            start(thread)
+            if is_ours:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(threads, "_at_rest", [])
+        monkeypatch.setattr(threading.Thread, "start", interrupted)
+        with TreeRunner(Gate(), node=node) as runner, pytest.raises(KeyboardInterrupt):
+            runner.start()
+        assert runner.future.result(0.0) is Status.INVALID
+
     def test_wait_gives_up_and_the_tree_goes_on(self, node: Any) -> None:
         gate = Gate()
         with started(gate, node=node) as runner:

@@ -268,6 +268,10 @@ class Judge:
             why = names & wanted or self.caller.resources.holders(names)
             self._hold(why, f"what is free goes to who waits longest: {handle}")
             wanted |= names
+        domain = self.caller.host.domain(0)
+        here = [handle for each in domain.open for handle in each.goals.values()]
+        left = {handle for handle in here if not handle.goal.claims_resources}
+        self._hold(domain.left.keys() == left, "who has given up its resources is known")
 
     def _within(self, passed: float, limit: float | None, name: str) -> None:
         self._hold(limit is None or passed < limit + JUST, f"timeout.{name} takes effect")

@@ -19,7 +19,6 @@ from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Retry, Timeouts
 from bt_actions.behaviours.variables import read
 from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
-from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -186,7 +185,7 @@ class TestNoServer:
             runner.start()
             runner.until(lambda: one.status is Status.SUCCESS)
             second = world.serve()
-            runner.advance(1.5 * LOOK_WHILE_RUNNING)
+            runner.advance(0.02)
             gate.passed = True
             assert runner.wait(30.0) is Status.FAILURE
         assert two.outcome is Outcome.SERVER_AMBIGUOUS
