@@ -75,8 +75,8 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
 
-    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading", "_shown_feedback",
-                 "_started")  # fmt: skip
+    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_plain", "_reading",
+                 "_shown_feedback", "_started")  # fmt: skip
 
     def __init__(
         self,
@@ -99,6 +99,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.action_type = action_type
         self.action_name = action_name
         self.goal = goal
+        self._plain: Any = None  # the goal, where it is of constants
         self.timeouts = Timeouts.of(timeout)
         self.retry = Retry.of(retry)
         self.busy = Busy(busy)
@@ -194,7 +195,9 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         installed.
         """
         action: Any = interface(self.action_type, "action")
+        self._plain = None
         if isinstance(self.goal, Mapping) and not reads_variables(self.goal):
+            self._plain = self.goal
             try:
                 fill(action.Goal, self.goal)
             except MessageError as error:
@@ -230,7 +233,8 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
                     return Status.RUNNING
                 handle, begun = self._begin(backend), True
-            backend.traffic.advance(handle, self._make_message)
+            is_plain = self.goal is self._plain
+            backend.traffic.advance(handle, self._make_message, is_plain=is_plain)
             decided = handle.is_decided  # then all of its feedback is here
             for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
                 message = handle.feedback.popleft()

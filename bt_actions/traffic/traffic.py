@@ -12,6 +12,7 @@ One lock guards all of it. Under the lock nothing waits, and of the user's code 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from typing import Any
 
 from bt_actions.goals.goal import Goal
@@ -128,36 +129,45 @@ class Traffic:
             return f"{namespace}/{self.participant.name}{name[1:]}"
         return f"{namespace}/{name}"
 
-    def advance(self, handle: GoalHandle, make_message: Callable[[], Any]) -> None:
+    def advance(
+        self, handle: GoalHandle, make_message: Callable[[], Any], *, is_plain: bool = False
+    ) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
 
-        It belongs from now on to the run that ticks its leaf. `make_message` is called without the
-        lock, on the caller's thread, at most once a call (the server may go meanwhile); what it
-        raises makes the goal INVALID_GOAL.
+        It belongs from now on to the run that ticks its leaf. `make_message` is called on the
+        caller's thread, at most once a call; what it raises makes the goal INVALID_GOAL. Where it
+        may run code of the user's, it is called without the lock (the server may go meanwhile);
+        `is_plain` says that it does not.
         """
         endpoint, handle.begun_in = handle.endpoint, begun_in.get() or handle.begun_in
         if handle.goal.state is State.DONE:
             return
+        with self.host.lock if is_plain else nullcontext():
+            if not self._is_due(handle):
+                return
+            try:
+                message = make_message()
+            except Exception as error:  # noqa: BLE001 - the user's: any
+                # in_words may run code of the user's: before `tell` takes the lock
+                endpoint.tell(handle, Event.INVALID, in_words(error))
+                return
+            with self.host.lock:
+                if is_plain or self._may_send(handle):
+                    handle.message = message
+                    endpoint.tell(handle, Event.SERVER_READY)
+
+    def _is_due(self, handle: GoalHandle) -> bool:
+        """Apply what is due, look at the server, and say whether to send the goal now."""
+        endpoint = handle.endpoint
         with self.host.lock:
             endpoint.apply_deadlines(handle)
             if self.host.closing:
                 endpoint.tell(handle, Event.INTERRUPTED)
             if handle.goal.state is not State.WAITING_FOR_SERVER:
-                return
+                return False
             if endpoint.recent_state(self.host.steady()) is Server.AMBIGUOUS:
                 endpoint.tell(handle, Event.SERVER_AMBIGUOUS)
-            if not self._may_send(handle):
-                return
-        try:
-            message = make_message()
-        except Exception as error:  # noqa: BLE001 - the user's: any
-            # in_words may run code of the user's: before `tell` takes the lock
-            endpoint.tell(handle, Event.INVALID, in_words(error))
-            return
-        with self.host.lock:
-            if self._may_send(handle):
-                handle.message = message
-                endpoint.tell(handle, Event.SERVER_READY)
+            return self._may_send(handle)
 
     def _may_send(self, handle: GoalHandle) -> bool:
         """Whether to send it now. If nothing else speaks against it, see to lost goals first."""
