@@ -7,6 +7,7 @@ signals (tests/scenarios).
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -49,6 +50,29 @@ class TestSucceeded:
         assert record.duration >= 0.2
         assert journal.events() == ["received", "accepted", "succeeded"]
         assert record.goal_id == journal.entries()[-1].goal
+
+    @pytest.mark.parametrize("at_first", [True, False])
+    def test_what_gives_a_goal_is_called_without_the_lock(
+        self, serve: Any, name: str, node: Node, *, at_first: bool
+    ) -> None:
+        def takes_the_lock() -> bool:
+            with process.lock:
+                return True
+
+        def goal() -> dict[str, float]:
+            with ThreadPoolExecutor(1) as other:
+                assert other.submit(takes_the_lock).result(5.0)
+            return {"distance": 0.1}
+
+        serve()
+        leaf = MoveRobot("m", 0.1, action_name=name)
+        if at_first:
+            leaf.goal = goal
+        leaf.setup(node=node)
+        leaf.goal = goal
+        until(lambda: leaf.tick_once() or leaf.status is not Status.RUNNING)
+        leaf.shutdown()
+        assert leaf.outcome is Outcome.SUCCEEDED
 
 
 class TestNoServer:
