@@ -5,8 +5,6 @@ Looks at what is known, and neither asks nor sends anything. All under the host'
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from bt_actions.goals.policy import Busy, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.servers.presence import Server
@@ -46,7 +44,7 @@ def left_near(handle: GoalHandle) -> list[GoalHandle]:
     ]
 
 
-def is_clear(handle: GoalHandle, left: Iterable[GoalHandle], now: float) -> bool:
+def is_clear(handle: GoalHandle, now: float) -> bool:
     """Whether there is room at its server, and nothing that was `left_near` may run beside it."""
     endpoint = handle.endpoint
     at_server = (each for each in endpoint.domain.open if each.action == endpoint.action)
@@ -55,7 +53,7 @@ def is_clear(handle: GoalHandle, left: Iterable[GoalHandle], now: float) -> bool
     return in_flight < IN_FLIGHT and not any(
         each.goal.outstanding
         or (each.goal.lost and just_came and each.endpoint.action != endpoint.action)
-        for each in left
+        for each in left_near(handle)
     )
 
 

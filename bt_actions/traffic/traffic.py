@@ -174,17 +174,15 @@ class Traffic:
         now = self.host.steady()
         if self.host.closing or not admission.finds_server(handle, now):
             return False
-        left = admission.left_near(handle)
-        if self._cancel_what_is_back(handle, left, now):
-            left = admission.left_near(handle)
-        return admission.is_clear(handle, left, now)
+        self._cancel_what_is_back(handle, now)
+        return admission.is_clear(handle, now)
 
-    def _cancel_what_is_back(self, handle: GoalHandle, left: list[GoalHandle], now: float) -> bool:
+    def _cancel_what_is_back(self, handle: GoalHandle, now: float) -> None:
         """Observe each server at which goals were lost that this one might run beside.
 
-        Should it be back, they are canceled. Opens an endpoint where this node has none. Returns
-        whether there was anything to observe.
+        Should it be back, they are canceled. Opens an endpoint where this node has none.
         """
+        left = admission.left_near(handle)
         to_see = dict.fromkeys(each.endpoint for each in left if each.goal.lost)
         actions = {each.action: None for each in to_see}
         for action, lost in list(self._domain.lost.items()):
@@ -198,7 +196,6 @@ class Traffic:
                 to_see[ours] = None
         for endpoint in to_see:  # all of them first: one may see what another has lost
             endpoint.observe_and_tell(now)
-        return bool(to_see)
 
     def deadline(self, handle: GoalHandle, now: Now) -> tuple[Event, float] | None:
         """Its next deadline, and the seconds until then; these change with what arrives."""
