@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from bt_actions.traffic.handle import GoalHandle
 
 
+_PLAIN = {bool, int, float, str}
+
+
 @dataclass(frozen=True, slots=True)
 class Progress:
     """What an action is doing at this moment."""
@@ -75,8 +78,8 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
 
-    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_plain", "_reading",
-                 "_shown_feedback", "_started")  # fmt: skip
+    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading", "_shown_feedback",
+                 "_started")  # fmt: skip
 
     def __init__(
         self,
@@ -99,7 +102,6 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.action_type = action_type
         self.action_name = action_name
         self.goal = goal
-        self._plain: Any = None  # the goal, where it is of constants
         self.timeouts = Timeouts.of(timeout)
         self.retry = Retry.of(retry)
         self.busy = Busy(busy)
@@ -195,9 +197,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         installed.
         """
         action: Any = interface(self.action_type, "action")
-        self._plain = None
         if isinstance(self.goal, Mapping) and not reads_variables(self.goal):
-            self._plain = self.goal
             try:
                 fill(action.Goal, self.goal)
             except MessageError as error:
@@ -233,8 +233,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
                     return Status.RUNNING
                 handle, begun = self._begin(backend), True
-            is_plain = self.goal is self._plain
-            backend.traffic.advance(handle, self._make_message, is_plain=is_plain)
+            backend.traffic.advance(handle, self._make_message, self._is_plain)
             decided = handle.is_decided  # then all of its feedback is here
             for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
                 message = handle.feedback.popleft()
@@ -338,6 +337,11 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         """Whether this attempt is over and in the history."""
         history = self.history  # a new visit begins a new one
         return bool(history) and history[-1].goal is handle.goal
+
+    def _is_plain(self) -> bool:
+        """Whether no code of the user's can run where the goal is made into a message."""
+        goal = self.goal
+        return type(goal) is dict and all(type(each) in _PLAIN for each in goal.values())
 
     def _make_message(self) -> Any:
         action: Any = self.action_type

@@ -195,7 +195,8 @@ class ActionEndpoint:
         goal = handle.goal
         if self.goals.get(goal.id) is handle:  # and not what has turned up again
             del self.goals[goal.id]
-            self.domain.left.pop(handle, None)
+            if handle.endpoint is self:  # and not another's by now
+                self.domain.left.pop(handle, None)
             self.transport.forget(goal.id)
             if goal.end is End.UNKNOWN:
                 self.cancels.send_now(goal.id)  # nobody will ask again

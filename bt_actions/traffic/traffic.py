@@ -130,19 +130,23 @@ class Traffic:
         return f"{namespace}/{name}"
 
     def advance(
-        self, handle: GoalHandle, make_message: Callable[[], Any], *, is_plain: bool = False
+        self,
+        handle: GoalHandle,
+        make_message: Callable[[], Any],
+        is_plain: Callable[[], bool] = lambda: False,
     ) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
 
         It belongs from now on to the run that ticks its leaf. `make_message` is called on the
-        caller's thread, at most once a call; what it raises makes the goal INVALID_GOAL. Where it
-        may run code of the user's, it is called without the lock (the server may go meanwhile);
-        `is_plain` says that it does not.
+        caller's thread, at most once a call; what it raises makes the goal INVALID_GOAL. It is
+        called without the lock (the server may go meanwhile), unless `is_plain` says that it runs
+        no code of the user's.
         """
         endpoint, handle.begun_in = handle.endpoint, begun_in.get() or handle.begun_in
         if handle.goal.state is State.DONE:
             return
-        with self.host.lock if is_plain else nullcontext():
+        at_once = handle.goal.state is State.WAITING_FOR_SERVER and is_plain()
+        with self.host.lock if at_once else nullcontext():
             if not self._is_due(handle):
                 return
             try:
@@ -152,7 +156,7 @@ class Traffic:
                 endpoint.tell(handle, Event.INVALID, in_words(error))
                 return
             with self.host.lock:
-                if is_plain or self._may_send(handle):
+                if at_once or (endpoint.participant.alive() and self._may_send(handle)):
                     handle.message = message
                     endpoint.tell(handle, Event.SERVER_READY)
 

@@ -101,8 +101,8 @@ def test_a_visit_whose_first_tick_breaks_off_is_interrupted_by_the_next(
     leaf.setup(node=backend)
     advance = backend.traffic.advance
 
-    def interrupted(handle: Any, make: Any, **how: Any) -> None:
-        advance(handle, make, **how)
+    def interrupted(*given: Any) -> None:
+        advance(*given)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(backend.traffic, "advance", interrupted)

@@ -6,6 +6,7 @@ signals (tests/scenarios).
 
 from __future__ import annotations
 
+from collections import UserDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -51,9 +52,9 @@ class TestSucceeded:
         assert journal.events() == ["received", "accepted", "succeeded"]
         assert record.goal_id == journal.entries()[-1].goal
 
-    @pytest.mark.parametrize("at_first", [True, False])
+    @pytest.mark.parametrize("kind", ["callable", "mapping"])
     def test_what_gives_a_goal_is_called_without_the_lock(
-        self, serve: Any, name: str, node: Node, *, at_first: bool
+        self, serve: Any, name: str, node: Node, kind: str
     ) -> None:
         def takes_the_lock() -> bool:
             with process.lock:
@@ -64,12 +65,14 @@ class TestSucceeded:
                 assert other.submit(takes_the_lock).result(5.0)
             return {"distance": 0.1}
 
+        class Lazy(UserDict[str, float]):
+            def __getitem__(self, key: str) -> float:
+                return goal()[key]
+
         serve()
         leaf = MoveRobot("m", 0.1, action_name=name)
-        if at_first:
-            leaf.goal = goal
         leaf.setup(node=node)
-        leaf.goal = goal
+        leaf.goal = goal if kind == "callable" else Lazy(distance=0.1)
         until(lambda: leaf.tick_once() or leaf.status is not Status.RUNNING)
         leaf.shutdown()
         assert leaf.outcome is Outcome.SUCCEEDED

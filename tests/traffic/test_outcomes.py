@@ -19,6 +19,7 @@ from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Retry, Timeouts
 from bt_actions.behaviours.variables import read
 from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
+from bt_actions.traffic import handover
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -603,3 +604,40 @@ def test_what_another_node_left_is_canceled_first_also_at_a_server_just_looked_a
     other.traffic.destroy()
     new.tick_once()
     assert new.progress().state == "WAITING_FOR_SERVER"
+
+
+def test_a_lost_goal_that_another_node_takes_over_is_still_known_to_be_left(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world.serve()
+    here = VirtualBackend(world.network)
+    leaves = [MoveRobot(name, 9.0) for name in ("one", "two")]
+    leaves[0].setup(node=here)
+    leaves[1].setup(node=VirtualBackend(world.network, host=here.host))
+    until_it_runs(world, leaves[0])
+    one, two = (leaf._own for leaf in leaves)
+    monkeypatch.setattr(one.transport, "servers", frozenset)
+    one.observe_and_tell(here.host.steady())
+    two.watch.observe(here.host.steady(), True, two.transport.servers())
+    handover.take_over(two, here.host.steady())
+    [handle] = leaves[0].open_handles()
+    assert handle.goal.lost
+    assert handle.endpoint is two
+    assert handle in here.host.domain(0).left
+
+
+def test_a_node_that_is_destroyed_while_a_goal_is_made_sends_it_not(world: World) -> None:
+    journal = world.serve()
+    node = VirtualBackend(world.network)
+    leaf = MoveRobot("m", 0.1)
+    leaf.setup(node=node)
+    leaf.goal = lambda: node.traffic.participant.close() or {"distance": 0.1}
+    while leaf.tick_once() or leaf.status is Status.RUNNING:
+        world.network.timeline.advance(world.network.now() + 0.05)
+    assert stood(leaf) == (Outcome.CANCELED, End.NEVER_STARTED)
+    assert journal.count("received") == 0
+
+
+def until_it_runs(world: World, leaf: ActionBehaviour) -> None:
+    while leaf.tick_once() or not executing(leaf):
+        world.network.timeline.advance(world.network.now() + 0.05)
