@@ -64,7 +64,8 @@ journal showed that each ran once and in its order.
   client. So are the moments of row 3; a goal is sent when it is handed to that client.
 - Our side of rows 1 to 5 is `ActionBehaviour`s in a tree under `TreeRunner`, with nothing said; the
   other sends each goal in the callback of the result before it.
-- Rows 9 and 10 count the better of two runs, after one that waits for discovery.
+- Rows 9 and 10 count the better of two runs, after one that waits for discovery; in that one the
+  runners' threads are made, too.
 - Row 11 cannot be less than 0.45: PyYAML's C parser, which gives us its events, and py_trees' own
   constructors take that much of the yardstick's time. Of 100 nodes, a tenth is what any file takes.
 - `make bench-short`, which CI calls, measures rows 1 to 5, 8 and 14, and fails where one is
