@@ -64,10 +64,14 @@ journal showed that each ran once and in its order.
   client. So are the moments of row 3; a goal is sent when it is handed to that client.
 - Our side of rows 1 to 5 is `ActionBehaviour`s in a tree under `TreeRunner`, with nothing said; the
   other sends each goal in the callback of the result before it.
-- Rows 9 and 10 count the better of two runs, after one that waits for discovery; in that one the
-  runners' threads are made, too.
+- Both sides of row 7 meet a server that has just come up, which they discover 0.12 or 0.24 s after
+  their node is made; one that has been up for longer takes up to 2.7 s now and then, of either.
+- Rows 9 and 10 count the median of eight runs, after one that waits for discovery; in that one the
+  runners' threads are made, too. A server with stock settings keeps what is over for 15 minutes, so
+  that its status messages grow from run to run.
 - Row 11 cannot be less than 0.45: PyYAML's C parser, which gives us its events, and py_trees' own
   constructors take that much of the yardstick's time. Of 100 nodes, a tenth is what any file takes.
+  More than 1,000 nodes outgrow the processor's cache, of both: a node costs a quarter more there.
 - `make bench-short`, which CI calls, measures rows 1 to 5, 8 and 14, and fails where one is
   beyond its limit by more than a quarter in each of three tries.
 """
