@@ -74,14 +74,16 @@ class Scheduler:
 
     def run(self) -> None:
         """Run all, and say when to do so again (`wakes_at`)."""
-        wait, self.wakes_at = AT_LEAST_EVERY, math.inf  # who asks meanwhile is heard
+        self.wakes_at = math.inf  # who asks meanwhile is heard
+        due = self._steady() + AT_LEAST_EVERY
         for endpoint in self.scheduled:
-            self._stalls.lives(self._steady())  # each look takes its time
+            now = self._steady()  # each look takes its time
+            self._stalls.lives(now)
             try:
-                wait = min(wait, endpoint.run_due(self._steady()))
+                due = min(due, now + endpoint.run_due(now))
             except Exception as error:  # noqa: BLE001 - the last guard of every deadline
                 self._failed(endpoint, error)
         now = self._steady()
-        self.wakes_at = max(now + SHORTEST, min(now + wait, self.wakes_at))
+        self.wakes_at = max(now + SHORTEST, min(due, self.wakes_at))
         self._stalls.lives(now)
         self._stalls.sleeps(now, self.wakes_at)
