@@ -12,6 +12,7 @@ import argparse
 import os
 import platform
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks import (
@@ -27,7 +28,7 @@ from benchmarks import (
     ticking,
     waiting,
 )
-from benchmarks.harness import Family, Measured, hold_within, measure, table
+from benchmarks.harness import MANY, Family, Measured, hold_within, measure, table
 
 FAMILIES = [
     chain.STOCK,
@@ -51,8 +52,9 @@ PAGE = """\
 Made by `make bench`, which measures all of this in one go; nothing here is written by hand.
 
 Each row has a yardstick that is measured in the same run, in turns with ours, in processes of their
-own. The value of a row is the median of {rounds} rounds, each of which compares what was measured
-one after the other; in brackets are its lowest and its highest. Compare values, not times: these
+own. The value of a row is the median of {rounds} rounds (rows 1 to 4: of {more}), each of which
+compares what was measured one after the other; in brackets are its lowest and its highest. Compare
+values, not times: these
 belong to the machine ({machine}; load {load} at the beginning).
 Every goal of rows 1 to 5, 7 (but with `--sim`), 9 and 10 went to a server in another process, whose
 journal showed that each ran once and in its order.
@@ -92,7 +94,7 @@ def _wanted(rows: set[str]) -> list[Family]:
         sides = {row.ours[0] for row in kept} | {row.theirs[0] for row in kept if row.theirs}
         if kept:
             needed = {name: side for name, side in family.sides.items() if name in sides}
-            families.append(Family(kept, needed))
+            families.append(replace(family, rows=kept, sides=needed))
     return families
 
 
@@ -133,7 +135,11 @@ def main() -> int:
     print(table(measured))
     if wanted.page:
         page = PAGE.format(
-            rounds=wanted.rounds, machine=_machine(), load=load, table=table(measured)
+            rounds=wanted.rounds,
+            more=wanted.rounds * MANY,
+            machine=_machine(),
+            load=load,
+            table=table(measured),
         )
         wanted.page.write_text(page, encoding="utf-8")
     return 0

@@ -7,7 +7,7 @@ from py_trees.common import Status
 from test_msgs.action import Fibonacci
 
 from benchmarks import by_hand, processes
-from benchmarks.harness import Family, Figures, Row
+from benchmarks.harness import MANY, Family, Figures, Row
 from benchmarks.wire import Wire
 from bt_actions import ActionBehaviour, TreeRunner
 
@@ -44,7 +44,8 @@ def _family(rows: list[Row], *settings: object) -> Family:
         expected = {ACTION: range(GOALS)}
         return processes.accounted("chain", name, expected, server=(ACTION, *settings))
 
-    return Family(rows, {name: lambda name=name: run(name) for name in ("hand", "tree")})
+    sides = {name: lambda name=name: run(name) for name in ("hand", "tree")}
+    return Family(rows, sides, MANY)
 
 
 def _row(number: str, work: str, figure: str, at_most: float) -> Row:

@@ -17,6 +17,8 @@ Round = Mapping[str, Figures]
 Where = tuple[str, str]
 """A side, and the name of its figure."""
 TRIES = 3
+MANY = 3
+"""Rounds for each that is asked for, of a family that is quick and varies."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,8 @@ class Family:
 
     rows: Sequence[Row]
     sides: Mapping[str, Callable[[], Figures]]
+    times: int = 1
+    """Its rounds, for each that is asked for."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +101,9 @@ HEAD = ["#", "work", "yardstick", "ours", "the yardstick's", "value (spread)", "
 
 
 def measure(family: Family, rounds: int, say: Callable[[str], None]) -> list[Measured]:
-    """Measure so many rounds; `say` is told of each."""
+    """Measure so many rounds, times the family's; `say` is told of each."""
     taken: list[Round] = []
+    rounds *= family.times
     for number in range(1, rounds + 1):
         taken.append({name: side() for name, side in family.sides.items()})
         values = (f"{row.number}: {row.value(taken[-1]):.3g}" for row in family.rows)

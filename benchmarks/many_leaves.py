@@ -10,7 +10,7 @@ from py_trees.common import Status
 from test_msgs.action import Fibonacci
 
 from benchmarks import processes
-from benchmarks.harness import Family, Figures, Row
+from benchmarks.harness import MANY, Family, Figures, Row
 from benchmarks.wire import Wire
 from bt_actions import ActionBehaviour, TreeRunner
 
@@ -61,6 +61,7 @@ FAMILY = Family(
         )
     ],
     {"one": lambda: _side("one"), "many": lambda: _side("many")},
+    MANY,
 )
 
 if __name__ == "__main__":

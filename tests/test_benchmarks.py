@@ -25,11 +25,11 @@ def test_sides_are_measured_in_turns() -> None:
         order.append(name)
         return {"ms": 1.0}
 
-    family = Family([RATIO], {name: lambda name=name: side(name) for name in ("hand", "tree")})  # type: ignore[misc]
+    sides = {name: lambda name=name: side(name) for name in ("hand", "tree")}  # type: ignore[misc]
     said: list[str] = []
-    [measured] = measure(family, 3, said.append)
-    assert order == ["hand", "tree"] * 3
-    assert len(measured.rounds) == len(said) == 3
+    [measured] = measure(Family([RATIO], sides, times=2), 3, said.append)
+    assert order == ["hand", "tree"] * 6
+    assert len(measured.rounds) == len(said) == 6
 
 
 @pytest.mark.parametrize(("row", "value"), [(RATIO, 2.0), (MORE, 1.0), (ALONE, 4.0)])
