@@ -66,8 +66,9 @@ journal showed that each ran once and in its order.
   client. So are the moments of row 3; a goal is sent when it is handed to that client.
 - Our side of rows 1 to 5 is `ActionBehaviour`s in a tree under `TreeRunner`, with nothing said; the
   other sends each goal in the callback of the result before it.
-- Both sides of row 7 meet a server that has just come up, which they discover 0.12 or 0.24 s after
-  their node is made; one that has been up for longer takes up to 2.7 s now and then, of either.
+- In row 7 all processes announce themselves every few milliseconds
+  (benchmarks/quick_discovery.xml). As Fast DDS comes, discovery takes 0.12 to 2.7 s, on either
+  side, which would be all that is seen.
 - Rows 9 and 10 count the median of eight runs, after one that waits for discovery; in that one the
   runners' threads are made, too. A server with stock settings keeps what is over for 15 minutes, so
   that its status messages grow from run to run.

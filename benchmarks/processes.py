@@ -1,6 +1,6 @@
 """Processes of a benchmark: each side is one, and so is the server that it sends goals to.
 
-They have a ROS domain of their own on this machine alone, and Fast DDS as it comes.
+They have a ROS domain of their own on this machine alone, and Fast DDS as it comes (but in row 7).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def seconds(arguments: Sequence[str]) -> float:
         [sys.executable, *arguments],
         env=environment(),
         cwd=ROOT,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,  # whose end is the process's; without it, Popen looks every 50 ms
         check=True,
         timeout=PATIENCE,
     )

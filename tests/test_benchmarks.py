@@ -25,7 +25,7 @@ def test_sides_are_measured_in_turns() -> None:
         order.append(name)
         return {"ms": 1.0}
 
-    sides = {name: lambda name=name: side(name) for name in ("hand", "tree")}  # type: ignore[misc]
+    sides = {name: lambda name=name: side(name) for name in ("hand", "tree")}
     said: list[str] = []
     [measured] = measure(Family([RATIO], sides, times=2), 3, said.append)
     assert order == ["hand", "tree"] * 6
