@@ -54,10 +54,12 @@ class Endpoints:
                 future.set_result(work())
             except Exception as error:  # noqa: BLE001 - raised again where it is awaited
                 future.set_exception(error)
-            # An executor that has just looked may wait for something else to happen now.
+            # It does not wake the executor by itself; and one that has just looked may not hear it.
             until = time.monotonic() + _SPUN
-            while executor.context.ok() and time.monotonic() < until and not taken.wait(_NUDGE):
+            while executor.context.ok() and time.monotonic() < until:
                 executor.wake()
+                if taken.wait(_NUDGE):
+                    break
 
         try:
             submit(do)
