@@ -32,7 +32,7 @@ def test_an_executor_is_woken_at_once_when_what_a_callback_awaits_is_there(
     executor, awaited, threads = Executor(), threading.Event(), []
 
     def submit(work: Any) -> None:
-        threads.append(threading.Thread(target=work))
+        threads.append(threading.Thread(target=work, daemon=True))
         threads[-1].start()
 
     node: Any = SimpleNamespace(executor=executor)
