@@ -74,16 +74,14 @@ class Scheduler:
 
     def run(self) -> None:
         """Run all, and say when to do so again (`wakes_at`)."""
-        self.wakes_at = math.inf  # who asks meanwhile is heard
-        due = self._steady() + AT_LEAST_EVERY
+        wait, self.wakes_at = AT_LEAST_EVERY, math.inf  # who asks meanwhile is heard
         for endpoint in self.scheduled:
-            now = self._steady()  # each look takes its time
-            self._stalls.lives(now)
+            self._stalls.lives(self._steady())  # each look takes its time
             try:
-                due = min(due, now + endpoint.run_due(now))
+                wait = min(wait, endpoint.run_due(self._steady()))
             except Exception as error:  # noqa: BLE001 - the last guard of every deadline
                 self._failed(endpoint, error)
         now = self._steady()
-        self.wakes_at = max(now + SHORTEST, min(due, self.wakes_at))
+        self.wakes_at = max(now + SHORTEST, min(now + wait, self.wakes_at))
         self._stalls.lives(now)
         self._stalls.sleeps(now, self.wakes_at)

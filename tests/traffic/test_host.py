@@ -7,11 +7,9 @@ from typing import Any
 
 import pytest
 
-from bt_actions.servers.stalls import Stalls
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.traffic.host import Entry, Host
-from bt_actions.traffic.scheduler import Scheduler
 from tests.support.waiting import until as until_real
 
 WORLDS = [pytest.param("virtual", id="virtual"), pytest.param("ros", marks=pytest.mark.ros)]
@@ -78,22 +76,6 @@ def test_it_is_run_by_the_moment_that_anybody_asks_for(world: Any) -> None:
         host.scheduler.remove(due)
     if isinstance(host, VirtualHost):  # where no thread can be late
         assert due.ran[runs] == pytest.approx(moment)
-
-
-def test_what_a_look_takes_does_not_put_off_the_next() -> None:
-    now = 100.0
-
-    class Slow(Due):
-        def run_due(self, moment: float) -> float:
-            nonlocal now
-            now += 0.02
-            return super().run_due(moment)
-
-    scheduler = Scheduler(lambda: now, Stalls(), lambda: None, lambda *_: pytest.fail("raised"))
-    scheduler.add(Slow(0.05))
-    scheduler.add(Slow(0.05))
-    scheduler.run()
-    assert scheduler.wakes_at == pytest.approx(100.05)
 
 
 def test_who_holds_the_lock_may_take_it_again_and_wait_for_a_change(world: Any) -> None:
