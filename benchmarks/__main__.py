@@ -66,15 +66,16 @@ journal showed that each ran once and in its order.
   client. So are the moments of row 3; a goal is sent when it is handed to that client.
 - Our side of rows 1 to 5 is `ActionBehaviour`s in a tree under `TreeRunner`, with nothing said; the
   other sends each goal in the callback of the result before it.
-- In row 7 all processes announce themselves every few milliseconds
-  (benchmarks/quick_discovery.xml). As Fast DDS comes, discovery takes 0.12 to 2.7 s, on either
-  side, which would be all that is seen.
+- In row 7 the server, the script and `bt-actions run`, but not `--sim`, have a Fast DDS profile in
+  place of their own (benchmarks/quick_discovery.xml): it announces them every 10 ms for a second,
+  then every 50 ms. With their own, discovery takes up to seconds, on either side. The script looks
+  for its server four times a second, as rclpy does; that is in its time.
 - Rows 9 and 10 count the median of eight runs, after one that waits for discovery; in that one the
   runners' threads are made, too. A server with stock settings keeps what is over for 15 minutes, so
-  that its status messages grow from run to run.
+  that its status messages grow from run to run, which is dearest for the hand-written chains.
 - Row 11 cannot be less than 0.45: PyYAML's C parser, which gives us its events, and py_trees' own
   constructors take that much of the yardstick's time. Of 100 nodes, a tenth is what any file takes.
-  More than 1,000 nodes outgrow the processor's cache, of both: a node costs a quarter more there.
+  That is in its growth, too; so is that large trees outgrow the processor's cache, in both.
 - `make bench-short`, which CI calls, measures rows 1 to 5, 8 and 14, and fails where one is
   beyond its limit by more than a quarter in each of three tries.
 """
