@@ -1,7 +1,7 @@
 """`bt-actions run` until its first goal is at the server, beside a minimal rclpy script.
 
-With the Fast DDS profiles of their own, discovery takes 0.1 to 2.7 s, on either side, which would be
-all that is seen. So all of them, but for --sim, have quick_discovery.xml.
+With the Fast DDS profiles of their own, discovery takes 0.1 to 2.7 s, on either side, which would
+be all that is seen. So all of them, but for --sim, have quick_discovery.xml.
 """
 
 from __future__ import annotations
