@@ -18,8 +18,8 @@ from bt_actions.behaviours.connected import Connected
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
-from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
+from bt_actions.goals.terms import Now
 from bt_actions.messages.conversion import MessageError, fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
@@ -78,8 +78,8 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
 
-    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading", "_shown_feedback",
-                 "_started")  # fmt: skip
+    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading",
+                 "_shown_feedback")  # fmt: skip
 
     def __init__(
         self,
@@ -114,7 +114,6 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self._handle: GoalHandle | None = None
         self._left_behind: list[GoalHandle] = []
         self._attempts = Attempts(self.retry, self._reading.when)
-        self._started = 0.0
         self._outcome: Outcome | None = None
 
     # What a caller may read after a tick
@@ -244,10 +243,9 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
             if not decided:
                 self.feedback_message = self._in_words(handle)
                 return Status.RUNNING
-            record = self._judge(handle, backend)
-            again = not self._is_over() and self._attempts.again(
-                record, backend.now(), backend.randomness
-            )
+            now = backend.now()
+            record = self._judge(handle, now)
+            again = not self._is_over() and self._attempts.again(record, now, backend.randomness)
             if self._is_over():
                 return Status.FAILURE
             if not again:
@@ -263,7 +261,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
             outcome, reason = handle.goal.outcome, handle.goal.reason
             if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
                 outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
-            self.history.append(self._record(handle.goal, outcome, reason, backend))
+            self.history.append(self._record(handle, outcome, reason, backend.now()))
             self.feedback_message = f"{outcome}: {reason}"
         self._outcome = self.history[-1].outcome  # also where it stops in the pause before a retry
 
@@ -316,7 +314,6 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
 
     def _begin(self, backend: Backend) -> GoalHandle:
         self._left_behind = self.open_handles()
-        self._started = backend.now().ros
         self._handle = backend.traffic.begin(
             self._own,
             self,
@@ -348,7 +345,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         data = self.goal() if callable(self.goal) else self.goal
         return fill(action.Goal, resolve(data), now=self._there()[0].stamp)
 
-    def _judge(self, handle: GoalHandle, backend: Backend) -> AttemptRecord:
+    def _judge(self, handle: GoalHandle, now: Now) -> AttemptRecord:
         goal = handle.goal
         outcome, reason = goal.outcome, goal.reason
         assert outcome is not None
@@ -357,11 +354,11 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why
         elif more := self.explain(outcome, goal.result):
             reason += f"; {more}"
-        return self._record(goal, outcome, reason, backend)
+        return self._record(handle, outcome, reason, now)
 
-    def _record(self, goal: Goal, outcome: Outcome, reason: str, backend: Backend) -> AttemptRecord:
-        now = backend.now().ros
-        return AttemptRecord(self.attempt, outcome, reason, self._started, now, goal.result, goal)
+    def _record(self, handle: GoalHandle, outcome: Outcome, reason: str, now: Now) -> AttemptRecord:
+        goal, begun = handle.goal, handle.begun_at.ros
+        return AttemptRecord(handle.attempt, outcome, reason, begun, now.ros, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:
         self._outcome = record.outcome

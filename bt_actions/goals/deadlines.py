@@ -7,6 +7,8 @@ of its own, and does not know what a deadline means (goal.py).
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 from bt_actions.goals.terms import NEVER, ON_ROS_CLOCK, Event, Now
 
 
@@ -42,7 +44,7 @@ class Deadlines:
         """Return the seconds until each, the earliest first; negative where it has passed."""
         suspended = self._not_before - now.steady
         waits = [(self._left(event, now), event) for event in self._due]
-        waits.sort(key=lambda wait: wait[0])
+        waits.sort(key=itemgetter(0))
         return [(max(left, suspended), event) for left, event in waits]
 
     def take_passed(self, event: Event, now: Now) -> bool:

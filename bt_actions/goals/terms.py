@@ -45,19 +45,18 @@ class State(Enum):
     )
     DONE = "There is nothing left to do for it."
 
-    @property
-    def shown(self) -> str:
-        """The name in ``--json`` and on the terminal, which tell less finely."""
-        return _SHOWN.get(self, self.name)
+    shown: str
+    """The name in ``--json`` and on the terminal, which tell less finely."""
 
 
 MAY_STILL_BE_ACCEPTED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
 """It was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
-_SHOWN = {
-    State.REPLACED: "EXECUTING",
-    **dict.fromkeys((*MAY_STILL_BE_ACCEPTED, State.NOT_RECEIVED, State.LOST), "CANCELING"),
-}
+for _state in State:
+    _state.shown = _state.name
+for _state in *MAY_STILL_BE_ACCEPTED, State.NOT_RECEIVED, State.LOST:
+    _state.shown = "CANCELING"
+State.REPLACED.shown = "EXECUTING"
 MAY_TURN_UP = MAY_STILL_BE_ACCEPTED | {State.SENDING, State.NOT_RECEIVED, State.LOST}
 """Feedback or a status is news: it was accepted, and runs, or has run."""
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import json
 import mmap
 import os
@@ -220,16 +221,20 @@ def _gone_author(path: Path) -> Author | None:
 
 
 def _slot(goal_id: bytes, entry: Entry) -> bytes:
-    """Return what a slot holds."""
+    """Return what a slot holds, in JSON."""
+    return f'{{"goal": "{goal_id.hex()}", {_written(entry)[1:]}'.encode().ljust(LENGTH)
+
+
+@functools.lru_cache(maxsize=64)  # most goals of one action differ in their ids alone
+def _written(entry: Entry) -> str:
     plain = {
-        "goal": goal_id.hex(),
         "action": entry.action,
         "domain": entry.domain,
         "servers": sorted(each.hex() for each in entry.servers),
         "accept": min(entry.accept, KEPT_FOR),
         "lost": entry.lost,
     }
-    return json.dumps(plain).encode().ljust(LENGTH)
+    return json.dumps(plain)
 
 
 def _read(slot: bytes, author: Author, path: Path, at: int) -> Sent | OSError:

@@ -33,7 +33,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, qos_profile_action_status_default
 from rclpy.type_support import check_for_type_support
-from unique_identifier_msgs.msg import UUID
 
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, NEVER
 from bt_actions.ros.graph import servers
@@ -108,18 +107,20 @@ class RosTransport:
 
     def send(self, goal_id: bytes, goal: Any) -> None:
         """Send the goal request."""
-        request = self._impl.SendGoalService.Request(goal_id=UUID(uuid=list(goal_id)), goal=goal)
+        request = self._impl.SendGoalService.Request(goal=goal)
+        request.goal_id.uuid = list(goal_id)
         self.reachability.asked(self._ask("goal", request, goal_id))
 
     def ask_result(self, goal_id: bytes) -> None:
         """Ask for the result, which the server answers when the goal has ended."""
-        request = self._impl.GetResultService.Request(goal_id=UUID(uuid=list(goal_id)))
+        request = self._impl.GetResultService.Request()
+        request.goal_id.uuid = list(goal_id)
         self._ask("result", request, goal_id)
 
     def cancel(self, goal_id: bytes) -> None:
         """Ask the server to cancel this goal, and no other."""
         request = CancelGoal.Request()
-        request.goal_info.goal_id = UUID(uuid=list(goal_id))
+        request.goal_info.goal_id.uuid = list(goal_id)
         self.reachability.asked(self._ask("cancel", request, goal_id))
 
     def _ask(self, kind: Request, request: Any, goal_id: bytes) -> float:

@@ -32,28 +32,25 @@ class Clocks:
     def now(self) -> Now:
         """Return this moment."""
         with self._lock:  # two threads that find time simulated must not both make up for it
-            return self._now()
+            steady = time.monotonic()
+            simulated, reading = False, steady
+            try:
+                if self._clock.ros_time_is_active:
+                    simulated, reading = True, self._clock.now().nanoseconds * 1e-9
+                    if reading == 0.0:  # no /clock message yet: time stands still
+                        self._waits(steady)
+                        return Now(steady, self._last)
+            except Exception:  # noqa: BLE001 - the node was destroyed: InvalidHandle, or worse
+                simulated = False
+            if simulated != self._simulated:
+                self._simulated = simulated
+                self._offset = self._last - reading
+            self._last = reading + self._offset
+            return Now(steady, self._last)
 
     def stamp(self) -> int:
         """The node's own clock in nanoseconds, as the headers of messages have it."""
         return int(self._clock.now().nanoseconds)
-
-    def _now(self) -> Now:
-        steady = time.monotonic()
-        simulated, reading = False, steady
-        try:
-            if self._clock.ros_time_is_active:
-                simulated, reading = True, self._clock.now().nanoseconds * 1e-9
-                if reading == 0.0:  # no /clock message yet: time stands still, and will not jump
-                    self._waits(steady)
-                    return Now(steady, self._last)
-        except Exception:  # noqa: BLE001 - the node was destroyed: InvalidHandle, or worse, by version
-            simulated = False
-        if simulated != self._simulated:
-            self._simulated = simulated
-            self._offset = self._last - reading
-        self._last = reading + self._offset
-        return Now(steady, self._last)
 
     def _waits(self, steady: float) -> None:
         self._warn_at = self._warn_at or steady + MOMENT

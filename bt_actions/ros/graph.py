@@ -34,8 +34,9 @@ def is_valid(node: Node) -> bool:
     Asked without the lock of its context, which rclpy holds while it calls back on shutdown.
     """
     try:
-        with node.handle, node.context.handle:
-            return bool(node.context.handle.ok())
+        context = node.context.handle
+        with node.handle, context:
+            return bool(context.ok())
     except InvalidHandle:  # either was destroyed
         return False
 

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bt_actions.events import GoalChanged
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.traffic.handle import GoalHandle, Run, begun_in
@@ -35,11 +34,11 @@ class RunGoals:
 
     def __init__(
         self,
-        emit: Callable[[GoalChanged], None],
+        emit: Callable[..., None],
         wake: Callable[[], None],
         changed: Callable[[], None],
     ) -> None:
-        """`wake` is called where there is something to tell, or to read.
+        """`emit` is called with what a GoalChanged is made of, `wake` where there is any.
 
         `changed` is called, under the lock of the traffic, where one of ours has changed.
         """
@@ -113,6 +112,6 @@ class RunGoals:
         while self._changes:
             handle, change = self._changes.popleft()
             if handle.owner is not None:  # else its leaf was thrown away since
-                self._emit(GoalChanged(now, handle.owner, *change))
+                self._emit(now, handle.owner, *change)
         for done in [each for each in list(self._handles) if each.is_over]:
             del self._handles[done]

@@ -19,7 +19,7 @@ from py_trees.common import Duration, Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.events import Event, NodeChanged, Observer, TreeFinished, TreeStarted
+from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
 from bt_actions.running.goals import RunGoals
 from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
@@ -85,7 +85,7 @@ class TickLoop:
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
         self._observers: list[Observer] = []
         self.goals = RunGoals(
-            self._emit, wake, lambda: self._traffic.host.scheduler.add(self.watchdog)
+            self._tell_of_goal, wake, lambda: self._traffic.host.scheduler.add(self.watchdog)
         )
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
@@ -353,6 +353,10 @@ class TickLoop:
     def _tell(self, changes: dict[Behaviour, Status]) -> None:
         for node, status in changes.items() if self._observers else ():
             self._emit(NodeChanged(self._now, path_of(node), node, status, node.feedback_message))
+
+    def _tell_of_goal(self, *change: Any) -> None:
+        if self._observers:
+            self._emit(GoalChanged(*change))
 
     def _emit(self, event: Event) -> None:
         for observer in list(self._observers):

@@ -47,8 +47,8 @@ def left_near(handle: GoalHandle) -> list[GoalHandle]:
 def is_clear(handle: GoalHandle, now: float) -> bool:
     """Whether there is room at its server, and nothing that was `left_near` may run beside it."""
     endpoint = handle.endpoint
-    at_server = (each for each in endpoint.domain.open if each.action == endpoint.action)
-    in_flight = sum(each.goal.in_flight for one in at_server for each in one.goals.values())
+    at_server = [each for each in endpoint.domain.open if each.action == endpoint.action]
+    in_flight = sum([each.goal.in_flight for one in at_server for each in one.goals.values()])
     just_came = now - endpoint.watch.in_sight_since < BESIDE  # another server may be shown later
     return in_flight < IN_FLIGHT and not any(
         each.goal.outstanding

@@ -8,7 +8,6 @@ goal request that does not leave is told to the goal. All under the host's lock.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from typing import Any
 
 from bt_actions.goals.goal import Goal
@@ -16,12 +15,9 @@ from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
 from bt_actions.servers.replies import Told
 from bt_actions.traffic.admission import why_not
-from bt_actions.traffic.handle import Endpoint, GoalHandle, Standing, wake
+from bt_actions.traffic.handle import Effect, Endpoint, GoalHandle, Standing, wake
 from bt_actions.traffic.host import Entry, Host
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
-
-Effect = Callable[[GoalHandle], None]
-"""What is done for a goal."""
 
 
 class Driver:
@@ -122,8 +118,7 @@ class Driver:
             goal.reason += why_not(handle)
         if (due := goal.due_in(now)) is not None:
             host.scheduler.wake_by(now.steady + due)
-        effects = self._what_follows(handle, commands)
-        self._endpoint.domain.effects.run(partial(effect, handle) for effect in effects)
+        self._endpoint.domain.effects.run(handle, self._what_follows(handle, commands))
 
     def _what_follows(self, handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Effect]:
         """Yield what is to be done after a step of a goal, in order."""
@@ -131,12 +126,12 @@ class Driver:
         handle.standing = now
         if now.shown != before.shown:
             yield self.note
+        for command in commands:
+            yield self._commands[command]
         if now.in_the_way != before.in_the_way:
             if not handle.goal.claims_resources and handle.goal.id in self._endpoint.goals:
                 self._endpoint.domain.left[handle] = None
             yield self._wake_waiting
-        for command in commands:
-            yield self._commands[command]
         if (now.answered, now.state is State.LOST) != (before.answered, before.state is State.LOST):
             yield self._update_record
         if now.state is not before.state:

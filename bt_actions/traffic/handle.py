@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
-from bt_actions.goals.terms import NEVER, Event, State
+from bt_actions.goals.terms import NEVER, Event, Now, State
 from bt_actions.servers.presence import Server, ServerWatch
 from bt_actions.servers.replies import Replies, Told
 from bt_actions.traffic.cancel_queue import Cancels
@@ -26,6 +26,7 @@ FEEDBACK_KEPT = 100
 
 Action = tuple[Any, str]
 """Type and name."""
+_LONG_AGO = Now(NEVER, NEVER)
 
 
 class Endpoint(Listener, Scheduled, Protocol):
@@ -126,8 +127,7 @@ class GoalHandle:
     held_back_since: float | None = None
     """Since when (steady clock) its deadlines stand still, as it is paused, or not sent though a
     server is in sight (Route.holds_back)."""
-    begun_at: float = NEVER
-    """Seconds, steady clock."""
+    begun_at: Now = _LONG_AGO
     not_gone_before: float = NEVER
     """Until when (steady clock) its server does not count as gone where it is not shown. It may be
     stopped, and is shown again within LEASE, or not be discovered by a new node, which takes
@@ -222,25 +222,30 @@ def wake(handles: Iterable[GoalHandle]) -> None:
             run.tell(None)
 
 
+Effect = Callable[[GoalHandle], None]
+"""What is done for a goal."""
+
+
 class Effects:
     """What goals have decided is to be done, in that order; the caller holds the host's lock."""
 
     def __init__(self) -> None:
-        self._waiting: deque[Callable[[], None]] = deque()
+        self._waiting: deque[tuple[Effect, GoalHandle]] = deque()
         self._runs = False
 
-    def run(self, effects: Iterable[Callable[[], None]]) -> None:
-        """Do these behind what was decided before, and what is decided meanwhile behind these.
+    def run(self, handle: GoalHandle, effects: Iterable[Effect]) -> None:
+        """Do these for a goal behind what was decided before, and what is meanwhile behind these.
 
         Where that is under way, whoever has begun it does all.
         """
-        self._waiting.extend(effects)
+        self._waiting.extend([(effect, handle) for effect in effects])
         if self._runs:
             return
         self._runs = True
         try:
             while self._waiting:
-                self._waiting.popleft()()
+                effect, whose = self._waiting.popleft()
+                effect(whose)
         finally:
             self._runs = False
 

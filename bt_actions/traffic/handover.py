@@ -41,7 +41,7 @@ def take_over(endpoint: Endpoint, now: float) -> None:
 def adopt(endpoint: Endpoint, host: Host) -> None:
     """Take over what was lost, or left, at this action before, to cancel it first."""
     for handle in endpoint.domain.lost.pop(endpoint.action, []):
-        saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at
+        saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at.steady
         if handle.endpoint.participant is not endpoint.participant and not saw_it:
             # A later node need only have discovered
             until = host.steady() + (LEASE if handle.not_gone_before == NEVER else TOO_NEW)

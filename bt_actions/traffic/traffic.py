@@ -103,15 +103,16 @@ class Traffic:
         end is UNKNOWN.
         """
         with self.host.lock:
+            now = self.participant.now()
             goal = Goal(
-                self.host.new_goal_id(), endpoint.name, timeouts, self.participant.now(),
+                self.host.new_goal_id(), endpoint.name, timeouts, now,
                 resources=frozenset(self._full_name(each) for each in resources),
                 busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
             handle = GoalHandle(
                 goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback
             )
-            handle.begun_at = self.host.steady()
+            handle.begun_at = now
             endpoint.take_in(handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
             if answer is None:
@@ -178,7 +179,8 @@ class Traffic:
         now = self.host.steady()
         if self.host.closing or not admission.finds_server(handle, now):
             return False
-        self._cancel_what_is_back(handle, now)
+        if self._domain.left or self._domain.lost:
+            self._cancel_what_is_back(handle, now)
         return admission.is_clear(handle, now)
 
     def _cancel_what_is_back(self, handle: GoalHandle, now: float) -> None:
