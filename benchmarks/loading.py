@@ -64,12 +64,12 @@ def _seconds(job: Callable[[], object]) -> float:
     return took
 
 
-def both(largest: float) -> Figures:
+def both() -> Figures:
     """Each size, in turns."""
     figures = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "tree.yaml"
-        for size in [size for size in SIZES if size <= largest]:
+        for size in SIZES:
             text = text_of(size)
             path.write_text(text, encoding="utf-8")
             times = max(1, min(20, 10_000 // size))
@@ -128,7 +128,7 @@ FAMILY = Family(
         Row("11, memory", "what it keeps", "", ("memory", "kB a node"), None, 4.0, "kB a node"),
     ],
     {
-        "both": lambda: processes.side("loading", "both", SIZES[-1]),
+        "both": lambda: processes.side("loading", "both"),
         "memory": lambda: processes.side("loading", "memory"),
     },
 )
