@@ -19,7 +19,6 @@ from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
-from bt_actions.goals.terms import Now
 from bt_actions.messages.conversion import MessageError, fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
@@ -243,9 +242,8 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
             if not decided:
                 self.feedback_message = self._in_words(handle)
                 return Status.RUNNING
-            now = backend.now()
-            record = self._judge(handle, now)
-            again = not self._is_over() and self._attempts.again(record, now, backend.randomness)
+            record = self._judge(handle, backend)
+            again = not self._is_over() and self._attempts.again(record, backend.randomness)
             if self._is_over():
                 return Status.FAILURE
             if not again:
@@ -261,7 +259,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
             outcome, reason = handle.goal.outcome, handle.goal.reason
             if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
                 outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
-            self.history.append(self._record(handle, outcome, reason, backend.now()))
+            self.history.append(self._record(handle, outcome, reason, backend))
             self.feedback_message = f"{outcome}: {reason}"
         self._outcome = self.history[-1].outcome  # also where it stops in the pause before a retry
 
@@ -345,7 +343,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         data = self.goal() if callable(self.goal) else self.goal
         return fill(action.Goal, resolve(data), now=self._there()[0].stamp)
 
-    def _judge(self, handle: GoalHandle, now: Now) -> AttemptRecord:
+    def _judge(self, handle: GoalHandle, backend: Backend) -> AttemptRecord:
         goal = handle.goal
         outcome, reason = goal.outcome, goal.reason
         assert outcome is not None
@@ -354,11 +352,13 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why
         elif more := self.explain(outcome, goal.result):
             reason += f"; {more}"
-        return self._record(handle, outcome, reason, now)
+        return self._record(handle, outcome, reason, backend)
 
-    def _record(self, handle: GoalHandle, outcome: Outcome, reason: str, now: Now) -> AttemptRecord:
-        goal, begun = handle.goal, handle.begun_at.ros
-        return AttemptRecord(handle.attempt, outcome, reason, begun, now.ros, goal.result, goal)
+    def _record(
+        self, handle: GoalHandle, outcome: Outcome, reason: str, backend: Backend
+    ) -> AttemptRecord:
+        goal, begun, ended = handle.goal, handle.begun_at.ros, backend.now().ros
+        return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:
         self._outcome = record.outcome

@@ -70,7 +70,7 @@ class Attempts:
         """The number of the attempt that is under way or comes next, from 1."""
         return len(self.history) + 1
 
-    def again(self, record: AttemptRecord, now: Now, chance: random.Random) -> bool:
+    def again(self, record: AttemptRecord, chance: random.Random) -> bool:
         """File `record`; return whether there will be another attempt after a pause."""
         self.history.append(record)
         why_not = self._why_not(record) if len(self.history) < self.retry.attempts else ""
@@ -78,8 +78,8 @@ class Attempts:
             record.reason += f" (not tried again: {why_not})"
         if why_not is not None:
             return False
-        self._resume_at = now.ros + self.retry.pause(len(self.history), chance)
-        self._ros_seen = now.ros
+        self._resume_at = record.ended + self.retry.pause(len(self.history), chance)
+        self._ros_seen = record.ended
         return True
 
     def pause_left(self, now: Now, *, look_only: bool = False) -> float:

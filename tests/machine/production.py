@@ -358,8 +358,9 @@ class Caller:
         assert outcome is not None
         if outcome is Outcome.SUCCEEDED and self.takes("unexpected"):
             outcome = Outcome.UNEXPECTED_RESULT
-        record = AttemptRecord(attempts.attempt, outcome, goal.reason, 0.0, 0.0, None, goal)
-        again = attempts.again(record, self.world.now, self._chance)
+        ended = self.world.now.ros
+        record = AttemptRecord(attempts.attempt, outcome, goal.reason, 0.0, ended, None, goal)
+        again = attempts.again(record, self._chance)
         self.judge.noted(leaf, self.seen[goal.id], record, again)
         leaf.handle = None
         if not again:

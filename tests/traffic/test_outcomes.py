@@ -568,6 +568,18 @@ class TestRetry:
         assert first >= 0.2
         assert second >= 0.6
 
+    def test_a_pause_begins_when_the_result_has_been_judged(self, world: World) -> None:
+        world.serve()
+        judged: list[float] = []
+
+        def slowly(result: Any) -> bool:
+            world.network.timeline.now += 2.0
+            judged.append(world.network.now())
+            return len(judged) > 1
+
+        leaf = world.run(MoveRobot("m", 0.1, retry=Retry(2, backoff=1.0), expect=slowly))
+        assert leaf.history[1].started >= judged[0] + 1.0
+
     @pytest.mark.parametrize("when", ["result.status == 3", lambda result: result.status == 3])
     @pytest.mark.parametrize("holds", [True, False])
     def test_when_decides_over_the_result(self, world: World, when: Any, holds: bool) -> None:
