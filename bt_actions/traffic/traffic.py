@@ -179,7 +179,7 @@ class Traffic:
         now = self.host.steady()
         if self.host.closing or not admission.finds_server(handle, now):
             return False
-        if self._domain.left or self._domain.lost:
+        if handle.endpoint.domain.left or self._domain.lost:
             self._cancel_what_is_back(handle, now)
         return admission.is_clear(handle, now)
 
