@@ -52,11 +52,12 @@ class State(Enum):
 MAY_STILL_BE_ACCEPTED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
 """It was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
+_SHOWN = {
+    State.REPLACED: "EXECUTING",
+    **dict.fromkeys((*MAY_STILL_BE_ACCEPTED, State.NOT_RECEIVED, State.LOST), "CANCELING"),
+}
 for _state in State:
-    _state.shown = _state.name
-for _state in *MAY_STILL_BE_ACCEPTED, State.NOT_RECEIVED, State.LOST:
-    _state.shown = "CANCELING"
-State.REPLACED.shown = "EXECUTING"
+    _state.shown = _SHOWN.get(_state, _state.name)
 MAY_TURN_UP = MAY_STILL_BE_ACCEPTED | {State.SENDING, State.NOT_RECEIVED, State.LOST}
 """Feedback or a status is news: it was accepted, and runs, or has run."""
 

@@ -116,6 +116,8 @@ class GoalHandle:
     """Which run it belongs to: the last one that ticked its leaf; None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
+    begun_at: Now = _LONG_AGO
+    """When it was wished for; long ago where nobody knows."""
     message: Any = None
     """What is to be sent, until it is."""
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
@@ -127,7 +129,6 @@ class GoalHandle:
     held_back_since: float | None = None
     """Since when (steady clock) its deadlines stand still, as it is paused, or not sent though a
     server is in sight (Route.holds_back)."""
-    begun_at: Now = _LONG_AGO
     not_gone_before: float = NEVER
     """Until when (steady clock) its server does not count as gone where it is not shown. It may be
     stopped, and is shown again within LEASE, or not be discovered by a new node, which takes

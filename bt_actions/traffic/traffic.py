@@ -110,9 +110,8 @@ class Traffic:
                 busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
             handle = GoalHandle(
-                goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback
+                goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback, now
             )
-            handle.begun_at = now
             endpoint.take_in(handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
             if answer is None:

@@ -100,8 +100,7 @@ for _ in range(200):
     time.sleep(0.005)
 print("went on", flush=True)
 input()
-while log._lines.unfinished_tasks:
-    time.sleep(0.01)
+log._lines.join()
 os._exit(0)
 """
 
