@@ -28,6 +28,7 @@ COMMANDS = {
     "sim": "sim",
     "cleanup": "cleanup",
     "check": "check",
+    "interfaces": "interfaces",
     "explain": "explain",
     "format": "format_trees",
     "schema": "schema",

@@ -1,0 +1,80 @@
+"""The text of an interface, with that of the messages in it, as `ros2 interface show` prints it."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from bt_actions.messages.interfaces import UnknownInterface, installed
+from bt_actions.utilities.suggest import did_you_mean
+
+_FIELD = re.compile(r"\s*([A-Za-z]\w*(?:/[A-Z]\w*)?)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w+")
+
+
+def all_interfaces() -> list[str]:
+    """The full names of all installed actions, services and messages."""
+    return sorted(name for kind in ("action", "srv", "msg") for name in installed(kind))  # type: ignore[arg-type]
+
+
+def full_name(wanted: str) -> str:
+    """The interface that `Fetch`, `my_msgs/Fetch` or `my_msgs/action/Fetch` names.
+
+    Raises UnknownInterface where there is none, or more than one.
+    """
+    names = all_interfaces()
+    package, _, short = wanted.rpartition("/")
+    found = [
+        name
+        for name in names
+        if name == wanted
+        or (name.rpartition("/")[2] == short and package in ("", name.partition("/")[0]))
+    ]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise UnknownInterface(f"{wanted!r} is more than one type, name it in full: {', '.join(found)}")
+    known = {each for name in names for each in (name, name.rpartition("/")[2])}
+    raise UnknownInterface(f"no installed package has the type {wanted!r}{did_you_mean(wanted, known)}")
+
+
+def definition(name: str, *, all_comments: bool = False) -> Iterator[str]:
+    """The lines of an interface, given in full, each message in it below its field, indented.
+
+    Comments of messages in it are left out, unless `all_comments`. Raises UnknownInterface where
+    the file is not installed.
+    """
+    package, kind, short = name.split("/")
+    return _lines(package, kind, short, "", comments=True, below=all_comments)
+
+
+def _lines(
+    package: str, kind: str, short: str, indent: str, *, comments: bool, below: bool
+) -> Iterator[str]:
+    text = _text(package, kind, short)
+    for line in text.splitlines():
+        shown = line.rstrip() if comments else re.sub(r"(^|\s+)#.*", "", line).rstrip()
+        if shown or (comments and not indent):
+            yield f"{indent}{shown}".rstrip()
+        field = _FIELD.match(line)
+        if field is None or not re.search(r"(^|/)[A-Z]", field[1]):
+            continue
+        owner, _, message = field[1].rpartition("/")
+        yield from _lines(
+            owner or package, "msg", message, f"{indent}\t", comments=below, below=below
+        )
+
+
+def _text(package: str, kind: str, short: str) -> str:
+    for entry in (*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix):
+        for suffix in (kind, "idl"):
+            path = Path(entry or ".") / "share" / package / kind / f"{short}.{suffix}"
+            if path.is_file():
+                return path.read_text(encoding="utf-8")
+    raise UnknownInterface(
+        f"{package}/{kind}/{short} is installed without its file share/{package}/{kind}/{short}.{kind}"
+    )
+
+

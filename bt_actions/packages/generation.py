@@ -1,0 +1,128 @@
+"""One package by rosidl and CMake, into a prefix of its own; nothing is written beside its sources."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from bt_actions.packages import PackageError
+from bt_actions.packages.environment import Tools, cache, variables
+from bt_actions.packages.order import needs
+from bt_actions.packages.sources import Source
+
+_REPAIR = Path(__file__).with_name("ros_wheels.cmake")
+_CMAKE_LISTS = """\
+cmake_minimum_required(VERSION 3.22)
+project({name} VERSION {version})
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+{finds}
+rosidl_generate_interfaces(${{PROJECT_NAME}}
+  {files}
+  DEPENDENCIES {needs}
+  SKIP_GROUP_MEMBERSHIP_CHECK
+)
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+"""
+Progress = Callable[[str, str], None]
+"""Hears of each step that begins, and then how far it is, "12 of 340"."""
+_COUNT = re.compile(r"\[(\d+)/(\d+)\]")
+
+
+def generate(
+    source: Source, prefixes: Sequence[Path], tools: Tools, work: Path, progress: Progress
+) -> Path:
+    """Generate, compile and install `source` into a prefix in `work`, which is returned.
+
+    Raises PackageError, which names the log.
+    """
+    lists, build, prefix = work / "source", work / "build", work / "prefix"
+    lists.mkdir(parents=True)
+    shutil.copy(source.folder / "package.xml", lists)
+    for file in source.files:
+        (lists / file).parent.mkdir(exist_ok=True)
+        shutil.copy(source.folder / file, lists / file)
+    packages = needs(source)
+    (lists / "CMakeLists.txt").write_text(
+        _CMAKE_LISTS.format(
+            name=source.name,
+            version=source.version,
+            finds="\n".join(f"find_package({each} REQUIRED)" for each in packages),
+            files="\n  ".join(f'"{file}"' for file in source.files),
+            needs=" ".join(packages),
+        )
+    )
+    environment = variables(tools, tuple(prefixes))
+    cmake = shutil.which("cmake", path=environment["PATH"])
+    if cmake is None or shutil.which("ninja", path=environment["PATH"]) is None:
+        raise PackageError(
+            f"there is no CMake or no Ninja in {tools.prefix}: delete that folder, and try again"
+        )
+    configure = [
+        cmake, "-S", lists, "-B", build, "-G", "Ninja",
+        f"-DCMAKE_PROJECT_INCLUDE={_REPAIR}",
+        f"-DCMAKE_INSTALL_PREFIX={prefix}",
+        f"-DPython3_EXECUTABLE={tools.python}",
+        "-DPYTHON_INSTALL_DIR=python",
+        "-DCMAKE_BUILD_TYPE=Release",
+        "-DCMAKE_SKIP_INSTALL_RPATH=ON",
+        "-DBUILD_TESTING=OFF",
+    ]  # fmt: skip
+    log = cache() / f"{source.name}.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    log.unlink(missing_ok=True)
+    for step, command in (
+        ("configuring", configure),
+        ("compiling", [cmake, "--build", build]),
+        ("collecting", [cmake, "--install", build, "--strip"]),
+    ):
+        progress(f"{source.name}: {step}", "")
+        if not _run(command, environment, log, partial(progress, f"{source.name}: {step}")):
+            raise PackageError(
+                f"{step} {source.name} failed: {_reason(log)}\nAll that CMake said is in {log}"
+            )
+    log.unlink()
+    return prefix
+
+
+def _run(
+    command: Sequence[str | Path], environment: dict[str, str], log: Path, done: Callable[[str], None]
+) -> bool:
+    """Run one step; tell how far it is. It ends with this process's Ctrl-C, and all it started."""
+    with (
+        log.open("a", encoding="utf-8") as file,
+        subprocess.Popen(
+            command, env=environment, text=True, errors="replace", start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        ) as process,
+    ):  # fmt: skip
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                file.write(line)
+                if found := _COUNT.match(line):
+                    done(f"{found[1]} of {found[2]}")
+            return process.wait() == 0
+        except BaseException:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGTERM)
+            raise
+
+
+def _reason(log: Path) -> str:
+    """The line of a log that most likely says what is wrong."""
+    lines = [line.strip() for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
+    for number, line in enumerate(lines):
+        if re.match(r"CMake Error", line):
+            return " ".join(lines[number + 1 : number + 3])[:300]
+        if re.search(r"\berror\b:?", line, re.IGNORECASE):
+            return line[:300]
+    return (lines or ["nothing was said"])[-1][:300]
