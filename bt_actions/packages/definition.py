@@ -16,7 +16,7 @@ _FIELD = re.compile(r"\s*([A-Za-z]\w*(?:/[A-Z]\w*)?)(?:<=\d+)?(?:\[[^\]]*\])?\s+
 
 def all_interfaces() -> list[str]:
     """The full names of all installed actions, services and messages."""
-    return sorted(name for kind in ("action", "srv", "msg") for name in installed(kind))  # type: ignore[arg-type]
+    return sorted(name for kind in ("action", "srv", "msg") for name in installed(kind))
 
 
 def full_name(wanted: str) -> str:
@@ -35,9 +35,13 @@ def full_name(wanted: str) -> str:
     if len(found) == 1:
         return found[0]
     if found:
-        raise UnknownInterface(f"{wanted!r} is more than one type, name it in full: {', '.join(found)}")
+        raise UnknownInterface(
+            f"{wanted!r} is more than one type, name it in full: {', '.join(found)}"
+        )
     known = {each for name in names for each in (name, name.rpartition("/")[2])}
-    raise UnknownInterface(f"no installed package has the type {wanted!r}{did_you_mean(wanted, known)}")
+    raise UnknownInterface(
+        f"no installed package has the type {wanted!r}{did_you_mean(wanted, known)}"
+    )
 
 
 def definition(name: str, *, all_comments: bool = False) -> Iterator[str]:
@@ -55,7 +59,7 @@ def _lines(
 ) -> Iterator[str]:
     text = _text(package, kind, short)
     for line in text.splitlines():
-        shown = line.rstrip() if comments else re.sub(r"(^|\s+)#.*", "", line).rstrip()
+        shown = line.rstrip() if comments else re.sub(r"\s*#.*", "", line).rstrip()
         if shown or (comments and not indent):
             yield f"{indent}{shown}".rstrip()
         field = _FIELD.match(line)
@@ -74,7 +78,6 @@ def _text(package: str, kind: str, short: str) -> str:
             if path.is_file():
                 return path.read_text(encoding="utf-8")
     raise UnknownInterface(
-        f"{package}/{kind}/{short} is installed without its file share/{package}/{kind}/{short}.{kind}"
+        f"{package}/{kind}/{short} is installed without its file share/{package}/{kind}/"
+        f"{short}.{kind}"
     )
-
-

@@ -1,4 +1,4 @@
-"""One package by rosidl and CMake, into a prefix of its own; nothing is written beside its sources."""
+"""One package by rosidl and CMake, into a prefix of its own; its sources are left alone."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def generate(
         raise PackageError(
             f"there is no CMake or no Ninja in {tools.prefix}: delete that folder, and try again"
         )
-    configure = [
+    configure: list[str | Path] = [
         cmake, "-S", lists, "-B", build, "-G", "Ninja",
         f"-DCMAKE_PROJECT_INCLUDE={_REPAIR}",
         f"-DCMAKE_INSTALL_PREFIX={prefix}",
@@ -79,11 +79,12 @@ def generate(
     log = cache() / f"{source.name}.log"
     log.parent.mkdir(parents=True, exist_ok=True)
     log.unlink(missing_ok=True)
-    for step, command in (
+    steps: list[tuple[str, list[str | Path]]] = [
         ("configuring", configure),
         ("compiling", [cmake, "--build", build]),
         ("collecting", [cmake, "--install", build, "--strip"]),
-    ):
+    ]
+    for step, command in steps:
         progress(f"{source.name}: {step}", "")
         if not _run(command, environment, log, partial(progress, f"{source.name}: {step}")):
             raise PackageError(
@@ -94,7 +95,10 @@ def generate(
 
 
 def _run(
-    command: Sequence[str | Path], environment: dict[str, str], log: Path, done: Callable[[str], None]
+    command: Sequence[str | Path],
+    environment: dict[str, str],
+    log: Path,
+    done: Callable[[str], None],
 ) -> bool:
     """Run one step; tell how far it is. It ends with this process's Ctrl-C, and all it started."""
     with (

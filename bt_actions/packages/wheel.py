@@ -1,4 +1,4 @@
-"""A prefix that CMake has filled becomes a wheel: what running needs, and what building upon it needs.
+"""A filled prefix becomes a wheel: what running needs, and what building upon it needs.
 
 The pypa's `wheel`, in the build environment, records and packs it.
 """
@@ -48,7 +48,7 @@ def pack(
         f"Wheel-Version: 1.0\nGenerator: {GENERATOR}\nRoot-Is-Purelib: false\nTag: {_tag()}\n"
     )
     out.mkdir(parents=True, exist_ok=True)
-    command = [tools.python, "-m", "wheel", "pack", root, "--dest-dir", out]
+    command = [str(tools.python), "-m", "wheel", "pack", str(root), "--dest-dir", str(out)]
     done = subprocess.run(command, env=variables(tools), capture_output=True, text=True)
     if done.returncode != 0:
         raise PackageError(f"{source.name} could not be packed: {done.stderr.strip()[-300:]}")

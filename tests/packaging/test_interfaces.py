@@ -112,11 +112,21 @@ class TestWheel:
         for source in sources:
             assert installed[source.name].read_text() == source.read_text()
 
-    def test_it_holds_what_running_needs_and_nothing_for_building(self, package: str) -> None:
+    def test_it_holds_what_running_needs_and_what_building_upon_it_needs(
+        self, package: str
+    ) -> None:
         prefix = Path(sys.prefix).resolve()
         paths = [Path(file.locate()).resolve() for file in installed_interfaces(package)]
         names = {str(path.relative_to(prefix)) for path in paths}
         index = "share/ament_index/resource_index"
         assert {f"{index}/packages/{package}", f"{index}/rosidl_interfaces/{package}"} <= names
         assert f"lib/lib{package}__rosidl_typesupport_fastrtps_c.so" in names
-        assert not [name for name in names if name.endswith((".h", ".hpp", ".c", ".cmake", ".sh"))]
+        assert f"share/{package}/cmake/{package}Config.cmake" in names
+        assert any(name.startswith(f"include/{package}/") for name in names)
+        assert not [name for name in names if name.endswith(".sh")]
+
+    def test_nothing_in_it_names_the_machine_that_built_it(self, package: str) -> None:
+        for file in installed_interfaces(package):
+            if file.suffix == ".cmake":
+                text = Path(file.locate()).read_text()
+                assert not re.search(r'[";](/|[A-Z]:)\w', text), file

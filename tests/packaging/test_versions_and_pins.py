@@ -7,11 +7,12 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from importlib.metadata import distributions
 from pathlib import Path
-from typing import Any
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+
+from bt_actions.packages.environment import pins
 
 ROOT = Path(__file__).resolve().parents[2]
 INTERFACES = sorted(path.parent for path in ROOT.glob("interfaces/*/package.xml"))
@@ -35,15 +36,8 @@ def development() -> list[Requirement]:
     return requirements(setup_cfg()["options.extras_require"]["dev"])
 
 
-def pyprojects() -> list[dict[str, Any]]:
-    return [tomllib.loads((folder / "pyproject.toml").read_text()) for folder in INTERFACES]
-
-
-def interfaces() -> list[Requirement]:
-    lines = pyprojects()[0]["build-system"]["requires"]
-    for pyproject in pyprojects():
-        lines += pyproject["project"]["dependencies"]
-    return [Requirement(line) for line in lines]
+def build_environment() -> list[Requirement]:
+    return [Requirement(line) for line in pins()]
 
 
 def constraints() -> dict[str, str]:
@@ -89,12 +83,18 @@ def test_the_interfaces_of_this_very_version_are_required() -> None:
         assert exact_version(required[name]) == version
 
 
-def test_all_interfaces_are_built_with_the_same_tools() -> None:
+def test_our_interfaces_are_built_by_the_one_build() -> None:
     assert len(INTERFACES) == 2
-    assert len({str(pyproject["build-system"]) for pyproject in pyprojects()}) == 1
+    backend = (ROOT / "interfaces" / "backend.py").resolve()
+    for folder in INTERFACES:
+        build = tomllib.loads((folder / "pyproject.toml").read_text())["build-system"]
+        assert build == {"requires": [], "build-backend": "backend", "backend-path": ["."]}
+        assert (folder / "backend.py").resolve() == backend
 
 
-@pytest.mark.parametrize("source", [runtime, development, interfaces], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    "source", [runtime, development, build_environment], ids=lambda f: f.__name__
+)
 def test_every_ros_package_is_pinned_to_the_version_in_the_constraints(
     source: Callable[[], list[Requirement]],
 ) -> None:
@@ -106,7 +106,7 @@ def test_every_ros_package_is_pinned_to_the_version_in_the_constraints(
 
 def test_the_constraints_fit_what_is_required() -> None:
     pinned = constraints()
-    for requirement in runtime() + development() + interfaces():
+    for requirement in runtime() + development() + build_environment():
         if requirement.name not in {folder.name for folder in INTERFACES}:
             assert pinned[canonicalize_name(requirement.name)] in requirement.specifier
 

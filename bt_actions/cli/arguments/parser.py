@@ -43,7 +43,10 @@ class Parser(argparse.ArgumentParser):
             self.error("which command? `bt-actions --help` lists them")
         args, unknown = self.parse_known_args(arguments)
         if unknown:
-            parser = self.commands[command]
+            parser: argparse.ArgumentParser = self
+            for word in arguments:
+                if isinstance(parser, Parser) and word in parser.commands:
+                    parser = parser.commands[word]
             assert isinstance(parser, Parser)
             parser.refuse(unknown)
         return args

@@ -85,6 +85,12 @@ def _command(name: str, text: str, parser: argparse.ArgumentParser) -> Command:
             )  # fmt: skip
         elif choices:
             words = choices
+            if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001
+                files = True
+                below = [_command(name, text, each) for name, each in action.choices.items()]
+                options += {
+                    option.names: option for each in below for option in each.options
+                }.values()
         elif action.metavar == "TREE":
             words, files = tuple(_inputs_of_trees()), True
         elif action.metavar == "CODE":

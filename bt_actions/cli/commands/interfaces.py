@@ -30,10 +30,10 @@ examples:
   bt-actions interfaces build navigation2/nav2_msgs
   bt-actions interfaces build src/my_msgs src/other_msgs -o wheels
 
-A package is a folder with package.xml, CMakeLists.txt, and action/, srv/ or msg/. Packages beside it
-that it uses are built with it. The first call downloads what it builds with, into the cache of the
-user. Where ROS 2 is installed, colcon builds the same folder. Exit codes: 0, or 2 where a package
-cannot be built or installed; nothing is installed then.
+A package is a folder with package.xml, CMakeLists.txt, and action/, srv/ or msg/. Packages beside
+it that it uses are built with it. The first call downloads its tools, into the user's cache. Where
+ROS 2 is installed, colcon builds the same folder. Exit codes: 0, or 2 where a package cannot be
+built or installed; nothing is installed then.
 """
 _SHOW = """\
 examples:
@@ -52,7 +52,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "interfaces",
         help="build message packages of your own, and show types",
-        description="Build message packages of your own without a ROS installation, and show types.",
+        description="Build message packages without a ROS installation, and show types.",
         epilog=_EPILOG,
     )
     below = parser.add_subparsers(title="commands", dest="action", metavar="COMMAND", required=True)
