@@ -17,6 +17,7 @@ import sysconfig
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution
+from importlib.util import find_spec
 from pathlib import Path
 
 from bt_actions.packages import PackageError
@@ -56,13 +57,17 @@ def installer(python: Path | None = None) -> list[str]:
     Raises PackageError where there is neither.
     """
     uv = shutil.which("uv")
-    if subprocess.run([sys.executable, "-c", "import pip"], capture_output=True).returncode == 0:
+    if _has_pip():
         where = [] if python is None else ["--python", str(python)]
         command = [sys.executable, "-m", "pip", "--disable-pip-version-check", *where, "install"]
         return [*command, "--no-input"]
     if uv is not None:
         return [uv, "pip", "install", "--python", str(python or sys.executable)]
     raise PackageError(_NO_PIP)
+
+
+def _has_pip() -> bool:
+    return find_spec("pip") is not None
 
 
 def build_environment(say: Callable[[str], None], *, network: bool) -> Tools:
