@@ -34,11 +34,15 @@ def build_wheel(
 ) -> str:
     """Build the package in the current folder; return the name of its wheel."""
     _load()
+    from bt_actions.packages import PackageError
     from bt_actions.packages.building import build_wheels
     from bt_actions.packages.environment import own_tools
     from bt_actions.packages.order import in_order
 
-    tools = own_tools()
-    sources = in_order([Path.cwd()], [tools.prefix])
-    (wheel,) = build_wheels(sources, tools, [], Path(wheel_directory), lambda *_: None)
+    try:
+        tools = own_tools()
+        sources = in_order([Path.cwd()], [tools.prefix])
+        (wheel,) = build_wheels(sources, tools, [], Path(wheel_directory), lambda *_: None)
+    except PackageError as error:
+        raise SystemExit(f"error: {error}") from None
     return wheel.name

@@ -76,9 +76,7 @@ def generate(
         "-DCMAKE_SKIP_INSTALL_RPATH=ON",
         "-DBUILD_TESTING=OFF",
     ]  # fmt: skip
-    log = cache() / f"{source.name}.log"
-    log.parent.mkdir(parents=True, exist_ok=True)
-    log.unlink(missing_ok=True)
+    log = work / "log"
     steps: list[tuple[str, list[str | Path]]] = [
         ("configuring", configure),
         ("compiling", [cmake, "--build", build]),
@@ -87,10 +85,12 @@ def generate(
     for step, command in steps:
         progress(f"{source.name}: {step}", "")
         if not _run(command, environment, log, partial(progress, f"{source.name}: {step}")):
+            kept = cache() / f"{source.name}.log"
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(log, kept)
             raise PackageError(
-                f"{step} {source.name} failed: {_reason(log)}\nAll that CMake said is in {log}"
+                f"{step} {source.name} failed: {_reason(log)}\nAll that CMake said is in {kept}"
             )
-    log.unlink()
     return prefix
 
 

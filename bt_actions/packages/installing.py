@@ -41,7 +41,14 @@ def check_names(sources: Iterable[Source]) -> None:
 
 def install(wheels: Iterable[Path]) -> None:
     """Install `wheels` at once; a Ctrl-C waits for its end. Raises PackageError."""
-    command = [*installer(), "--quiet", "--no-deps", "--force-reinstall", *map(str, wheels)]
+    command = [
+        *installer(),
+        "--quiet",
+        "--no-index",
+        "--no-deps",
+        "--force-reinstall",
+        *map(str, wheels),
+    ]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
     ) as process:

@@ -62,6 +62,9 @@ def test_modules_the_page_the_lease_and_the_mark_of_a_typed_package_are_in_the_w
     page = {str(path.relative_to(ROOT)) for path in package.glob("render/page*.*")}
     assert {Path(path).suffix for path in page} == {".py", ".html", ".css", ".js"}
     others = {"bt_actions/py.typed", str(SHORT_LEASE.relative_to(ROOT))}
+    others |= {
+        f"bt_actions/packages/{name}" for name in ("build_environment.txt", "ros_wheels.cmake")
+    }
     assert sources | page | others <= set(wheel.namelist())
 
 

@@ -178,8 +178,8 @@ PAGES: Mapping[str, Page] = {
         tree("inputs: {level: float64}\nroot: {check: $level > 0.2}\n"),
     ),
     "BT203": Page(
-        "The ROS message that this is about has no field of this name. `ros2 interface show` "
-        "prints what it has.",
+        "The ROS message that this is about has no field of this name. `bt-actions interfaces show "
+        "TYPE` prints what it has.",
         moving("root:\n  move: Go\n  goal: {distnace: 2.0}\n"),
         moving("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
     ),
@@ -191,7 +191,9 @@ PAGES: Mapping[str, Page] = {
     ),
     "BT205": Page(
         "The package of this action, service or message is not installed here, or has none of this"
-        " name. Source the workspace that it is built in, or check with --no-types.",
+        " name. `bt-actions interfaces list` prints what there is. Source the workspace that it is "
+        "built in; without a workspace, `bt-actions interfaces build PATH` builds and installs the "
+        "package from its sources. Or check with --no-types.",
         "tree: example\n" + MOVE.replace("MoveRobot", "MoveRobt")
         + "root: {move: Go, goal: {distance: 1.0}}\n",
         moving("root: {move: Go, goal: {distance: 1.0}}\n"),
