@@ -2,6 +2,7 @@
 
 import configparser
 import re
+import sysconfig
 import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
@@ -57,10 +58,13 @@ def package_xml(folder: Path) -> tuple[str, str]:
 
 
 def installed_by_pip() -> dict[str, str]:
-    """Without the second, bare name (rclpy beside ros-rclpy) that each ROS wheel carries."""
+    """Without the second, bare name (rclpy beside ros-rclpy) that each ROS wheel carries.
+
+    And without what setuptools brings along and puts on sys.path when it is imported.
+    """
     return {
         canonicalize_name(found.name): found.version
-        for found in distributions()
+        for found in distributions(path=[sysconfig.get_path("purelib")])
         if (found.read_text("INSTALLER") or "").strip() == "pip"
     }
 
