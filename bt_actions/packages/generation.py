@@ -88,8 +88,9 @@ def generate(
             kept = cache() / f"{source.name}.log"
             kept.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(log, kept)
+            reason = _reason(log).replace(str(lists), str(source.folder))
             raise PackageError(
-                f"{step} {source.name} failed: {_reason(log)}\nAll that CMake said is in {kept}"
+                f"{step} {source.name} failed: {reason}\nAll that CMake said is in {kept}"
             )
     return prefix
 
@@ -122,11 +123,15 @@ def _run(
 
 
 def _reason(log: Path) -> str:
-    """The line of a log that most likely says what is wrong."""
-    lines = [line.strip() for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
+    """What a log gives as the reason: the first exception of Python, or error of a compiler."""
+    lines = [line for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
     for number, line in enumerate(lines):
-        if re.match(r"CMake Error", line):
-            return " ".join(lines[number + 1 : number + 3])[:300]
-        if re.search(r"\berror\b:?", line, re.IGNORECASE):
+        after = lines[number + 1 :]
+        if line.startswith("Traceback"):
+            after = after[next((n for n, each in enumerate(after) if each[0] != " "), 0) :]
+            return " ".join(after[:2])[:300]
+        if line.startswith("CMake Error"):
+            return " ".join(each.strip() for each in after[:2])[:300]
+        if re.search(r": (fatal )?error: ", line):
             return line[:300]
     return (lines or ["nothing was said"])[-1][:300]

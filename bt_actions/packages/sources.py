@@ -164,10 +164,12 @@ def _read_line(package: str, line: str, place: str) -> list[tuple[str | None, st
     """The field or constant of a line, if any: the message it uses, if any, and its name."""
     from rosidl_adapter.parser import InvalidFieldDefinition, parse_message_string
 
+    if line[:1].isspace() and line.strip() and not line.lstrip().startswith("#"):
+        raise PackageError(f"{place}: a field begins its line, without spaces before it")
     try:
         # Its complaints go to standard error besides.
         with contextlib.redirect_stderr(io.StringIO()):
-            spec = parse_message_string(package, "Line", line.strip())
+            spec = parse_message_string(package, "Line", line)
     except InvalidFieldDefinition as error:
         raise PackageError(f"{place}: {str(error).strip()!r} has a type and no name") from error
     except Exception as error:  # the parser raises what it likes

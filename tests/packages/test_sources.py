@@ -65,6 +65,7 @@ def test_the_files_are_those_that_cmake_names_or_all(
         ("srv/Do.srv", "int32 a\n", "srv/Do.srv: it has no lines ---, and a .srv file has 1"),
         ("msg/Do.msg", "int32 a\n---\n", "msg/Do.msg: it has 1 line ---, and a .msg file has none"),
         ("msg/Do.msg", "# a\n\nint32\n", "msg/Do.msg:3: 'int32' has a type and no name"),
+        ("msg/Do.msg", "\n  # fine\n  int32 a\n", "msg/Do.msg:3: a field begins its line"),
         ("msg/Do.msg", "int32 Wrong\n", "msg/Do.msg:1: 'Wrong' is an invalid field name"),
         ("msg/Do.msg", "int33 a\n", "msg/Do.msg:1: 'int33' is an invalid message name"),
         ("msg/Do.msg", "uint8 A=300\n", "msg/Do.msg:1: value '300' can not be converted"),
