@@ -92,7 +92,7 @@ def build_environment(say: Callable[[str], None], *, network: bool) -> Tools:
             f"the build environment is missing: {folder} is to hold the {len(pins())} packages "
             f"that {PINS} lists.\nRun it once without --no-network, which downloads them."
         )
-    with _alone(folder.with_suffix(".lock"), say):
+    with _alone(folder.parent / f"{folder.name}.lock", say):
         if not ready.exists():
             command = installer(tools.python)
             say(f"making the build environment once, of {len(pins())} packages: {folder}")

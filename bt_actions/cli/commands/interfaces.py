@@ -27,7 +27,7 @@ examples:
 _BUILD = """\
 examples:
   bt-actions interfaces build my_msgs
-  bt-actions interfaces build navigation2/nav2_msgs
+  bt-actions interfaces build navigation2/nav2_msgs geographic_info/geographic_msgs
   bt-actions interfaces build src/my_msgs src/other_msgs -o wheels
 
 A package is a folder with package.xml, CMakeLists.txt, and action/, srv/ or msg/. Packages beside
