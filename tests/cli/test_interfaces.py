@@ -103,3 +103,13 @@ def test_what_is_not_there_is_said_on_one_line(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert message in refused(capsys, *arguments)
+
+
+@pytest.mark.parametrize("command", ["build", "show", "list"])
+def test_each_command_below_has_a_help_text_with_an_example(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(["interfaces", command, "--help"])
+    assert exit_.value.code == 0
+    assert f"\n  bt-actions interfaces {command} " in capsys.readouterr().out
