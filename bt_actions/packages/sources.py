@@ -11,6 +11,7 @@ import io
 import re
 import xml.etree.ElementTree as ET  # nosec B405
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from bt_actions.packages import PackageError
@@ -62,9 +63,17 @@ def read_source(folder: Path) -> Source:
         raise PackageError(f"{where}: <version> is {version!r}: it is three numbers, as in 1.2.0")
     files = _files(folder)
     uses: dict[str, str] = {}
+    graph: dict[str, set[str]] = {}
     for file in files:
-        for used, place in _uses(name, folder, file).items():
-            uses.setdefault(used, place)
+        of_file = _uses(name, folder, file)
+        uses = of_file | uses
+        if file.startswith("msg/"):
+            graph[f"{name}/{Path(file).stem}"] = set(of_file)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        circle = " holds ".join(reversed(error.args[1]))
+        raise PackageError(f"{folder}: a message cannot hold itself: {circle}") from error
     return Source(
         folder=folder,
         name=name,
@@ -81,7 +90,7 @@ def read_manifest(folder: Path) -> ET.Element:
     """The content of package.xml. Raises PackageError."""
     path = folder / "package.xml"
     try:
-        return ET.fromstring(path.read_text(encoding="utf-8"))  # nosec B314
+        return ET.fromstring(path.read_bytes())  # nosec B314
     except FileNotFoundError:
         inside = sorted(each.parent.name for each in folder.glob("*/package.xml"))
         hint = f"; name one of those in it: {', '.join(inside)}" if inside else ""

@@ -81,6 +81,14 @@ def test_a_broken_file_is_refused_with_its_line(
     assert capsys.readouterr() == ("", "")
 
 
+def test_a_message_that_holds_itself_is_refused(write: Write) -> None:
+    assert refused(write("my_msgs", {"msg/A.msg": "A[] below\n"})) == (
+        "FOLDER: a message cannot hold itself: my_msgs/A holds my_msgs/A"
+    )
+    both = {"msg/A.msg": "B b\n", "msg/B.msg": "other_msgs/C c\nb_msgs/A[] a\n"}
+    assert "cannot hold itself: b_msgs/" in refused(write("b_msgs", both))
+
+
 def test_a_name_may_be_in_the_goal_and_in_the_result(write: Write) -> None:
     read_source(write("my_msgs", {"action/Do.action": "int32 a\n---\nint32 a\n---\nint32 a\n"}))
 
