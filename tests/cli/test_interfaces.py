@@ -93,6 +93,7 @@ def test_what_there_is_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
         (["show", "Pose", "--all-coments"], "no option --all-coments; did you mean '--all-comm"),
         (["shw"], "invalid choice: 'shw'"),
         ([], "COMMAND"),
+        (["build", ".", "-o", "README.md"], "File exists: 'README.md'"),
         (
             ["build", "/no/such/folder"],
             "bt-actions: interfaces build: /no/such/folder is no folder",
@@ -100,8 +101,12 @@ def test_what_there_is_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_what_is_not_there_is_said_on_one_line(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    message: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2])
     assert message in refused(capsys, *arguments)
 
 

@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
 
         try:
             _build(args)
-        except PackageError as error:
+        except (PackageError, OSError) as error:  # a folder that cannot be written, a full disk
             raise BadInput(f"interfaces build: {error}") from error
         return Exit.SUCCESS
     from bt_actions.messages.interfaces import UnknownInterface
@@ -130,6 +130,8 @@ def _build(args: argparse.Namespace) -> None:
     from bt_actions.packages.order import in_order
 
     began = time.monotonic()
+    if args.output is not None:
+        args.output.mkdir(parents=True, exist_ok=True)
     sources = in_order(args.paths, [here()])
     if args.output is None:
         installing.check_names(sources)
