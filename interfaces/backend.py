@@ -36,10 +36,11 @@ def build_wheel(
     _load()
     from bt_actions.packages import PackageError
     from bt_actions.packages.building import build_wheels
-    from bt_actions.packages.environment import own_tools
+    from bt_actions.packages.environment import check_compilers, own_tools
     from bt_actions.packages.order import in_order
 
     try:
+        check_compilers()
         tools = own_tools()
         sources = in_order([Path.cwd()], [tools.prefix])
         (wheel,) = build_wheels(sources, tools, [], Path(wheel_directory), lambda *_: None)
