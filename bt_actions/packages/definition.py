@@ -60,7 +60,7 @@ def _lines(
     text = _text(package, kind, short)
     for line in text.splitlines():
         shown = line.rstrip() if comments else re.sub(r"\s*#.*", "", line).rstrip()
-        if shown or (comments and not indent):
+        if shown or comments:
             yield f"{indent}{shown}".rstrip()
         field = _FIELD.match(line)
         if field is None or not re.search(r"(^|/)[A-Z]", field[1]):
