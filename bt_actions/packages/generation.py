@@ -60,7 +60,7 @@ def generate(
             needs=" ".join(packages),
         )
     )
-    environment = variables(tools, tuple(prefixes))
+    environment = {"CMAKE_BUILD_TYPE": "Release"} | variables(tools, prefixes)
     cmake = shutil.which("cmake", path=environment["PATH"])
     if cmake is None or shutil.which("ninja", path=environment["PATH"]) is None:
         raise PackageError(
@@ -72,7 +72,6 @@ def generate(
         f"-DCMAKE_INSTALL_PREFIX={prefix}",
         f"-DPython3_EXECUTABLE={tools.python}",
         "-DPYTHON_INSTALL_DIR=python",
-        "-DCMAKE_BUILD_TYPE=Release",
         "-DCMAKE_SKIP_INSTALL_RPATH=ON",
         "-DBUILD_TESTING=OFF",
     ]  # fmt: skip
