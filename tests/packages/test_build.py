@@ -79,7 +79,7 @@ class Environment:
         self.variables = {key: value for key, value in os.environ.items() if key not in hidden}
 
     def start(self, *arguments: object) -> subprocess.Popen[str]:
-        """Start its Python; what it compiles leaves the others on this machine more."""
+        """Start its Python, with a lower priority than the other tests."""
         return subprocess.Popen(
             ["nice", "-n", "5", str(self.python), *map(str, arguments)],
             env=self.variables, cwd=self.prefix, text=True,
