@@ -128,7 +128,7 @@ def _reason(log: Path) -> str:
         after = lines[number + 1 :]
         if line.startswith("Traceback"):
             after = after[next((n for n, each in enumerate(after) if each[0] != " "), 0) :]
-            return " ".join(after[:2])[:300]
+            return " ".join(each for each in after[:2] if not each.startswith("CMake"))[:300]
         if line.startswith("CMake Error"):
             return " ".join(each.strip() for each in after[:2])[:300]
         if re.search(r": (fatal )?error: ", line):
