@@ -23,11 +23,11 @@ from rclpy.qos import (
 )
 
 from bt_actions.messages.interfaces import interface_name
-from bt_actions.ros.in_sight import elsewhere, mismatch
+from bt_actions.ros.in_sight import mismatch
 from bt_actions.ros.workarounds.closable import closable
-from bt_actions.traffic.backend import Call
+from bt_actions.traffic.backend import ARRIVES, Call
 from bt_actions.traffic.handle import waker
-from bt_actions.utilities.suggest import listing
+from bt_actions.utilities.suggest import elsewhere, listing
 
 DISCOVERS = 3.5
 """Seconds that a new participant takes, at most, to discover who was there before it.
@@ -36,9 +36,6 @@ Fast DDS as it comes announces a participant every 3 s, and answers the first an
 one at once; that answer is lost in about half of all cases, as it may come before the new one
 listens. Up to 2.8 s were measured.
 """
-ARRIVES = 1.0
-"""Seconds that a message is given to arrive: a latched one, once its publisher is in sight, and
-what we have published, before the process ends."""
 
 
 def qos_profile(name: str) -> QoSProfile:

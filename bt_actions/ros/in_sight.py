@@ -1,23 +1,17 @@
-"""Why a topic or a service finds nobody, in words, of what the ROS graph shows.
+"""Why a topic finds nobody though somebody is there, in words, of what the ROS graph shows.
 
-What is there in vain is told first: another type, or a quality of service that does not match; then
-one of the same type in another namespace. The texts follow a name and go on as a sentence.
+Another type, or a quality of service that does not match. The texts follow a name and go on as a
+sentence; what is there under another name tells `elsewhere` of utilities/suggest.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from bt_actions.utilities.suggest import did_you_mean, listing
-
-NAMED = 3
-"""Names of one type in other namespaces that are told, at most."""
-
-ALIKE = 0.75
-"""How alike two full names must be: they share their namespaces."""
+from bt_actions.utilities.suggest import listing
 
 
 def mismatch(
@@ -46,16 +40,3 @@ def mismatch(
         if all(map(keeps, wants)) and not any(map(keeps, offers)):
             return f"{theirs} is {published if publish else asked}"
     return ""
-
-
-def elsewhere(name: str, kind: str, known: Mapping[str, Collection[str]]) -> str:
-    """Name those of a type that end as `name` does, in other namespaces; or what looks like it.
-
-    `known` has the types of each full name.
-    """
-    of_kind = [each for each, kinds in known.items() if kind in kinds and each != name]
-    base = name.rpartition("/")[2]
-    found = sorted(each for each in of_kind if each.rpartition("/")[2] == base)
-    if found:
-        return f"; there is {listing(found, NAMED)} of that type"
-    return did_you_mean(name, of_kind, cutoff=ALIKE)

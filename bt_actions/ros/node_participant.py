@@ -24,13 +24,12 @@ from bt_actions.ros.environment import sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
 from bt_actions.ros.graph import enclave, is_valid
 from bt_actions.ros.host import host
-from bt_actions.ros.in_sight import elsewhere
 from bt_actions.ros.log import log
 from bt_actions.ros.receiving import Receiver
 from bt_actions.ros.rediscovery import look_for
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import Listener, Seeker
-from bt_actions.utilities.suggest import did_you_mean, listing
+from bt_actions.utilities.suggest import did_you_mean, elsewhere, listing
 
 FEEDBACK = "/_action/feedback"
 _ON_NODE = "_bt_actions_participant"

@@ -6,7 +6,8 @@ import pytest
 from rclpy.topic_endpoint_info import TopicEndpointInfo as Ends
 
 from bt_actions.ros.connections import qos_profile
-from bt_actions.ros.in_sight import elsewhere, mismatch
+from bt_actions.ros.in_sight import mismatch
+from bt_actions.utilities.suggest import elsewhere
 
 BOOL = "std_msgs/msg/Bool"
 OURS = Ends(topic_type=BOOL, qos_profile=qos_profile("default"))
