@@ -91,7 +91,7 @@ class VirtualNetwork(Medium):
     def publisher(
         self, message_type: Any, topic: str, *, latched: bool = False
     ) -> VirtualPublisher:
-        """Make a publisher on a topic, which sets the stamps of headers."""
+        """Make a publisher on a topic, which stamps headers with the virtual time."""
         return _StampingPublisher(self, message_type, topic, latched=latched)
 
     # Topics
@@ -108,7 +108,10 @@ class VirtualNetwork(Medium):
         *,
         latched: bool = False,
     ) -> Subscription:
-        """Have `take` called with each message of this type; `latched`: the latest ones, too."""
+        """Have `take` called with each message of this type.
+
+        With `latched` also with the latest one that each latched publisher has published before.
+        """
         subscription, its = (message_type, take), self.topic(topic)
         its.subscriptions.append(subscription)
         for publisher in its.publishers:
