@@ -6,6 +6,7 @@ import array
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -33,6 +34,12 @@ VARIABLES: dict[str, Any] = {
     "words": {"from": 1, "class": {"in": 5}, "None": 2, "is": "x.from", "if": 5, "fromage": 9},
     "from": 3,
     "class": True,
+    "matrix": np.array([0.5, 0.5]),
+    "bytes": [b"\x01", b"\x02"],
+    "pair": (7, 8),
+    "singles": array.array("f", [0.7, 0.1]),
+    "single": np.float32(0.7),
+    "long": [0] * 60_000,
 }
 
 
@@ -70,6 +77,32 @@ def value(text: str) -> object:
         ("max($a, $b)", 2.5),
         ("min($list)", 10),
         ("abs(-3)", 3),
+        ("$list + [$a]", [10, 20, 30, 1]),
+        ("[] + ($a, $a)", [1, 1]),
+        ("$raw + [$b] + $raw", [1.0, 2.0, 2.5, 1.0, 2.0]),
+        ("$matrix + $bytes + $pair", [0.5, 0.5, 1, 2, 7, 8]),
+        ("result.message + ' ' + str($a) + str($on) + str(0.7)", "done 1true0.7"),
+        ("$list[1:3]", [20, 30]),
+        ("$singles.0 == 0.7 and $single == 0.7 and $singles == [0.7, 0.1]", True),
+        ("$singles[1:] + [max($singles)]", [0.1, 0.7]),
+        ("str($single)", "0.7"),
+        ("$list[:-1] + $list[5:]", [10, 20]),
+        ("$raw[$a:]", [2.0]),
+        ("$matrix[:1]", [0.5]),
+        ("$list[-1]", 30),
+        ("result.message[1:3]", "on"),
+        ("round($b)", 2),
+        ("round(2.34567, 2)", 2.35),
+        ("round(7, 2)", 7),
+        ("int($b)", 2),
+        ("int(' -12 ')", -12),
+        ("float('2.5') + float($a)", 3.5),
+        ("known($a)", True),
+        ("known($gone)", False),
+        ("known($gone.x) or known($list.7) or known($where.gone)", False),
+        ("known($list[$gone])", False),
+        ("known(result.poses.0.x) and not known(result.poses.0.y)", True),
+        ("known($gone) and $gone > 3", False),
         ("$raw == [1, 2]", True),
         ("$raw.1", 2.0),
         ("true and True", True),
@@ -105,7 +138,12 @@ def test_an_expression_has_the_value_python_gives_it(text: str, expected: object
         ("NOT($on)", "write 'not'", 0),
         ("$a === 1", "'===': write '=='", 3),
         ("$a !== 1", "'!==': write '!='", 3),
+        ("$b < 20 % and $a == 1", "'20 %': write 0.2", 5),
+        ("$b > 12.5%", "'12.5%': write 0.125", 5),
         ("length($list) > 1", "write len($list)", 0),
+        ("string($a) == '1'", "write str($a)", 0),
+        ("$list.append($a + 1)", "write $list + [$a + 1]", 0),
+        ("isset($a)", "write known($a)", 0),
         ("1 < result.poses.size()", "write len(result.poses)", 4),
         (
             "$a == sensor_msgs/msg/BatteryState.FULL",
@@ -126,7 +164,11 @@ def test_an_expression_has_the_value_python_gives_it(text: str, expected: object
             0,
         ),
         ("$1", "a dollar sign begins a name: write $name", 0),
-        ("$a > 1 and __import__('os')", "only len, abs, min and max can be called", 11),
+        (
+            "$a > 1 and __import__('os')",
+            "only len, abs, min, max, round, int, float, str and known can be called",
+            11,
+        ),
         ("result.__class__", "'__class__': names with a leading underscore are private", 0),
         ("_a", "unknown name '_a': a variable is written $_a, a field result._a", 0),
         ("len()", "len() needs a value", 0),
@@ -140,7 +182,10 @@ def test_an_expression_has_the_value_python_gives_it(text: str, expected: object
         ("(lambda: 1)", "a lambda cannot be used in an expression", 1),
         ("$a is 1", "write '==' or '!=' instead of 'is'", 0),
         ("1 if $a else 2", "'if' cannot be used in an expression", 0),
-        ("$list[0:1]", "a slice cannot be used in an expression", 0),
+        ("$list[0:1:2]", "a step cannot be used in an expression", 0),
+        ("round($b, 1, 2)", "round() takes at most 2 values, not 3", 0),
+        ("known()", "known() needs a value", 0),
+        ("known($a > 1)", "known() asks for one value: known($name), known($a.b.0)", 6),
         ("f'{x}'", "an f-string cannot be used in an expression", 0),
         ("'abc", "this text has no closing quote", 0),
         ("'a\\n'", "a text here holds no backslash and no line break", 2),
@@ -184,6 +229,21 @@ def test_what_is_no_expression_is_refused_with_its_place(
         ("not 3", "true or false is needed, not 3", (0, 5)),
         ("$a and $on", "true or false is needed, not 1", (0, 2)),
         ("len(3)", "3 has no length", (0, 6)),
+        ("['part ' + $a]", "a text is joined with a text: write str(...) around 1", (1, 13)),
+        ("$list + $a", "a list is joined with a list: write [...] around 1", (0, 10)),
+        ("1 + $long + 1", "a list is joined with a list: write [...] around 1", (0, 9)),
+        ("$long + $long", "the list would have more than 100,000 items", (0, 13)),
+        ("$list['a':]", "an index is a whole number, not 'a'", (0, 11)),
+        ("$a[1:]", "1 has no items", (0, 6)),
+        ("$where[1:]", "{pose: {x: 7}} has no items", (0, 10)),
+        ("int('x')", "'x' is no whole number", (0, 8)),
+        ("int('1e999')", "'1e999' is no whole number", (0, 12)),
+        ("int(float('inf'))", "inf is no whole number", (0, 17)),
+        ("int($list)", "a number, or a text that holds one, is needed, not [10, 20, 30]", (0, 10)),
+        ("float('x')", "'x' is no number", (0, 10)),
+        ("float($on)", "a number, or a text that holds one, is needed, not true", (0, 10)),
+        ("round($b, 99)", "round() takes 0 to 15 digits, not 99", (0, 13)),
+        ("str($list)", "str() is of a number, a text, true or false, not [10, 20, 30]", (0, 10)),
         ("min([])", "min() of an empty list", (0, 7)),
         ("max(3)", "max() of one value needs a list, not 3", (0, 6)),
         ("max(1, 'a')", "max() is of numbers alone, or of texts alone", (0, 11)),
@@ -234,8 +294,9 @@ class _Hostile:
 _TOKENS = st.sampled_from(
     ["$a", "$b", "$list", "$where", "$raw", "$gone", "$bad", "result", ".0", ".x", ".pose", "[0]",
      "[", "]", "(", ")", "+", "-", "*", "**", "/", "%", "//", "<", "==", "!=", "and", "or", "not",
-     "in", "is", "1", "2.5", "1e308", "99999999999", "'t'", '"', "len(", "max(", "abs(", ",", " ",
-     "true", "lambda", "if", "else", "for", ":", "=", "#", "ä", "\\", "\n", "__class__", "{", "}"]
+     "in", "is", "1", "2.5", "1e308", "99999999999", "'t'", '"', "len(", "max(", "abs(", "str(",
+     "known(", ",", " ", "true", "lambda", "if", "else", "for", ":", "=", "#", "ä", "\\", "\n",
+     "__class__", "{", "}"]
 )  # fmt: skip
 _VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -22,7 +22,7 @@ from rclpy.qos import (
     qos_profile_services_default,
 )
 
-from bt_actions.messages.interfaces import interface_name
+from bt_actions.messages.interfaces import TwoTypes, interface_name
 from bt_actions.ros.in_sight import mismatch
 from bt_actions.ros.workarounds.closable import closable
 from bt_actions.traffic.backend import ARRIVES, Call
@@ -52,6 +52,20 @@ def qos_profile(name: str) -> QoSProfile:
             lifespan=Duration(seconds=10),
         ),
     }[name]
+
+
+@contextlib.contextmanager
+def _one_type(node: Node, kind: type, name: str) -> Iterator[None]:
+    """Tell in the tree's words why rclpy cannot make something, where the name has another type."""
+    try:
+        yield
+    except RuntimeError as error:  # RCLError, which is public nowhere
+        full = node.resolve_topic_name(name)
+        known = [*node.get_topic_names_and_types(), *node.get_service_names_and_types()]
+        others = {each for found, kinds in known if found == full for each in kinds}
+        if others - {interface_name(kind)}:
+            raise TwoTypes(full, kind, others) from error
+        raise
 
 
 class _Topic:
@@ -100,9 +114,11 @@ class Subscription(_Topic):
         super().__init__(node, seen_since, message_type, qos)
         self._made_at = time.monotonic()
         group = MutuallyExclusiveCallbackGroup()
-        self._subscription = closable(
-            node.create_subscription(message_type, topic, take, self._qos, callback_group=group)
-        )
+        with _one_type(node, message_type, topic):
+            made = node.create_subscription(
+                message_type, topic, take, self._qos, callback_group=group
+            )
+        self._subscription = closable(made)
         self.name = self._subscription.topic_name
 
     def may_come(self) -> float:
@@ -128,7 +144,9 @@ class Publisher(_Topic):
         self, node: Node, seen_since: float, message_type: type, topic: str, qos: str
     ) -> None:
         super().__init__(node, seen_since, message_type, qos)
-        self._publisher = closable(node.create_publisher(message_type, topic, self._qos))
+        with _one_type(node, message_type, topic):
+            made = node.create_publisher(message_type, topic, self._qos)
+        self._publisher = closable(made)
         self._has_all_by = 0.0
         self.name = self._publisher.topic_name
 
@@ -162,7 +180,8 @@ class Service:
         self._node = node
         self._type = service_type
         group = MutuallyExclusiveCallbackGroup()
-        self._client = node.create_client(service_type, name, callback_group=group)
+        with _one_type(node, service_type, name):
+            self._client = node.create_client(service_type, name, callback_group=group)
         self.name: str = self._client.service_name
         """The service's full name."""
 

@@ -99,7 +99,7 @@ class Backend(Protocol):
         """The node's own clock in nanoseconds, as the headers of messages have it."""
 
     def service(self, service_type: type, name: str) -> Service:
-        """Become a client of a service."""
+        """Become a client of a service. Raises TwoTypes, as the next two do."""
 
     def subscription(
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]

@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import pytest
-from std_msgs.msg import Float32, Int32
+from std_msgs.msg import Bool, Float32, Int32
 from std_srvs.srv import SetBool, Trigger
 
+from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.handle import Run, begun_in
@@ -213,17 +214,19 @@ def test_some_time_after_it_began_nobody_may_be_on_the_way_any_more(
     spoken.close()
 
 
-@pytest.mark.parametrize("qos", ["default", "sensor"])
-def test_a_first_message_may_come_for_a_second_where_somebody_publishes(
+@pytest.mark.parametrize("qos", ["default", "latched", "sensor"])
+def test_a_first_message_has_its_time_where_its_publisher_is_there(
     world: World, name: str, qos: str
 ) -> None:
-    world.speaker(Int32, name)
+    alone = world.backend.subscription(Int32, f"{name}_alone", qos, lambda _: None)
+    world.until(lambda: alone.may_come() == 0.0)  # and the node is new no more
+    spoken = world.backend.publisher(Int32, name, "latched" if qos == "latched" else "default")
     heard = world.backend.subscription(Int32, name, qos, lambda _: None)
     world.until(lambda: heard.may_come() > 0.0)
-    began = world.backend.now().steady
+    assert alone.may_come() == 0.0
     world.until(lambda: heard.may_come() == 0.0)
-    assert world.backend.now().steady - began > 0.5
-    heard.close()
+    for each in (alone, heard, spoken):
+        each.close()
 
 
 def test_what_was_published_before_comes_to_nobody_unless_it_is_latched(
@@ -288,6 +291,20 @@ def test_who_is_told_may_publish_in_turn(world: World, name: str) -> None:
     spoken.publish(Int32(data=7))
     world.until(lambda: len(came) == 2)
     assert came == [7, 7]
+    spoken.close()
+
+
+def test_a_listener_that_raises_raises_where_messages_travel(world: World, name: str) -> None:
+    def take(_message: Any) -> None:
+        raise RuntimeError("a mistake of the listener's")
+
+    heard = world.backend.subscription(Int32, name, "default", take)
+    spoken = world.backend.publisher(Int32, name, "default")
+    world.until(lambda: spoken.listeners == 1)
+    spoken.publish(Int32(data=1))
+    with pytest.raises(RuntimeError, match="a mistake of the listener's"):
+        world.until(lambda: False)
+    heard.close()
     spoken.close()
 
 
@@ -376,6 +393,20 @@ def test_a_service_answers_and_wakes_who_runs_the_tree(
         assert told == [None]
         assert call.result() == SetBool.Response(success=data, message="switched")
     service.close()
+
+
+@pytest.mark.ros
+def test_a_name_that_is_in_use_with_another_type_is_told_with_both(ros: World, name: str) -> None:
+    full, backend = f"{ros.namespace}/{name}", ros.backend
+    made = [backend.publisher(Int32, name, "default"), backend.service(SetBool, name)]
+    with pytest.raises(TwoTypes, match=f"^{full} is used as std_msgs/msg/Bool, and also as"):
+        backend.subscription(Bool, name, "default", lambda _: None)
+    with pytest.raises(TwoTypes, match=r"/msg/Bool, and also as .*std_msgs/msg/Int32"):
+        backend.publisher(Bool, name, "default")
+    with pytest.raises(TwoTypes, match=r"/srv/Trigger, and also as .*std_srvs/srv/SetBool"):
+        backend.service(Trigger, name)
+    for each in made:
+        each.close()
 
 
 def test_an_answer_to_a_call_that_was_dropped_is_no_answer_to_the_next(
