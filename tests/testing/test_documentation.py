@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,12 +10,17 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
 
 
-def test_the_examples_of_the_page_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def test_the_page_shows_a_fault_an_interruption_and_outputs() -> None:
+    assert len(EXAMPLES) == 3
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_an_example_of_the_page_passes(example: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    examples = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
-    names: dict[str, object] = {}
-    exec("".join(examples), names)
-    tests = [each for name, each in names.items() if name.startswith("test_") and callable(each)]
-    for test in tests:
-        test()
-    assert len(tests) == len(examples) == 3
+    names: dict[str, Any] = {}
+    exec(example, names)
+    (test,) = [each for name, each in names.items() if name.startswith("test_")]
+    test()
