@@ -11,7 +11,7 @@ import reprlib
 from collections.abc import Callable
 from typing import Any
 
-from bt_actions.messages.interfaces import interface_name, short_name
+from bt_actions.messages.interfaces import interface, interface_name, short_name
 from bt_actions.simulation.platform import Server
 from bt_actions.testing.action_server import VirtualActionServer
 from bt_actions.testing.medium import Medium
@@ -102,7 +102,7 @@ class VirtualNetwork(Medium):
 
     def subscribe(
         self,
-        message_type: type,
+        message_type: type | str,
         topic: str,
         take: Callable[[Any], None],
         *,
@@ -112,6 +112,7 @@ class VirtualNetwork(Medium):
 
         With `latched` also with the latest one that each latched publisher has published before.
         """
+        message_type = interface(message_type, "msg")
         subscription, its = (message_type, take), self.topic(topic)
         its.subscriptions.append(subscription)
         for publisher in its.publishers:
@@ -134,10 +135,15 @@ class VirtualNetwork(Medium):
     # Services
 
     def provide(
-        self, service_type: type, name: str, answer: Callable[[Any], Any], *, takes: float = 0.0
+        self,
+        service_type: type | str,
+        name: str,
+        answer: Callable[[Any], Any],
+        *,
+        takes: float = 0.0,
     ) -> None:
         """Serve a service: `answer` makes the response of a request, which takes so long (s)."""
-        self.services[self.expand(name)] = (service_type, answer, takes)
+        self.services[self.expand(name)] = (interface(service_type, "srv"), answer, takes)
 
     def service(self, service_type: type, name: str) -> tuple[Callable[[Any], Any], float] | None:
         """Return how a service answers, and how long that takes; None where there is none."""
@@ -174,8 +180,8 @@ class VirtualPublisher:
     def __init__(
         self, network: VirtualNetwork, message_type: Any, topic: str, *, latched: bool
     ) -> None:
+        self.message_type: Any = interface(message_type, "msg")
         self.topic = network.expand(topic)
-        self.message_type = message_type
         self.kept: Any = None
         """The latest message, where it is `latched`: later subscriptions are given that."""
         self._network = network

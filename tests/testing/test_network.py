@@ -197,6 +197,25 @@ def test_a_topic_that_is_fed_anything_else_says_so(
             network.publish("at_door", given)
 
 
+def test_types_are_classes_or_names_and_stand_first(
+    tmp_path: Path, network: VirtualNetwork
+) -> None:
+    heard: list[str] = []
+    network.subscribe("std_msgs/msg/String", "said", lambda message: heard.append(message.data))
+    network.publisher("std_msgs/msg/String", "said").publish(String(data="here"))
+    network.provide("std_srvs/srv/Trigger", "door", lambda request: Trigger.Response())
+    assert VirtualRunner(tree(tmp_path, CALLS), network).run() is Status.SUCCESS
+    assert heard == ["here"]
+    mistaken: Any = network
+    for wrong in (
+        lambda: mistaken.provide("door", Trigger, None),
+        lambda: mistaken.subscribe("said", String, None),
+        lambda: mistaken.publisher("said", String),
+    ):
+        with pytest.raises(ValueError, match=r"'\w+' is no type name"):
+            wrong()
+
+
 def test_leaves_hear_speak_and_call(tmp_path: Path, network: VirtualNetwork) -> None:
     heard: list[str] = []
     network.subscribe(String, "knock", lambda message: heard.append(message.data))
