@@ -1,7 +1,7 @@
-"""Why a topic finds nobody though somebody is there, in words, of what the ROS graph shows.
+"""Why a topic or a service finds nobody, in words, of what the ROS graph shows.
 
-Another type, or a quality of service that does not match. The texts follow a name and go on as a
-sentence; what is there under another name tells `elsewhere` of utilities/suggest.py.
+What is there in vain is told first: another type, or a quality of service that does not match; then
+one of the same type in another namespace. The texts follow a name and go on as a sentence.
 """
 
 from __future__ import annotations
