@@ -35,6 +35,9 @@ _DOES_WITHOUT = frozenset({"invert", "force_success"})
 """Kinds that succeed where their child has failed."""
 
 
+_NOTHING: frozenset[str] = frozenset()
+
+
 class _Need(NamedTuple):
     """A read that fails a node while the variable has no value."""
 
@@ -53,7 +56,8 @@ _Needs = tuple[tuple[_Need, ...], frozenset[str]]
 
 def find_missing(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
     """Report the reads in later children of fallbacks that fail for what an earlier one lacked."""
-    _Missing(checker, doubts).visit(root)
+    if any(_kind(node) == "fallback" for node in checker.document.nodes()):
+        _Missing(checker, doubts).visit(root)
 
 
 class _Missing:
@@ -139,7 +143,8 @@ class _Missing:
                     yield _Need(name, node, computed)
 
     def _writes(self, node: TreeNode) -> frozenset[str]:
-        return frozenset(write.name for write in self._checker.writes.get(id(node), ()))
+        writes = self._checker.writes.get(id(node))
+        return frozenset([write.name for write in writes]) if writes else _NOTHING
 
     def _report(self, need: _Need, first: _Need) -> None:
         source, at = self._checker.source, span_of(need.node.key)
