@@ -144,9 +144,8 @@ def test_a_name_that_a_subtree_uses_with_another_type_is_told_where_it_is_includ
 def test_imported_actions_of_one_server_with_two_types_are_told_where_the_second_is_used(
     tmp_path: Path,
 ) -> None:
-    library = MOVE.format("").replace("m, ", "g, ")
+    library = MOVE.format("").replace("server: m", "server: g")
     told = found(tmp_path, f"actions:\n  move: {library}\n")
-    assert told == [
-        "main.yaml:11 BT217 the action server 'g' is robot_control_interfaces/action/MoveRobot in"
-        f" {tmp_path}/lib.yaml:2, and robot_control_interfaces/action/Gripper elsewhere"
-    ]
+    move, gripper = (f"robot_control_interfaces/action/{each}" for each in ("MoveRobot", "Gripper"))
+    text = f"the action server 'g' is {move} in {tmp_path}/lib.yaml:2, and {gripper} elsewhere"
+    assert told == [f"main.yaml:11 BT217 {text}"]
