@@ -208,7 +208,7 @@ class Form:
             raise self._refusal(node, f"{name}() takes {takes}, not {len(args)}")
 
     def _compile_known(self, node: ast.expr, part: Callable[[ast.expr], _Closure]) -> _Closure:
-        """Whether a part of an expression has a value. Whatever it lacks fails nothing."""
+        """A closure that tells whether a part has a value, and never fails."""
         if not isinstance(node, (ast.Name, ast.Attribute, ast.Subscript)):
             raise self._refusal(node, "known() asks for one value: known($name), known($a.b.0)")
         before = len(self.variables)

@@ -1,9 +1,9 @@
-"""Branches for what fails that fail themselves, for the same value that nobody knows: BT320.
+"""Later children of a fallback that fail for the value that an earlier one lacked: BT320.
 
-A fallback's later child is there for what makes an earlier one fail. A topic without a message, and
-a variable that nothing has written, fail whatever reads them, but for a log. Where a later child
-asks again in a check of its own, it is one of several cases and is not meant, unless the first only
-asks and no other child is left.
+A fallback's later child is there for the failure of an earlier one. A node fails where it reads a
+topic without a message, or a variable that nothing has written; a log does not. A later child that
+reads the value in a check of its own is one of several cases, and no hazard, unless the earlier one
+does nothing but ask and no other child is left.
 """
 
 from __future__ import annotations
