@@ -32,9 +32,10 @@ _INFINITE = float("inf")
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
 _ANSWERS = frozenset({"result", "feedback", "message"})
 _SAVE = "save what it holds, and read that as $name"
+_ASKED = "known($name) is true where there is a value"
 _EXAMPLE = "MoveRobot.Result.STATUS_FAULT"
 _FOREIGN = {
-    "null": "there is no 'null' here",
+    "null": f"there is no 'null' here: {_ASKED}",
     "TRUE": "write 'true'",
     "FALSE": "write 'false'",
 }
@@ -207,7 +208,7 @@ class Form:
             raise self._refusal(node, f"{name}() takes {takes}, not {len(args)}")
 
     def _compile_known(self, node: ast.expr, part: Callable[[ast.expr], _Closure]) -> _Closure:
-        """Whether a part of an expression has a value. Whatever it lacks fails nothing."""
+        """A closure that tells whether a part has a value, and never fails."""
         if not isinstance(node, (ast.Name, ast.Attribute, ast.Subscript)):
             raise self._refusal(node, "known() asks for one value: known($name), known($a.b.0)")
         before = len(self.variables)
@@ -364,7 +365,7 @@ def _why_not(node: ast.expr) -> str:
             return f"{name}() takes values only, not {node.keywords[0].arg or '**'}="
         return f"only {listed()} can be called"
     if isinstance(node, ast.Constant) and node.value is None:
-        return "there is no 'None' here"
+        return f"there is no 'None' here: {_ASKED}"
     names: dict[type[ast.expr], str] = {
         ast.Lambda: "a lambda",
         ast.IfExp: "'if'",

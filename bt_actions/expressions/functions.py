@@ -137,8 +137,7 @@ def instead_of(name: str, owner: str | None, arguments: list[str]) -> str | None
     `owner` is what stands before the dot of a method. None where nothing is known.
     """
     ours = _FOREIGN.get(name.lower())
-    if owner is not None and name in _JOINS and len(arguments) == 1:
-        return f"{owner} + {_JOINS[name].format(arguments[0])}"
-    if ours is None or len(arguments) != (owner is None):
-        return None
-    return f"{ours}({arguments[0] if owner is None else owner})"
+    values = arguments if owner is None else [owner, *arguments]
+    if name in _JOINS and len(values) == 2:
+        return f"{values[0]} + {_JOINS[name].format(values[1])}"
+    return f"{ours}({values[0]})" if ours is not None and len(values) == 1 else None

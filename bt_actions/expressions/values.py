@@ -92,7 +92,7 @@ def field(value: object, name: str) -> object:
     if described is not None:
         known = described()
         if name in known or name.isupper():
-            return field_of(value, name)
+            return field_of(value, name, known)
         raise ValueError(f"{type(value).__name__} has no field {name!r}{_among(known)}")
     public: Iterable[str] = ()
     if is_dataclass(value):

@@ -107,7 +107,8 @@ def to_plain(message: object) -> Any:
     """Dictionaries, lists and scalars that JSON can say (except NaN and infinities)."""
     fields = getattr(type(message), "get_fields_and_field_types", None)
     if fields is not None:
-        return {name: to_plain(field_of(message, name)) for name in fields()}
+        types = fields()
+        return {name: to_plain(field_of(message, name, types)) for name in types}
     message = plain(message)  # array.array and numpy alike
     if isinstance(message, (list, tuple, bytes)):
         if numbers_only(message):

@@ -7,7 +7,7 @@ float32 that is next to 0.7 is 0.699999988079071. Written to a float32 again, bo
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 _NUMBERS = frozenset({bool, int, float})
@@ -51,12 +51,10 @@ def item_of(items: Any, at: int) -> object:
     return shortest(item) if _of_float32(items) else item
 
 
-def field_of(message: Any, name: str) -> object:
-    """The value of a message's field, as the message keeps it but for the one number it may be."""
+def field_of(message: object, name: str, types: Mapping[str, str]) -> object:
+    """The value of a message's field; `types` are those of its fields, as rosidl names them."""
     value = getattr(message, name)
-    if type(value) is float and message.get_fields_and_field_types().get(name) == "float":
-        return shortest(value)
-    return scalar(value)
+    return shortest(value) if types.get(name) == "float" else scalar(value)
 
 
 def shortest(value: Any) -> Any:

@@ -56,8 +56,9 @@ def shorten_fields(message: object, limit: int = 80) -> str:
     A field's own value is cut at half of the limit; a number has six digits.
     """
     text = ""
-    for name in getattr(message, "get_fields_and_field_types", dict[str, str])():
-        value = field_of(message, name)
+    types = getattr(message, "get_fields_and_field_types", dict[str, str])()
+    for name in types:
+        value = field_of(message, name, types)
         plain = value[:limit] if isinstance(value, str) else ""
         number = f"{value:g}" if isinstance(value, float) else ""
         text += f"{', ' if text else ''}{name} {plain or number or shorten(value, limit // 2)}"
@@ -70,7 +71,8 @@ def _parts(value: object) -> Iterator[Part] | None:
     """What a value with others in it is made of; None for one that holds no others."""
     fields = getattr(type(value), "get_fields_and_field_types", None)
     if fields is not None:
-        return _braced((f"{name}: ", field_of(value, name)) for name in fields())
+        types = fields()
+        return _braced((f"{name}: ", field_of(value, name, types)) for name in types)
     if isinstance(value, Mapping):
         return _braced((f"{key if isinstance(key, str) else _scalar(key, 40)}: ", item)
                        for key, item in value.items())  # fmt: skip

@@ -1,9 +1,9 @@
-"""Branches for what fails that fail themselves, for the same value that nobody knows: BT320.
+"""Later children of a fallback that fail for the value that an earlier one lacked: BT320.
 
-A fallback's later child is there for what makes an earlier one fail. A topic without a message, and
-a variable that nothing has written, fail whatever reads them, but for a log. Where a later child
-asks again in a check of its own, it is one of several cases and is not meant, unless the first only
-asks and no other child is left.
+A fallback's later child is there for the failure of an earlier one. A node fails where it reads a
+topic without a message, or a variable that nothing has written; a log does not. A later child that
+reads the value in a check of its own is one of several cases, and no hazard, unless the earlier one
+does nothing but ask and no other child is left.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ _DOES_WITHOUT = frozenset({"invert", "force_success"})
 """Kinds that succeed where their child has failed."""
 
 
+_NOTHING: frozenset[str] = frozenset()
+
+
 class _Need(NamedTuple):
     """A read that fails a node while the variable has no value."""
 
@@ -53,7 +56,8 @@ _Needs = tuple[tuple[_Need, ...], frozenset[str]]
 
 def find_missing(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
     """Report the reads in later children of fallbacks that fail for what an earlier one lacked."""
-    _Missing(checker, doubts).visit(root)
+    if any(_kind(node) == "fallback" for node in checker.document.nodes()):
+        _Missing(checker, doubts).visit(root)
 
 
 class _Missing:
@@ -139,7 +143,8 @@ class _Missing:
                     yield _Need(name, node, computed)
 
     def _writes(self, node: TreeNode) -> frozenset[str]:
-        return frozenset(write.name for write in self._checker.writes.get(id(node), ()))
+        writes = self._checker.writes.get(id(node))
+        return frozenset([write.name for write in writes]) if writes else _NOTHING
 
     def _report(self, need: _Need, first: _Need) -> None:
         source, at = self._checker.source, span_of(need.node.key)
