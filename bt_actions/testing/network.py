@@ -92,7 +92,7 @@ class VirtualNetwork(Medium):
         self, message_type: Any, topic: str, *, latched: bool = False
     ) -> VirtualPublisher:
         """Make a publisher on a topic, which stamps headers with the virtual time."""
-        return _StampingPublisher(self, message_type, topic, latched=latched)
+        return VirtualPublisher(self, message_type, topic, latched=latched, stamps=True)
 
     # Topics
 
@@ -178,14 +178,22 @@ class VirtualPublisher:
     """Publishes messages of one type on a topic, from when it was made."""
 
     def __init__(
-        self, network: VirtualNetwork, message_type: Any, topic: str, *, latched: bool
+        self,
+        network: VirtualNetwork,
+        message_type: Any,
+        topic: str,
+        *,
+        latched: bool,
+        stamps: bool = False,
     ) -> None:
+        """Be there; `stamps`: the headers of messages get the virtual time."""
         self.message_type: Any = interface(message_type, "msg")
         self.topic = network.expand(topic)
         self.kept: Any = None
         """The latest message, where it is `latched`: later subscriptions are given that."""
         self._network = network
         self._latched = latched
+        self._stamps = stamps
         network.topic(topic).publishers.append(self)
 
     @property
@@ -200,6 +208,9 @@ class VirtualPublisher:
             kind = interface_name(self.message_type)
             raise TypeError(f"{self.topic} was given {told(message)}, and is a topic of {kind}")
         message = copy.deepcopy(message)  # whoever publishes may change it before it arrives
+        if self._stamps and hasattr(message, "header"):
+            nanoseconds = int(self._network.now() * 1e9)
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
         if self._latched:
             self.kept = message
         its = self._network.topic(self.topic)
@@ -212,17 +223,6 @@ class VirtualPublisher:
         its = self._network.topic(self.topic)
         if self in its.publishers:
             its.publishers.remove(self)
-
-
-class _StampingPublisher(VirtualPublisher):
-    """That of a simulated server, or of a test."""
-
-    def publish(self, message: Any) -> None:
-        """Publish, with the virtual time in the header."""
-        if hasattr(message, "header"):
-            nanoseconds = int(self._network.now() * 1e9)
-            message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
-        super().publish(message)
 
 
 class VirtualTimer:

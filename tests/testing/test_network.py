@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Bool, Int32, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -214,6 +215,19 @@ def test_types_are_classes_or_names_and_stand_first(
     ):
         with pytest.raises(ValueError, match=r"'\w+' is no type name"):
             wrong()
+
+
+def test_a_publisher_sets_the_stamp_of_what_arrives_alone(network: VirtualNetwork) -> None:
+    heard: list[BatteryState] = []
+    network.subscribe(BatteryState, "battery", heard.append)
+    publisher, message = network.publisher(BatteryState, "battery"), BatteryState()
+    network.timeline.advance(2.0)
+    publisher.publish(message)
+    network.publish("battery", message)
+    network.arrive()
+    assert [each.header.stamp.sec for each in heard] == [2, 0]
+    with pytest.raises(TypeError, match="/house/battery was given the class BatteryState"):
+        publisher.publish(BatteryState)
 
 
 def test_leaves_hear_speak_and_call(tmp_path: Path, network: VirtualNetwork) -> None:
