@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
@@ -223,6 +224,27 @@ def test_what_a_tree_tells_is_the_same(world: World, load: Load, name: str, what
     root = load(text)
     world.run(root)
     assert root.feedback_message == says.replace("NAME", name)
+
+
+AGES = """topics:
+  flag: {topic: NAME/flag, type: std_msgs/msg/Int32, qos: latched, max_age: 400 ms}
+root:
+  sequence: S
+  children:
+    - check: $flag.data == 1
+    - wait: 500 ms
+    - check: $flag.data == 1
+"""
+
+
+def test_a_message_is_as_old_as_the_time_since_it_came(world: World, load: Load, name: str) -> None:
+    world.publish(f"{name}/flag", Int32(data=1), latched=True)
+    root = load(AGES)
+    world.run(root)
+    first, _, last = root.children
+    assert (first.status, last.status) == (Status.SUCCESS, Status.FAILURE)
+    said = rf"the last message on {name}/flag is \d\.\d s old \(\$flag\)"
+    assert re.fullmatch(said, last.feedback_message)
 
 
 def test_what_a_tree_said_last_arrives(world: World, load: Load, name: str) -> None:
