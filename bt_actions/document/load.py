@@ -113,7 +113,7 @@ class Tree:
 
     @property
     def files(self) -> dict[Path, str]:
-        """Every file that it is made of, resolved, with the text that was read (none of data)."""
+        """Every file that it is made of, as named, with the text that was read (none of data)."""
         return self._workspace.files
 
     def check_inputs(self, inputs: Mapping[str, object]) -> None:
@@ -143,7 +143,7 @@ def open_tree(
 
     `types` and `python` as for `load_tree`; `python` may also be the names of the packages whose
     classes a tree may name. With `within`, no file is read that does not lie in one of these
-    folders, wherever links lead.
+    folders; links in them are followed wherever they lead.
 
     Raises DocumentError with everything that is wrong with the tree.
     """

@@ -38,7 +38,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
     candidates: list[Path] = []
     if path.suffix not in _SUFFIXES and exact.name:
         candidates += [exact.with_name(path.name + suffix) for suffix in _SUFFIXES]
-    is_name = len(path.parts) == 1
+    is_name = len(path.parts) == 1 and not wanted.startswith(".")
     if is_name and path.suffix in _SUFFIXES:
         candidates += [folder / path for folder in tree_folders()]
     elif is_name:
@@ -89,7 +89,7 @@ def installed_trees() -> dict[str, Path]:
         except OSError:
             continue
         for file in files:
-            if file.suffix in _SUFFIXES:
+            if file.suffix in _SUFFIXES and not file.name.startswith("."):
                 found.setdefault(file.stem, file)
     return found
 

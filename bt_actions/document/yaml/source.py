@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
-    "read_source", "read_stream", "source_of", "spoken",
+    "absolute", "read_source", "read_stream", "source_of", "spoken",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
@@ -87,7 +87,7 @@ class Source:
     decoded: tuple[Node, list[Char]] | None = None
     """The scalar that inner.py was last asked about, and where its characters are written."""
     within: tuple[Path, ...] | None = None
-    """The folders, resolved, in which every file must lie that it names; None: anywhere."""
+    """The folders in which every file must lie that it names; None: anywhere."""
     files: dict[Path, object] = field(default_factory=dict)
     """What was read for it from other files as data, or the ValueError that came of it."""
     items: int = 0
@@ -115,14 +115,21 @@ class Source:
         return lines[number - 1] if 0 < number <= len(lines) else None
 
     def refusal(self, path: Path) -> str:
-        """Why it may not name this file, wherever links lead; or ""."""
+        """Why it may not name this file; or "".
+
+        By its name, or by where links lead, a file must lie in one of the folders: whoever may
+        write there has made the links in them. A link counts only where it is named as it lies
+        there: `link/../x` is beside what the link leads to.
+        """
         if self.within is None:
             return ""
+        named = absolute(path)
         try:
             resolved = path.resolve()
+            lies = {resolved, named} if named.resolve() == resolved else {resolved}
         except (OSError, RuntimeError):
             return f"{path.name} cannot be found"
-        if any(resolved.is_relative_to(folder) for folder in self.within):
+        if any(each.is_relative_to(folder) for each in lies for folder in self.within):
             return ""
         return f"{path.name} lies outside of the folders whose trees are served"
 
@@ -210,6 +217,11 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
     except (OSError, ValueError) as error:
         raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
     return source_of(data, name, path)
+
+
+def absolute(path: Path) -> Path:
+    """The path from the root, without "..", by its words alone: links are not followed."""
+    return Path(os.path.abspath(path))  # noqa: PTH100 - `Path.absolute` keeps ".."
 
 
 def read_stream(stream: BinaryIO | None, name: str) -> Source:
