@@ -107,11 +107,6 @@ class Catalog:
             self._patience.seconds = PATIENCE
             return list(self._entries.values())
 
-    def close(self) -> None:
-        """Look no more."""
-        with self._lock:
-            self._patience.close()
-
     def find(self, name: str) -> Entry:
         """The tree of this name, as it is now. Raises Refused."""
         with self._lock:

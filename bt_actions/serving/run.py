@@ -64,7 +64,8 @@ class Run:
         self._begins, self._ended = begins, ended
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
-        self._paused = False
+        self.paused = False
+        """No new goal is begun."""
         self.ending: Ending | None = None
         self.leaves_ended = 0
         self._running: dict[Behaviour, None] = {}
@@ -97,7 +98,8 @@ class Run:
 
     def _pause(self, wanted: bool) -> None:
         with self._lock:
-            self._paused = wanted
+            self.paused = wanted
+            self.changes += 1
             if self._runner is not None:
                 (self._runner.pause if wanted else self._runner.resume)()
 
@@ -142,7 +144,7 @@ class Run:
                 self._runner = runner
                 if self.ending is not None:
                     runner.interrupt()
-                if self._paused:
+                if self.paused:
                     runner.pause()
             status = runner.run()
         except BaseException as raised:  # noqa: BLE001 - a behaviour's, or nobody spins the node

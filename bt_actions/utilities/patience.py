@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import weakref
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from typing import Any, TypeVar
@@ -23,6 +24,8 @@ class Patience:
         self.seconds = seconds
         self._hanging: dict[Hashable, Future[Any]] = {}
         self._jobs: _Jobs | None = None
+        self._leave_thread: Callable[[], object] = lambda: None
+        """Let the thread end with what it does; also done when nobody has this any more."""
 
     def __call__(self, key: Hashable, work: Callable[[], T]) -> T:
         """Return what `work` returns, or raise what it raises.
@@ -30,7 +33,7 @@ class Patience:
         Raises TimeoutError where it takes too long. It goes on, and is not begun again meanwhile:
         who asks for `key` when it is done is given what came of it.
         """
-        future = self._hanging.get(key)
+        future: Future[T] | None = self._hanging.get(key)
         if future is None:
             future = self._submit(work)
             try:
@@ -39,35 +42,38 @@ class Patience:
                 if future.done():
                     raise
                 self._hanging[key] = future
-                self.close()
+                self._leave_thread()
+                self._jobs = None
                 raise
         if not future.done():
             raise TimeoutError
         del self._hanging[key]
-        result: T = future.result()
-        return result
-
-    def close(self) -> None:
-        """Let the thread end with what it does; work that comes later has another one."""
-        if self._jobs is not None:
-            self._jobs.put(None)
-            self._jobs = None
+        return future.result()
 
     def _submit(self, work: Callable[[], T]) -> Future[T]:
         future = Future[T]()
         if self._jobs is None:
-            self._jobs = queue.SimpleQueue()
+            self._jobs = jobs = _Jobs()
+            self._leave_thread = weakref.finalize(self, jobs.put, None)
             threading.Thread(
-                target=_do, args=(self._jobs,), name="bt_actions-reads", daemon=True
+                target=_work, args=(jobs,), name="bt_actions-reads", daemon=True
             ).start()
         self._jobs.put((future, work))
         return future
 
 
-def _do(jobs: _Jobs) -> None:
-    while (job := jobs.get()) is not None:
-        future, work = job
-        try:
-            future.set_result(work())
-        except BaseException as error:  # noqa: BLE001 - raised where it is asked for
-            future.set_exception(error)
+def _work(jobs: _Jobs) -> None:
+    while _did(jobs.get()):
+        pass
+
+
+def _did(job: tuple[Future[Any], Callable[[], Any]] | None) -> bool:
+    """Do a piece of work; whether there was one. Nothing of it is kept by the thread."""
+    if job is None:
+        return False
+    future, work = job
+    try:
+        future.set_result(work())
+    except BaseException as error:  # noqa: BLE001 - raised where it is asked for
+        future.set_exception(error)
+    return True

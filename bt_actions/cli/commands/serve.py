@@ -1,7 +1,8 @@
 """`bt-actions serve`: trees in folders as one action, for other nodes to run by name, until Ctrl-C.
 
-Prints one line: `ready: ...` when goals are accepted, `unconfigured: ...` with --managed. What
-happens to goals goes to the log.
+Prints one line: `ready: ...` when goals are accepted, `unconfigured: ...` with --managed. Where
+another server of the action comes first, `waiting: ...` is printed before. What happens to goals
+goes to the log.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ and says which goals are not accounted for (exit code 3).
 """
 
 _POLICIES = ("reject", "queue", "replace", "parallel")
+_NAMED = 3
+"""Of several files of one name, how many are told where it is ready; the log has them all."""
 _LISTS = {"trees": "DIR", "python": "PACKAGE"}
 _HELP = {
     "trees": "a folder of trees, or package://NAME/trees; repeatable; nothing outside is read; "
@@ -221,11 +224,17 @@ def _announce(server: TreeServer, *, managed: bool) -> None:
     if managed:
         say(f"unconfigured: {server.node.get_fully_qualified_name()}")
         return
+    from bt_actions.serving.story import warnings_of
+
     assert server.lifecycle is not None
     server.lifecycle.change("configure")
     server.lifecycle.change("activate")
     entries = server.catalog.entries()
     broken = [each.name for each in entries if each.tree is None]
     more = f", {len(broken)} broken: {listing(broken)}" if broken else ""
+    if warnings := [one.message for each in entries for one in warnings_of(each)]:
+        more += f"; {listing(warnings, _NAMED)}"
     name = f"{server.node.get_namespace().rstrip('/')}/run_tree"
-    say(f"ready: {name}, {len(entries) - len(broken)} trees{more}")
+    ready = f"ready: {name}, {len(entries) - len(broken)} trees{more}"
+    server.precedence.regained = lambda: say(ready)
+    say(f"waiting: {server.precedence.why}" if server.precedence.yields() else ready)

@@ -60,7 +60,8 @@ class CallView(GoalView):
         message = self._leaf.progress().feedback
         if message is None:
             return ""
-        return ", ".join(_leaf_text(each) for each in message.running)
+        running = ", ".join(_leaf_text(each) for each in message.running)
+        return f"paused{': ' if running else ''}{running}" if message.paused else running
 
     def result_lines(self) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""

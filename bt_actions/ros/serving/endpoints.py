@@ -78,7 +78,9 @@ class Endpoints:
         self._made.callback(self.node.destroy_publisher, publisher)
         return publisher
 
-    def timer(self, period: float, callback: Callable[[], None], *, autostart: bool = True) -> Any:
+    def timer(
+        self, period: float, callback: Callable[[], object], *, autostart: bool = True
+    ) -> Any:
         """Return a timer on the steady clock."""
         timer = self.node.create_timer(
             period,
