@@ -84,13 +84,14 @@ class Catalog:
     def __init__(self, folders: Iterable[Path], *, python: Iterable[str] = ()) -> None:
         self._patience = Patience(AT_START)
         self.folders = tuple(Path(each) for each in folders)
-        for folder in self.folders:
-            try:
-                is_folder = self._patience(folder, folder.is_dir)
-            except TimeoutError:
-                raise NotADirectoryError(f"{folder}: {_NOT_READ}") from None
-            if not is_folder:
-                raise NotADirectoryError(f"{folder} is no folder of trees")
+        with self._patience:
+            for folder in self.folders:
+                try:
+                    is_folder = self._patience(folder, folder.is_dir)
+                except TimeoutError:
+                    raise NotADirectoryError(f"{folder}: {_NOT_READ}") from None
+                if not is_folder:
+                    raise NotADirectoryError(f"{folder} is no folder of trees")
         self._python = frozenset(python)
         self._lock = threading.Lock()
         self._entries: dict[str, Entry] = {}
@@ -101,7 +102,7 @@ class Catalog:
 
     def entries(self) -> list[Entry]:
         """All trees, by name."""
-        with self._lock:
+        with self._lock, self._patience:
             found = [self._entry(name, paths) for name, paths in sorted(self._files().items())]
             self._entries = {each.name: each for each in found if each is not None}
             self._patience.seconds = PATIENCE
@@ -109,7 +110,7 @@ class Catalog:
 
     def find(self, name: str) -> Entry:
         """The tree of this name, as it is now. Raises Refused."""
-        with self._lock:
+        with self._lock, self._patience:
             files = self._files()
             entry = self._entry(name, files.get(name, ()))
             if entry is None:

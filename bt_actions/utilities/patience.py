@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import queue
 import threading
-import weakref
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any, Self, TypeVar
 
 T = TypeVar("T")
 _Jobs = queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]
@@ -17,15 +17,19 @@ class Patience:
     """Does one piece of work after another on a thread of its own, and waits so long for each.
 
     Each is waited for `seconds`; a quarter of that while another hangs, as many files may lie on
-    one stuck mount. To be called on one thread at a time.
+    one stuck mount. A context manager, at whose end the thread goes; for one user at a time.
     """
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
         self._hanging: dict[Hashable, Future[Any]] = {}
         self._jobs: _Jobs | None = None
-        self._leave_thread: Callable[[], object] = lambda: None
-        """Let the thread end with what it does; also done when nobody has this any more."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._leave_thread()
 
     def __call__(self, key: Hashable, work: Callable[[], T]) -> T:
         """Return what `work` returns, or raise what it raises.
@@ -43,7 +47,6 @@ class Patience:
                     raise
                 self._hanging[key] = future
                 self._leave_thread()
-                self._jobs = None
                 raise
         if not future.done():
             raise TimeoutError
@@ -53,27 +56,23 @@ class Patience:
     def _submit(self, work: Callable[[], T]) -> Future[T]:
         future = Future[T]()
         if self._jobs is None:
-            self._jobs = jobs = _Jobs()
-            self._leave_thread = weakref.finalize(self, jobs.put, None)
-            threading.Thread(
-                target=_work, args=(jobs,), name="bt_actions-reads", daemon=True
-            ).start()
+            self._jobs = _Jobs()
+            work_on = partial(_work, self._jobs)
+            threading.Thread(target=work_on, name="bt_actions-reads", daemon=True).start()
         self._jobs.put((future, work))
         return future
 
+    def _leave_thread(self) -> None:
+        """Let it end with what it does."""
+        if self._jobs is not None:
+            self._jobs.put(None)
+            self._jobs = None
+
 
 def _work(jobs: _Jobs) -> None:
-    while _did(jobs.get()):
-        pass
-
-
-def _did(job: tuple[Future[Any], Callable[[], Any]] | None) -> bool:
-    """Do a piece of work; whether there was one. Nothing of it is kept by the thread."""
-    if job is None:
-        return False
-    future, work = job
-    try:
-        future.set_result(work())
-    except BaseException as error:  # noqa: BLE001 - raised where it is asked for
-        future.set_exception(error)
-    return True
+    while (job := jobs.get()) is not None:
+        future, work = job
+        try:
+            future.set_result(work())
+        except BaseException as error:  # noqa: BLE001 - raised where it is asked for
+            future.set_exception(error)

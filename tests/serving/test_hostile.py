@@ -167,6 +167,6 @@ def test_what_a_server_says_of_strangers_is_one_clean_line_each(
             assert clean(text) == text
             assert len(text) <= LONGEST + 20
     assert sum("\ufffd" in told.tree for told in client.rejections) == 1
-    assert sum("asks for command" in line for line in server.errors) == 4
+    assert sum("asked for by" in line for line in server.errors) == 4
     assert not any(line.startswith(spoofed) for line in server.errors)
     assert [line for line in server.errors if clean(line) != line or len(line) > LONGEST] == []
