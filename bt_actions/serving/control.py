@@ -57,9 +57,9 @@ class Control:
             known = listing(f"{each.word} ({number})" for number, each in self._steps.items())
             response.message = f"{request.command} is no command; {known} are"
         elif goal is None:
-            wanted = f"no goal {goal_id.hex()} runs here" if any(goal_id) else "no goal id is given"
+            wrong = f"no goal {goal_id.hex()} runs here" if any(goal_id) else "no goal id is given"
             there = listing(f"{each.id.hex()} ({each.tree})" for each in goals.values())
-            response.message = f"{wanted}; {f'there is {there}' if goals else 'none does'}"
+            response.message = f"{wrong}; {f'there is {there}' if goals else 'nothing runs here'}"
         else:
             asks = clean(request.requested_by)[:ECHO]
             self._say(goal, f"{step.word} asked for by {asks or 'a client'}")

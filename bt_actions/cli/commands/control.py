@@ -38,7 +38,9 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("server", metavar="SERVER", help="its action, such as /r1/run_tree")
-    parser.add_argument("wish", choices=tuple(_DONE), help="what to do with the run")
+    parser.add_argument(
+        "wish", metavar="pause|resume|halt", choices=tuple(_DONE), help="what to do with the run"
+    )
     parser.add_argument("goal", metavar="ID", nargs="?", default="", help="which run")
     add_option(parser, "--namespace", help="namespace of the server, where SERVER has no slash")
     add_ros_args(parser)
