@@ -38,6 +38,7 @@ examples:
 
 The action is `run_tree`, of type bt_actions_interfaces/action/RunTree; a tree's name is its file's.
 A goal with an unknown tree or wrong inputs is rejected, and `~/rejections` and the log say why.
+Where another server of the action is there already, this one waits until that is gone.
 After a crash, the goals that the killed server left are canceled first; where nobody can see what
 was left, it ends with exit code 3.
 Ctrl-C and SIGTERM end it: all goals are canceled and drained first. A second Ctrl-C leaves at once
