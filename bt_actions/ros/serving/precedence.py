@@ -75,7 +75,7 @@ class Precedence:
                 self._unclaimed_since = None
                 return ""
             names = [name for name, _ in self._node.get_topic_names_and_types()]
-        except InvalidHandle:  # the node is gone
+        except (InvalidHandle, RuntimeError):  # the node is gone, or its context
             return ""
         here = [name for name in names if name.startswith(f"{self._action}/_since/")]
         claims = sorted(found[0] for found in map(_CLAIM.search, here) if found)
