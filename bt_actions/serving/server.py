@@ -128,14 +128,15 @@ class TreeServer:
             yields=self.precedence.yields,
             keeps=RESULT_TIMEOUT,
         )
-        endpoints.service(ListTrees, "~/list_trees", self._on_list)
-        endpoints.service(CheckTree, "~/check_tree", self._on_check)
+        silent = self.precedence.is_doubled
+        endpoints.service(ListTrees, "~/list_trees", self._on_list, silent=silent)
+        endpoints.service(CheckTree, "~/check_tree", self._on_check, silent=silent)
         control = Control(
             lambda: dict(self._goals),
             lambda goal: self._end(goal, Ending.HALTED),
             self._tell_of,
         )
-        endpoints.service(ControlTree, "~/control_tree", control.answer)
+        endpoints.service(ControlTree, "~/control_tree", control.answer, silent=silent)
         self._timer = endpoints.timer(FASTEST, self._tell, autostart=False)
         Diagnostics(endpoints, self._standings, self._worker.submit)
         self.lifecycle: Lifecycle | None = None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,11 +14,15 @@ from typing import Any
 import pytest
 from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
+from bt_actions_interfaces.srv import CheckTree
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.action import ActionServer
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from bt_actions.goals.ids import new_goal_id
+from bt_actions.ros.graph import servers
 from bt_actions.serving import TreeServer
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Process
@@ -62,6 +69,8 @@ def test_a_second_server_says_so_and_leaves_every_goal_to_the_first(
         sent = client.send("empty")
         assert client.result(sent)[0] == GoalStatus.STATUS_SUCCEEDED
         assert client.cancel(sent) == 0
+        asked = client.call(CheckTree, tree="empty")
+        assert not any(each.code == "INACTIVE" for each in asked.findings), "the first is asked"
     until(lambda: begun(first) == 5)
     assert begun(second) == 0
     client.until(lambda: levels == {DiagnosticStatus.ERROR}, "it is in the diagnostics")
@@ -124,6 +133,45 @@ def test_a_server_that_is_none_of_trees_comes_first(
     foreign.destroy()
     until(lambda: not server.precedence.why)
     server.close()
+
+
+AUTHORS = {
+    "this process": new_goal_id,
+    "a dead one": lambda: bytes.fromhex(subprocess.check_output(MAKE_ID, text=True)),
+    "another machine's": lambda: new_goal_id()[:3] + b"???" + new_goal_id()[6:],
+}
+MAKE_ID = [
+    sys.executable,
+    "-c",
+    "from bt_actions.goals.ids import new_goal_id; print(new_goal_id().hex())",
+]
+
+
+@pytest.mark.parametrize(
+    ("author", "why"),
+    [
+        ("this process", f"process {os.getpid()} has served"),
+        ("a dead one", ""),
+        ("another machine's", "a process on another machine has served"),
+    ],
+    ids=AUTHORS,
+)
+def test_who_was_there_earlier_counts_unless_it_is_dead(
+    new_node: Callable[[str], Node], folder: Path, author: str, why: str
+) -> None:
+    node, ours = new_node("other"), new_node("ours")
+    claim = f"run_tree/_since/t{1:020d}_{AUTHORS[author]().hex()}"
+    node.create_publisher(Time, claim, 1)
+    other = ActionServer(node, RunTree, "run_tree", lambda goal: RunTree.Result())
+    until(lambda: servers(ours, "run_tree"))
+    until(lambda: ours.count_publishers(claim))
+    server = TreeServer(ours, trees=folder)
+    until(lambda: len(servers(ours, "run_tree")) == 2)
+    server.precedence.yields()
+    assert server.precedence.why.startswith(why)
+    assert bool(server.precedence.why) is bool(why)
+    server.close()
+    other.destroy()
 
 
 def test_one_that_yields_sees_its_own_goals_to_their_end_and_answers_no_other_question(

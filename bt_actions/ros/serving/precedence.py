@@ -63,6 +63,13 @@ class Precedence:
             self.regained()
         return bool(why)
 
+    def is_doubled(self) -> bool:
+        """Whether a server that comes first has a node of the same name, and so our services."""
+        if not self.yields():
+            return False
+        mine = self._node.get_name(), self._node.get_namespace()
+        return int(self._node.get_node_names_and_namespaces().count(mine)) > 1
+
     def _look(self) -> str:
         """Return why another server is to answer, or "".
 
