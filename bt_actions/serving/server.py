@@ -65,8 +65,8 @@ class TreeServer:
     Args:
         node: where all of it is, and from where the trees' goals are sent. Somebody spins it, on
             another thread than the one that makes or closes this; any executor will do.
-        trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Nothing
-            outside of them is read.
+        trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Of
+            other files, those are read that are linked there.
         policy: what to do with a goal while another runs: "reject", "queue", "replace", "parallel".
         most: how many goals may wait (queue), or run (parallel).
         python: the packages whose classes the trees' ``python:`` nodes may name.
