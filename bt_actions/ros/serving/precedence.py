@@ -24,8 +24,10 @@ LOOK = 1.0
 """Seconds in which a new server is shown one that is there (0.04 to 0.6 measured)."""
 _GLANCE = 0.05
 """Seconds between two looks."""
-_UNCLAIMED = 0.5
-"""Seconds for which a server is in sight until its topic is, too, if it has one."""
+_UNCLAIMED = 2.0
+"""Seconds for which a server is in sight until its topic is, too, if it has one;"""
+_UNCLAIMED_AT_START = 0.3
+"""and before this one has answered anybody, when to yield for a moment costs nothing."""
 _CLAIM = re.compile(r"/_since/t(\d{20})_([0-9a-f]{32})$")
 
 
@@ -94,8 +96,9 @@ class Precedence:
             return ""
         now = time.monotonic()
         self._unclaimed_since = self._unclaimed_since or now
-        if now - self._unclaimed_since < _UNCLAIMED:
-            return ""
+        at_start = now < self._begun + LOOK
+        if now - self._unclaimed_since < (_UNCLAIMED_AT_START if at_start else _UNCLAIMED):
+            return self.why
         return f"another server of {self._action} is in sight, which is no server of trees"
 
 
