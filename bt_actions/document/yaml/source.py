@@ -36,10 +36,6 @@ PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
 Char = tuple[str, int, int]
 """A character of a text, and the line and column where it is written, from 1."""
-_PAIR = re.compile(
-    r"(?<!\\)((?:\\\\)*)\\u(d[89ab][0-9a-f]{2})\\u(d[c-f][0-9a-f]{2})", re.IGNORECASE
-)
-"""A character as JSON may write it, and YAML may not: as two halves of UTF-16."""
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PLAIN = bytes([9, 10, 13, *range(32, 127)])
 """What most texts are made of alone: then none is forbidden, and that is seen faster."""
@@ -104,9 +100,10 @@ class Source:
 
     @property
     def lines(self) -> list[str]:
-        """The lines, without their ends."""
+        """The lines as YAML 1.2 and editors count them, without their ends."""
         if self._lines is None:
-            self._lines = self.text.splitlines() if self.text else []
+            text = self.text.replace("\r\n", "\n").replace("\r", "\n")
+            self._lines = text.removesuffix("\n").split("\n") if text else []
         return self._lines
 
     def line(self, number: int) -> str | None:
@@ -265,8 +262,6 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
         raise _unreadable(
             name, f"byte 0x{data[error.start]:02x} is no UTF-8", "BT101", line, column
         ) from None
-    if path is not None and path.suffix == ".json":
-        text = _PAIR.sub(_joined, text)
     source = Source(name, text, path)
     bad = _FORBIDDEN.search(text) if data.translate(None, _PLAIN) else None
     if bad is not None:
@@ -283,10 +278,6 @@ def spoken(char: str) -> str:
     """What to call a character that nobody sees."""
     known = {"\t": "a tab", "\n": "a line break"}.get(char)
     return known or f"U+{ord(char):04X} ({unicodedata.name(char, 'no name').lower()})"
-
-
-def _joined(pair: re.Match[str]) -> str:
-    return pair[1] + bytes.fromhex(pair[2] + pair[3]).decode("utf-16-be")
 
 
 def _unreadable(
