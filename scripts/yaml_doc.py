@@ -99,7 +99,7 @@ In the fields of a message, and in variables that fill them (but for `now` and c
 | field | may be written |
 |---|---|
 | builtin_interfaces/Time | `now`, seconds, or `{{sec, nanosec}}` |
-| builtin_interfaces/Duration | `500 ms`, seconds, or `{{sec, nanosec}}` |
+| builtin_interfaces/Duration | `500 ms`, `-1 s`, seconds, or `{{sec, nanosec}}` |
 | geometry_msgs/Quaternion | `{{yaw: 90 deg}}` (`$a`: radians), `roll`, `pitch`; or its fields |
 | a number with constants | `STATUS_MOVING`, `MoveRobot.Feedback.STATUS_MOVING`, `pkg/msg/X.NAME` |
 

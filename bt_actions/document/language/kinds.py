@@ -312,7 +312,7 @@ def _all() -> Iterable[Kind]:
         Text("a class, such as package.module.Class, as a text"),
         "A behaviour of one's own, made with its name and `arguments`.",
         "python: py_trees.behaviours.Periodic\narguments: {n: 3}",
-        Key("arguments", Values(), "For its constructor; where that wants an enum, a member's name."),
+        Key("arguments", Values(), "For its constructor; of an enum, a member's name."),
     )
     yield _leaf(
         "check",

@@ -10,6 +10,7 @@ import sys
 from dataclasses import dataclass
 
 from bt_actions.document.findings.elsewhere import notation_here
+from bt_actions.document.language.bare import warn_bare_duration
 from bt_actions.document.language.shape import (
     Schema,
     is_computed,
@@ -19,7 +20,7 @@ from bt_actions.document.language.shape import (
     wrong_form,
 )
 from bt_actions.document.language.values import BAD, Computed, read_expression, read_value
-from bt_actions.document.yaml.cut import warn_cut
+from bt_actions.document.yaml.cut import warn_cut, warn_quotes
 from bt_actions.document.yaml.nodes import NULLS, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, spoken
 from bt_actions.utilities.suggest import did_you_mean
@@ -31,6 +32,8 @@ __all__ = [
 ]  # fmt: skip
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_MARKED = re.compile(r"\$(?:[({]+\s*)?[A-Za-z_]")
+"""A variable as a text or an expression holds it, or as other tools write one."""
 GREATEST = sys.float_info.max
 _NAME_LIMIT = 200
 
@@ -48,6 +51,7 @@ class Text:
         if self.values:
             return read_value(node, source)
         warn_cut(node, source, "text")
+        warn_quotes(node, source)
         return node.text
 
     def schema(self) -> Schema:
@@ -85,6 +89,12 @@ class NodeName:
             return BAD
         if source.commented:
             warn_cut(node, source, "name")
+        warn_quotes(node, source)
+        if _MARKED.search(text):
+            source.report(
+                "BT319", span_of(node), f"no value is put into a name: it stays {text!r}",
+                hint="leave the '$' away; 'log: ...' beside the node can show the value",
+            )  # fmt: skip
         return text
 
     def schema(self) -> Schema:
@@ -221,6 +231,7 @@ class Duration:
         if seconds == 0 and not self.zero:
             source.report("BT110", span_of(node), "a duration here is more than zero")
             return BAD
+        warn_bare_duration(node, seconds, source)
         return seconds
 
     def schema(self) -> Schema:

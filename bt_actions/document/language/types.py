@@ -18,6 +18,7 @@ from bt_actions.messages.fields import (
     Message,
     Scalar,
 )
+from bt_actions.messages.interfaces import DURATION
 from bt_actions.utilities.suggest import did_you_mean
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ PLAIN_TYPES = ("bool", *FLOATS, *(name for name in INTEGERS), "string")
 """The types that need no package."""
 _STAND_FOR = {
     "builtin_interfaces/msg/Time": (*FLOATS, *INTEGERS),
-    "builtin_interfaces/msg/Duration": (*FLOATS, *INTEGERS, "string"),
+    DURATION: (*FLOATS, *INTEGERS, "string"),
 }
 """The plain types whose values may be given for a message: seconds, and `500 ms`."""
 _TEXT = Scalar("string")

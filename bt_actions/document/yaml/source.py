@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
-    "read_source", "read_stream", "source_of", "spoken",
+    "read_source", "read_stream", "source_of", "spoken", "unquoted",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
@@ -41,6 +41,10 @@ _PLAIN = bytes([9, 10, 13, *range(32, 127)])
 """What most texts are made of alone: then none is forbidden, and that is seen faster."""
 _UNSEEN = re.compile("[\xa0\u1680\u2000-\u200d\u202f\u205f\u2060\u3000\ufeff]")
 """Looks like a space, or like nothing."""
+_QUOTES = "“”„«»‘’‚"
+_QUOTED = re.compile(f"[{_QUOTES}]([^{_QUOTES}\"']+)[{_QUOTES}]")
+_DASHED = re.compile("[‐‑–—−][0-9.]")
+"""A number behind what looks like a minus sign."""
 
 
 class TooManyErrors(Exception):
@@ -137,7 +141,7 @@ class Source:
             return
         is_error = RULES[code].severity is Severity.ERROR
         if is_error:
-            hint = self._unseen(code, span, message) or hint
+            hint = self._look_alike(code, span, message) or hint
             if self.errors >= MAX_ERRORS:
                 raise TooManyErrors
             self.errors += 1
@@ -156,17 +160,22 @@ class Source:
         if is_error and self.errors == MAX_ERRORS:
             raise TooManyErrors
 
-    def _unseen(self, code: str, span: Span, message: str) -> str | None:
-        """Name what only looks like a space, and may be why an error is found here.
+    def _look_alike(self, code: str, span: Span, message: str) -> str | None:
+        """Name what only looks like a space, a quote or a minus sign, and may be why an error is
+        found here.
 
-        Looked for in the indentation and the place itself; what is no YAML may go wrong anywhere
-        on the line, or the one above.
+        A space is looked for in the indentation and the place itself; what is no YAML may go wrong
+        anywhere on the line, or the one above.
         """
         line = self.line(span.line) or ""
         end = span.end_column - 1 if span.end_line == span.line else len(line)
         parts = [line[: len(line) - len(line.lstrip())], line[span.column - 1 : end]]
         if code == "BT102":
             parts = [line, self.line(span.line - 1) or ""]
+        if (inside := unquoted(parts[1])) is not None:
+            return f"{parts[1][0]} is a typographic quote: write {inside}"
+        if _DASHED.match(parts[1]):
+            return f"{parts[1][0]} is no minus sign: write -{parts[1][1:]}"
         odd = _UNSEEN.search("\n".join(parts))
         if odd is None or spoken(odd[0]) in message:
             return None
@@ -272,6 +281,12 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
             line, column,
         )  # fmt: skip
     return source
+
+
+def unquoted(text: str) -> str | None:
+    """What stands inside of typographic quotes, where a text is in such quotes."""
+    found = _QUOTED.fullmatch(text) if text[:1] in _QUOTES else None
+    return None if found is None else found[1]
 
 
 def spoken(char: str) -> str:
