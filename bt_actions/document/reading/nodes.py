@@ -11,7 +11,7 @@ from itertools import chain
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.findings.elsewhere import kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
-from bt_actions.document.language.kinds import KINDS, Kind
+from bt_actions.document.language.kinds import KINDS, Group, Kind
 from bt_actions.document.language.scalars import Name
 from bt_actions.document.language.shape import words_for, wrong_form
 from bt_actions.document.language.shapes import (
@@ -21,6 +21,7 @@ from bt_actions.document.language.shapes import (
     required_in,
 )
 from bt_actions.document.language.values import BAD
+from bt_actions.document.reading.around import around
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
@@ -147,7 +148,8 @@ class _Reader:
             self._source.report(
                 "BT112", span_of(second),
                 f"a node is one thing: this is a {first.text!r} and a {second.text!r}",
-                hint="begin a new item with '-'", related=Related(place, "the first is here"),
+                hint=self._nested(written, first, second) or "begin a new item with '-'",
+                related=Related(place, "the first is here"),
             )  # fmt: skip
             return None
         words = [key for key, _ in written.pairs if key.text not in NODE_KEYS]
@@ -162,6 +164,14 @@ class _Reader:
         ):
             return beside[0]  # with what it holds in the place of 'child'
         self._report_no_kind(written, words)
+        return None
+
+    def _nested(self, written: Mapping, first: Scalar, second: Scalar) -> str | None:
+        """What to write where one of two kinds is a decorator, which goes around the other."""
+        for outer, inner in ((first, second), (second, first)):
+            kind = KINDS.get(outer.text)
+            if kind is not None and kind.group is Group.DECORATOR:
+                return around(written, outer, inner)
         return None
 
     def _report_no_kind(self, written: Mapping, words: list[Scalar]) -> None:
@@ -299,7 +309,7 @@ class _Reader:
             message = f"{node.key.text!r} has no {key.text!r}"
             self._source.report("BT107", span_of(key), message, hint=hint)
         else:
-            hint = None
+            hint = around(node.node, key, node.key) if key.text in _BESIDE_CHILD else None
             if key.text == "name" and "name" not in keys:
                 hint = f"the name stands behind '{node.key.text}:'"
             report_unknown_key(key, keys, self._source, hint)
