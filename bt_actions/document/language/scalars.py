@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass
+from typing import Literal
 
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.bare import warn_bare_duration
@@ -19,6 +20,7 @@ from bt_actions.document.language.shape import (
     words_for,
     wrong_form,
 )
+from bt_actions.document.language.types import meant_type
 from bt_actions.document.language.values import BAD, Computed, read_expression, read_value
 from bt_actions.document.yaml.cut import warn_cut, warn_quotes
 from bt_actions.document.yaml.nodes import NULLS, Node, Scalar, span_of
@@ -308,7 +310,7 @@ class Place(Condition):
 class TypeName:
     """The name of a ROS interface, or (kind `value`) of a type that a variable can have."""
 
-    kind: str
+    kind: Literal["action", "srv", "msg", "value"]
 
     @property
     def words(self) -> str:
@@ -321,7 +323,9 @@ class TypeName:
             return wrong_form(self, node, source)
         if self.kind != "value" and not re.fullmatch(_TYPE_NAMES[self.kind], node.text):
             text = f"{node.text!r} is no type name"
-            hint = f"it is written package/{self.kind}/Name"
+            if "_" in node.text.rpartition("/")[2] and "/" in node.text:
+                text += ": its last part has no '_'"
+            hint = meant_type(node.text, self.kind) or f"it is written package/{self.kind}/Name"
             source.report("BT207", span_of(node), text, hint=hint)
             return BAD
         return node.text

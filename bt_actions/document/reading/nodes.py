@@ -79,7 +79,7 @@ class _Reader:
         """A node by itself; its children wait."""
         source = self._source
         if not isinstance(written, Mapping):
-            hint = None
+            hint: str | None = None
             if isinstance(written, Scalar):
                 word, _, name = written.text.partition(":")
                 if word in self._kinds:
@@ -309,7 +309,9 @@ class _Reader:
             message = f"{node.key.text!r} has no {key.text!r}"
             self._source.report("BT107", span_of(key), message, hint=hint)
         else:
-            hint = around(node.node, key, node.key) if key.text in _BESIDE_CHILD else None
+            hint = None
+            if key.text in _BESIDE_CHILD:
+                hint = around(node.node, key, node.key)
             if key.text == "name" and "name" not in keys:
                 hint = f"the name stands behind '{node.key.text}:'"
             report_unknown_key(key, keys, self._source, hint)
