@@ -246,13 +246,19 @@ class _Reader:
             node.name = own
         if unknown:
             return
-        for wanted in needs:
-            if wanted.name not in written:
-                source.report(
-                    "BT108", span_of(node.key),
-                    f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,
-                )  # fmt: skip
-                source.unread.nodes.append(node.key)
+        missing = [wanted for wanted in needs if wanted.name not in written]
+        if missing and node.is_action and node.name in self._actions:
+            said = f"{node.name!r} is an action of this tree: its name is the node's kind"
+            source.report("BT108", span_of(node.key), said, hint=f"write '{node.name}: name'")
+            source.unread.nodes.append(node.key)
+            source.unread.actions = True
+            return
+        for wanted in missing:
+            source.report(
+                "BT108", span_of(node.key),
+                f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.hint,
+            )  # fmt: skip
+            source.unread.nodes.append(node.key)
 
     def _below_name(
         self,
