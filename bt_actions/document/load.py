@@ -319,7 +319,9 @@ def _found(path: PathLike) -> Path:
         return find_tree(path)
     except TreeNotFoundError as error:
         source = Source(os.fspath(path) or '""', "")
-        hint = None if "mean" in str(error) else f"installed are {', '.join(installed_trees())}"
+        hint = None
+        if error.hint and "mean" not in str(error):
+            hint = f"installed are {', '.join(installed_trees())}"
         source.report("BT100", Span(1, 1, 1, 2), str(error), hint=hint)
         raise DocumentError(source.findings) from None
 

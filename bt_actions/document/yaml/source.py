@@ -5,6 +5,7 @@ Reading never takes more than `MAX_BYTES` of memory, whatever the path leads to.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import stat
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
-    "read_source", "read_stream", "source_of", "spoken", "unquoted",
+    "broken_link", "read_source", "read_stream", "source_of", "spoken", "unquoted",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
@@ -212,10 +213,20 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
     except DocumentError:  # is a ValueError, too
         raise
     except FileNotFoundError:
-        raise _unreadable(name, "there is no such file") from None
+        link = broken_link(path)
+        raise _unreadable(name, f"this is {link}" if link else "there is no such file") from None
     except (OSError, ValueError) as error:
         raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
     return source_of(data, name, path)
+
+
+def broken_link(path: Path) -> str:
+    """Describe a link that leads to no file: ``a link to Y, which is not there``; else ""."""
+    with contextlib.suppress(OSError, ValueError):  # of a name that no file can have
+        target = os.path.realpath(path)
+        if path.is_symlink() and not os.path.exists(target):  # noqa: PTH110 - a text
+            return f"a link to {target}, which is not there"
+    return ""
 
 
 def read_stream(stream: BinaryIO | None, name: str) -> Source:
