@@ -299,7 +299,7 @@ def _open(
     if document.root is None:
         message = "this file is for trees to import: it holds no tree itself"
         document.source.report("BT106", Span(1, 1, 1, 2), message)
-        raise DocumentError(document.source.findings)
+        raise DocumentError(_errors(workspace))
     return workspace, document
 
 

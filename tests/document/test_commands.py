@@ -48,6 +48,17 @@ def test_the_text_reads_like_a_compiler_s() -> None:
     assert as_text([]) == ""
 
 
+def test_people_are_told_errors_first_and_tools_by_place() -> None:
+    text = (
+        "tree: t\ndescription: “x”\nroot:\n  sequence: S\n  children:\n"
+        "    - {wait: 500}\n    - {log: $b}\n    - {log: $c}\n"
+    )
+    found = check_source(source_of(text.encode(), "t.yaml"))
+    told = re.findall(r"t\.yaml:(\d+):\d+: (\w+)", as_text(found))
+    assert told == [("7", "error"), ("8", "error"), ("2", "warning"), ("6", "warning")]
+    assert [each["line"] for each in json.loads(as_json(found))] == [2, 6, 7, 8]
+
+
 def test_json_is_a_list_of_objects() -> None:
     first = json.loads(as_json(findings()))[0]
     assert first == {
