@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from bt_actions.messages.as_fields import as_fields
 from bt_actions.messages.conveniences import constant, duration_of, quaternion_of, time_of
 from bt_actions.messages.fields import (
     FLOATS,
@@ -160,7 +161,9 @@ class _Filler:
             return value
         value = self._convenience(cls, value, path)
         if not isinstance(value, (dict, Mapping)):
-            raise ValueError(f"the fields of a {short_name(cls)} are needed, not {show(value)}")
+            near = as_fields(cls, value)
+            said = f"the fields of a {short_name(cls)} are needed, not {show(value)}"
+            raise ValueError(f"{said}: write {near}" if near else said)
         known = describe(cls)
         message = cls() if self._hole is None else None
         outer, self._owner = self._owner, cls

@@ -26,9 +26,10 @@ from bt_actions.document.language.shapes import AnyValue, Key, ListOf, Record, T
 from bt_actions.goals.policy import RETRYABLE, Busy
 
 __all__ = [
-    "ACTION_KEYS", "ACTION_NAME", "ACTION_SERVER", "ACTION_TYPE", "ALIAS", "DOING", "INPUT",
-    "LIBRARY_KEYS", "MESSAGE_TYPE", "NAMESPACE", "NODE", "NODES", "OUTPUT", "POLICIES", "QOS",
-    "RESULT", "RETRY", "SERVICE_RETRY", "TIMEOUT", "TOPIC", "TOPIC_NAME", "TOP_KEYS", "keyed",
+    "ACTION_KEYS", "ACTION_NAME", "ACTION_SERVER", "ACTION_TYPE", "ALIAS", "DEFAULTS", "DOING",
+    "INPUT", "LIBRARY_KEYS", "MESSAGE_TYPE", "NAMESPACE", "NODE", "NODES", "OUTPUT", "POLICIES",
+    "QOS", "RESULT", "RETRY", "SERVICE_RETRY", "TIMEOUT", "TOPIC", "TOPIC_NAME", "TOP_KEYS",
+    "keyed",
 ]  # fmt: skip
 
 

@@ -38,6 +38,7 @@ _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
 _BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
 """Kinds that are taken for keys in a node whose kind stands behind 'type:'."""
+_IN_SEQUENCE = "put a sequence there, and the list into it: {sequence: name, children: [...]}"
 _FIELDS = ("goal", "request", "message")
 """Keys for the fields of what a node sends."""
 
@@ -61,6 +62,8 @@ class _Reader:
         own = actions.pairs if isinstance(actions, Mapping) else []
         self._refused = {key.text for key, _ in own} & NODE_KEYS
         """Names of actions that were reported: what looks like a key may be meant for one."""
+        self._astray = {key.text for key, _ in document.node.pairs} & {*_CHILDREN}
+        """Keys of some node that stand at the top, which was reported."""
         self._waiting: list[tuple[TreeNode, Node]] = []
         """Children to be read, each with its parent; the next is the last."""
 
@@ -84,6 +87,8 @@ class _Reader:
                 word, _, name = written.text.partition(":")
                 if word in self._kinds:
                     hint = f"write '{word}: {name or 'name'}'"
+            elif isinstance(written, Listing) and written.items:
+                hint = _IN_SEQUENCE
             message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
             source.report("BT111", span_of(written), message, hint=hint)
             source.unread.nodes.append(written)
@@ -246,7 +251,10 @@ class _Reader:
             node.name = own
         if unknown:
             return
-        missing = [wanted for wanted in needs if wanted.name not in written]
+        missing = [
+            wanted for wanted in needs
+            if wanted.name not in written and wanted.name not in self._astray
+        ]  # fmt: skip
         if missing and node.is_action and node.name in self._actions:
             said = f"{node.name!r} is an action of this tree: its name is the node's kind"
             source.report("BT108", span_of(node.key), said, hint=f"write '{node.name}: name'")
@@ -326,7 +334,7 @@ class _Reader:
         if name == "child":
             if isinstance(inner, Listing):
                 message = "'child' is one node, not a list"
-                self._source.report("BT109", span_of(inner), message, hint="use a sequence")
+                self._source.report("BT109", span_of(inner), message, hint=_IN_SEQUENCE)
                 self._source.unread.nodes.append(inner)
                 written: list[Node] = inner.items
             else:
