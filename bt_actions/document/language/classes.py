@@ -183,9 +183,15 @@ def _parameters(cls: type[Behaviour]) -> Mapping[str, inspect.Parameter] | None:
 
 
 def _resolved(parameter: inspect.Parameter, names: dict[str, object]) -> inspect.Parameter:
-    if isinstance(parameter.annotation, str):
-        with contextlib.suppress(Exception):  # it may be any code, and name what is not there
-            return parameter.replace(annotation=eval(parameter.annotation, names))
+    """A parameter whose type is no text; as it is where that cannot be told."""
+
+    def alone() -> None:
+        pass
+
+    alone.__annotations__ = {"it": parameter.annotation}
+    with contextlib.suppress(Exception):  # the text may be any code, and name what is not there
+        found = inspect.get_annotations(alone, globals=names, eval_str=True)
+        return parameter.replace(annotation=found["it"])
     return parameter
 
 
