@@ -19,7 +19,7 @@ from bt_actions.messages.fields import (
     Scalar,
 )
 from bt_actions.messages.interfaces import DURATION
-from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
+from bt_actions.utilities.suggest import closest, did_you_mean, listing
 
 if TYPE_CHECKING:
     from bt_actions.messages.interfaces import Kind
@@ -120,8 +120,8 @@ def meant_type(text: str, kind: Kind) -> str | None:
     shorts: dict[str, list[str]] = {}
     for name in installed(kind) if short else ():
         shorts.setdefault(name.rpartition("/")[2], []).append(name)
-    near = next((one for one in shorts if folded(one) == folded(short)), None)
-    found = shorts.get(near or closest(short, shorts, cutoff=0.8) or "", [])
+    near = short if short in shorts else closest(short, shorts, cutoff=0.8)
+    found = shorts.get(near or "", [])
     own = [name for name in found if name.partition("/")[0] in before]
     names = listing(own or found, 4)
     return f"write {names if len(own or found) == 1 else f'one of {names}'}" if names else None
