@@ -106,6 +106,17 @@ def test_places_count_lines_as_an_editor_does() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("char", "name"),
+    [("\x85", "next line"), ("\u2028", "line separator"), ("\u2029", "paragraph separator")],
+)
+def test_a_separator_that_nobody_sees_is_named_where_it_is_wrong(char: str, name: str) -> None:
+    text = f"tree: t\nroot:\n  sequence: S\n  {char}children: [{{success: A}}]\n"
+    (finding,) = check_source(source_of(text.encode(), "t.yaml"))
+    assert (finding.code, finding.line, finding.column) == ("BT107", 4, 3)
+    assert finding.hint == f"U+{ord(char):04X} ({name}) stands here: type this without it"
+
+
 def test_formatting_and_ignores_keep_to_the_same_lines() -> None:
     text = (
         "tree: t\nroot:\n  # of\u2028ours\n  retry: R # bt: ignore[BT304] a\x85b\n"

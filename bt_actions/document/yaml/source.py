@@ -40,7 +40,7 @@ Char = tuple[str, int, int]
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PLAIN = bytes([9, 10, 13, *range(32, 127)])
 """What most texts are made of alone: then none is forbidden, and that is seen faster."""
-_UNSEEN = re.compile("[\xa0\u1680\u2000-\u200d\u202f\u205f\u2060\u3000\ufeff]")
+_UNSEEN = re.compile("[\x85\xa0\u1680\u2000-\u200d\u2028\u2029\u202f\u205f\u2060\u3000\ufeff]")
 """Looks like a space, or like nothing."""
 _QUOTES = "“”„«»‘’‚"
 _QUOTED = re.compile(f"[{_QUOTES}]([^{_QUOTES}\"']+)[{_QUOTES}]")
@@ -302,7 +302,7 @@ def unquoted(text: str) -> str | None:
 
 def spoken(char: str) -> str:
     """What to call a character that nobody sees."""
-    known = {"\t": "a tab", "\n": "a line break"}.get(char)
+    known = {"\t": "a tab", "\n": "a line break", "\x85": "U+0085 (next line)"}.get(char)
     return known or f"U+{ord(char):04X} ({unicodedata.name(char, 'no name').lower()})"
 
 
