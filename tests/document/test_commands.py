@@ -317,6 +317,8 @@ def test_the_place_of_what_is_no_file_stands_there_once(
         ("nowhere/base.yaml", ": there is no folder 'nowhere'"),
         ("lost", ": lost.yaml is a link to {folder}/gone.yaml, which is not there"),
         ("lost.yaml", ": lost.yaml is a link to {folder}/gone.yaml, which is not there"),
+        ("far/a.yaml", ": far is a link to {folder}/gone, which is not there"),
+        ("package://own/trees/a.yaml", "/a.yaml is a link to {folder}/gone, which is not there"),
     ],
 )
 def test_a_tree_that_is_not_there_is_told_with_what_is_beside_it(
@@ -330,6 +332,10 @@ def test_a_tree_that_is_not_there_is_told_with_what_is_beside_it(
     monkeypatch.chdir(tmp_path)
     Path("base.yaml").write_text("tree: base\nroot: {success: }\n")
     Path("lost.yaml").symlink_to("gone.yaml")
+    Path("far").symlink_to("gone")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    Path("share/own/trees").mkdir(parents=True)
+    Path("share/own/trees/a.yaml").symlink_to("../../../gone")
     assert main([command, name.replace("{folder}", str(tmp_path))]) == 2
     out, err = capsys.readouterr()
     assert (out + err).splitlines()[0].endswith(told.replace("{folder}", str(tmp_path)))

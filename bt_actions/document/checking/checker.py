@@ -259,7 +259,8 @@ class Checker:
                     text = f"{named(wanted)} is needed, and this is a text"
                     self.source.report("BT204", span_of(item.node), text)
                 return True
-            if isinstance(item, (int, float)):
+            may_need_more = wanted == TEXT or wanted is ANGLE or isinstance(wanted, Message)
+            if may_need_more and isinstance(item, (int, float)):
                 at = locate(node, path)
                 if isinstance(at, Scalar) and at.value == item:  # else it comes from a file
                     return self._bare_number(at, item, wanted)

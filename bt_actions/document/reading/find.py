@@ -57,9 +57,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
             return candidate
     if _is_there(exact):
         return exact  # whoever reads it will say what it is
-    for path in (exact, *candidates):
-        if link := broken_link(path):
-            raise TreeNotFoundError(f"{path} is {link}")
+    _refuse_links(exact, *candidates)
     raise TreeNotFoundError(_nowhere(wanted, exact, is_name), _searched(exact) if is_name else None)
 
 
@@ -129,8 +127,17 @@ def _in_package(wanted: str) -> Path:
     for candidate in places:
         if _is_file(candidate):
             return candidate
+    _refuse_links(*places)
     near = next(filter(None, map(_beside, places)), "")
     raise TreeNotFoundError(f"there is no {inner!r} in the package {package!r}{near}")
+
+
+def _refuse_links(*places: Path) -> None:
+    """Raise TreeNotFoundError for a link to nowhere, or a folder that is one."""
+    for place in places:
+        for path in (place, place.parent):
+            if link := broken_link(path):
+                raise TreeNotFoundError(f"{path} is {link}")
 
 
 def _is_file(path: Path) -> bool:

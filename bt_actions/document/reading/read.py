@@ -39,7 +39,8 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
         return None
     if not isinstance(node, Mapping):
         message = f"a tree is a mapping with the keys 'tree' and 'root', not {words_for(node)}"
-        source.report("BT106", span_of(node), message)
+        hint = "write 'tree: name' and 'root:', and below that a node"
+        source.report("BT106", span_of(node), message, hint=hint)
         return None
     document = Document(source, node)
     if not library and node.get("root") is None and node.get("tree") is None:

@@ -43,7 +43,7 @@ _PLAIN = bytes([9, 10, 13, *range(32, 127)])
 _UNSEEN = re.compile("[\x85\xa0\u1680\u2000-\u200d\u2028\u2029\u202f\u205f\u2060\u3000\ufeff]")
 """Looks like a space, or like nothing."""
 _QUOTES = "“”„«»‘’‚"
-_QUOTED = re.compile(f"[{_QUOTES}]([^{_QUOTES}\"']+)[{_QUOTES}]")
+_QUOTED = re.compile(f"[{_QUOTES}]([^{_QUOTES}\"']+)[{_QUOTES}\"']")
 _DASHED = re.compile("[‐‑–—−][0-9.]")
 """A number behind what looks like a minus sign."""
 
