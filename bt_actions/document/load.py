@@ -299,7 +299,7 @@ def _open(
     if document.root is None:
         message = "this file is for trees to import: it holds no tree itself"
         document.source.report("BT106", Span(1, 1, 1, 2), message)
-        raise DocumentError(document.source.findings)
+        raise DocumentError(_errors(workspace))
     return workspace, document
 
 
@@ -319,7 +319,9 @@ def _found(path: PathLike) -> Path:
         return find_tree(path)
     except TreeNotFoundError as error:
         source = Source(os.fspath(path) or '""', "")
-        hint = None if "mean" in str(error) else f"installed are {', '.join(installed_trees())}"
+        hint = None
+        if error.hint and "mean" not in str(error):
+            hint = f"installed are {', '.join(installed_trees())}"
         source.report("BT100", Span(1, 1, 1, 2), str(error), hint=hint)
         raise DocumentError(source.findings) from None
 

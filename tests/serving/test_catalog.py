@@ -215,9 +215,12 @@ def test_a_link_to_nowhere_is_one_broken_tree(
 ) -> None:
     write("go.yaml")
     (tmp_path / "trees" / "gone.yaml").symlink_to(tmp_path / "nowhere.yaml")
-    assert {each.name: each.state for each in catalog.entries()} == {
-        "go": State.OK, "gone": State.INVALID,
-    }  # fmt: skip
+    told = {each.name: each.findings for each in catalog.entries()}
+    assert told.keys() == {"go", "gone"}
+    assert not told["go"]
+    assert (
+        f"is a link to {tmp_path / 'nowhere.yaml'}, which is not there" in told["gone"][0].message
+    )
 
 
 def test_files_that_begin_with_a_dot_are_not_looked_at(catalog: Catalog, write: Write) -> None:

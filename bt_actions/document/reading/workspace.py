@@ -166,9 +166,9 @@ class Workspace:
         try:
             path = find_tree(wanted, beside=beside)
         except TreeNotFoundError as error:
-            hint = package_here(wanted)
-            text = f"there is no tree {wanted!r}" if hint else str(error)
-            source.report("BT209", span_of(written), text, hint=hint)
+            here = package_here(wanted)
+            text = f"there is no tree {wanted!r}" if here else str(error)
+            source.report("BT209", span_of(written), text, hint=here or error.hint)
             return None
         if path.suffix not in SUFFIXES and _is_file(path):
             text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"
