@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,6 +46,9 @@ class Rude:
         (array.array("i", [7]) * 4_000_000, "[7, 7, 7, … 4000000 items]"),
         (np.zeros(3), "[0.0, 0.0, 0.0]"),
         (np.float64(2.0), "2.0"),
+        (np.float32(0.7), "0.7"),
+        (np.array([0.7, 16777217.0], np.float32), "[0.7, 16777216.0]"),
+        (array.array("f", [0.7, -1e-30, math.inf]), "[0.7, -1e-30, inf]"),
         ([[7] * 100] * 2, "[[7, 7, 7, … 100 items], [7, 7, 7, … 100 items]]"),
         ([Rude()], "[<Rude>]"),
         (SimpleNamespace(a=1), "namespace(a=1)"),

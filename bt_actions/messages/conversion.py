@@ -27,7 +27,7 @@ from bt_actions.messages.fields import (
     no_field,
 )
 from bt_actions.messages.interfaces import DURATION, interface_name, short_name
-from bt_actions.utilities.plain_data import numbers_only, plain, scalar
+from bt_actions.utilities.plain_data import field_of, numbers_only, plain, scalar
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.units import parse_angle
 
@@ -110,12 +110,9 @@ def to_plain(message: object) -> Any:
     """Dictionaries, lists and scalars that JSON can say (except NaN and infinities)."""
     fields = getattr(type(message), "get_fields_and_field_types", None)
     if fields is not None:
-        return {name: to_plain(getattr(message, name)) for name in fields()}
-    if isinstance(message, bytes) and len(message) == 1:
-        return message[0]
-    to_list = getattr(message, "tolist", None)  # array.array and numpy alike
-    if to_list is not None:
-        return to_list()
+        types = fields()
+        return {name: to_plain(field_of(message, name, types)) for name in types}
+    message = plain(message)  # array.array and numpy alike
     if isinstance(message, (list, tuple, bytes)):
         if numbers_only(message):
             return list(message)
@@ -200,7 +197,7 @@ class _Filler:
         name = str(kind.item)
         items: Any = array.array("B", value) if isinstance(value, (bytes, bytearray)) else value
         if hasattr(items, "tolist") and getattr(items, "typecode", None) != _CODES.get(name):
-            items = items.tolist()  # numpy's, too
+            items = plain(items)  # numpy's, too
         if not isinstance(items, (list, tuple, array.array)):
             raise ValueError(f"a list of {name} is needed, not {show(value)}")
         converted: Any = None if self._hole else _numbers(name, items)  # there may be millions

@@ -9,9 +9,12 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+from bt_actions.messages.conversion import show
+from bt_actions.messages.interfaces import short_name
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
+from bt_actions.traffic.backend import ARRIVES
 from bt_actions.traffic.handle import waker
 from bt_actions.traffic.traffic import Traffic
 
@@ -50,7 +53,7 @@ class VirtualBackend:
 
     def publisher(self, message_type: type, topic: str, qos: str) -> VirtualSpeaker:
         """Become a publisher on a topic."""
-        return VirtualSpeaker(self.network, topic, qos)
+        return VirtualSpeaker(self.network, message_type, topic, qos)
 
     def log(self, level: str, text: str) -> None:
         """Write a line of the tree's to the network's log."""
@@ -65,7 +68,7 @@ class _Connection:
         self._network = network
 
     def may_come(self) -> float:
-        """Say that nobody else may."""
+        """Say that nobody may."""
         return 0.0
 
     def why_nobody(self) -> str:
@@ -79,7 +82,7 @@ class _Connection:
 class VirtualService(_Connection):
     """A client of one service."""
 
-    def __init__(self, network: VirtualNetwork, service_type: type, name: str) -> None:
+    def __init__(self, network: VirtualNetwork, service_type: Any, name: str) -> None:
         super().__init__(network, name)
         self._type = service_type
 
@@ -95,7 +98,7 @@ class VirtualService(_Connection):
             answer, takes = served
 
             def reply() -> None:
-                response = answer(request)
+                response = self._response(answer(request))
                 self._network.timeline.call_in(takes, lambda: self._network.soon(arrive, response))
 
             def arrive(response: Any) -> None:
@@ -105,6 +108,15 @@ class VirtualService(_Connection):
 
             self._network.soon(reply)
         return call
+
+    def _response(self, given: Any) -> Any:
+        """Return what a service has answered. Raises TypeError for what rclpy would not send."""
+        if isinstance(given, self._type.Response):
+            return given
+        wanted, was = short_name(self._type.Response), "None" if given is None else show(given)
+        if isinstance(given, type):
+            was = f"the class {short_name(given)}"
+        raise TypeError(f"the service {self.name} has to return a {wanted}, and returned {was}")
 
 
 class VirtualSubscription(_Connection):
@@ -120,9 +132,18 @@ class VirtualSubscription(_Connection):
     ) -> None:
         super().__init__(network, topic)
         self._topic = network.topic(topic)
+        self._type = message_type
+        self._made_at = network.now()
         self._mine = network.subscribe(message_type, topic, take)
-        if qos == "latched" and isinstance(self._topic.latched, message_type):
+        self._awaits_latched = qos == "latched" and isinstance(self._topic.latched, message_type)
+        if self._awaits_latched:
             network.soon(self._topic.bring, self._mine, self._topic.latched)
+
+    def may_come(self) -> float:
+        """Seconds for which the first message of a publisher that is there may be on its way."""
+        if not self._awaits_latched and self._type not in self._topic.publishers:
+            return 0.0
+        return max(0.0, self._made_at + ARRIVES - self._network.now())
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -133,15 +154,26 @@ class VirtualSubscription(_Connection):
 class VirtualSpeaker(_Connection):
     """One topic, spoken on by a leaf."""
 
-    def __init__(self, network: VirtualNetwork, topic: str, qos: str) -> None:
+    def __init__(self, network: VirtualNetwork, message_type: type, topic: str, qos: str) -> None:
         super().__init__(network, topic)
         self._latched = qos == "latched"
+        self._topic = network.topic(topic)
+        self._type = message_type
+        self._last: Any = None
+        self._topic.publishers.append(message_type)
 
     @property
     def listeners(self) -> int:
         """How many subscriptions there are."""
-        return len(self._network.topic(self.name).subscriptions)
+        return len(self._topic.subscriptions)
 
     def publish(self, message: Any) -> None:
         """Publish."""
+        self._last = message
         self._network.publish(self.name, message, latched=self._latched)
+
+    def close(self) -> None:
+        """Publish no more; what was latched goes with its publisher."""
+        self._topic.leave(self._type)
+        if self._latched and self._topic.latched is self._last:
+            self._topic.latched = None

@@ -68,13 +68,16 @@ class Medium:
 
     def __init__(self, timeline: Timeline) -> None:
         self.timeline = timeline
+        self.arrived_by = 0.0
+        """When all that was sent so far has arrived."""
         self._gids = 0
         self._servers: list[Served] = []
         self._clients: list[Client] = []
 
     def soon(self, work: Callable[..., object], *arguments: Any) -> None:
         """Have `work` called when a message sent now arrives."""
-        self.timeline.call_in(LATENCY, partial(work, *arguments))
+        self.arrived_by = self.timeline.now + LATENCY
+        self.timeline.call_at(self.arrived_by, partial(work, *arguments))
 
     def new_gid(self) -> bytes:
         """Return what sets a server apart."""

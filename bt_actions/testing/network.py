@@ -9,6 +9,8 @@ import itertools
 from collections.abc import Callable
 from typing import Any
 
+from bt_actions.messages.conversion import show
+from bt_actions.messages.interfaces import short_name
 from bt_actions.simulation.platform import Server
 from bt_actions.testing.action_server import VirtualActionServer
 from bt_actions.testing.medium import Medium
@@ -123,11 +125,18 @@ class VirtualNetwork(Medium):
 
 
 class _Topic:
-    """Who listens to a topic, and what later listeners are told."""
+    """Who listens to a topic and who speaks on it, and what later listeners are told."""
 
     def __init__(self) -> None:
         self.subscriptions: list[Subscription] = []
+        self.publishers: list[type] = []
+        """The message types of those who may publish on it."""
         self.latched: Any = None
+
+    def leave(self, message_type: type) -> None:
+        """Count one of its publishers off, if there is one."""
+        if message_type in self.publishers:
+            self.publishers.remove(message_type)
 
     def bring(self, subscription: Subscription, message: Any) -> None:
         """Give a message that arrives to who still listens."""
@@ -142,16 +151,21 @@ class VirtualPublisher:
         self._network = network
         self._type = message_type
         self.topic = topic
+        network.topic(topic).publishers.append(message_type)
 
     def publish(self, message: Any) -> None:
-        """Publish, with the virtual time in the header."""
+        """Publish, with the virtual time in the header. Raises TypeError for another message."""
+        if not isinstance(message, self._type):
+            wanted = short_name(self._type)
+            raise TypeError(f"{self.topic} takes a {wanted}, not {show(message)}")
         if hasattr(message, "header"):
             nanoseconds = int(self._network.now() * 1e9)
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
         self._network.publish(self.topic, message)
 
     def destroy(self) -> None:
-        """Have nothing to let go of."""
+        """Publish no more."""
+        self._network.topic(self.topic).leave(self._type)
 
 
 class VirtualTimer:

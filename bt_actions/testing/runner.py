@@ -89,7 +89,7 @@ class VirtualRunner:
         Raises RuntimeError while a run goes on, as its goals have to end yet.
         """
         if self._goes_on:
-            raise RuntimeError("the run goes on: let it end first, with run(), or interrupt()")
+            raise RuntimeError("the run goes on: let it end first, with advance()")
         return self._loop.goals.unaccounted
 
     def observe(self, callback: Observer) -> None:
@@ -116,7 +116,8 @@ class VirtualRunner:
     def advance(self, seconds: float) -> Status | None:
         """Let so much time pass; return the tree's status if it has ended by then.
 
-        It returns when the tree ends; after that, time passes without it. INVALID means that it
+        It returns when the tree has ended and what it sent last has arrived; after that, time
+        passes without it. INVALID means that it
         was interrupted. Raises what `run` raises, and RuntimeError before the first `start`.
         """
         if self._status is None:
@@ -131,6 +132,9 @@ class VirtualRunner:
             step = self._loop.step(self.now)
             if isinstance(step, Done):
                 self._status = step.result
+                last = self.network.arrived_by
+                while self.network.timeline.advance(last):  # what the tree has sent last
+                    pass
                 return self._status
             self._next, self._goes_on = self.now + step.seconds, True
         while self.network.timeline.advance(until):
@@ -138,7 +142,7 @@ class VirtualRunner:
         return self._status
 
     def interrupt(self) -> None:
-        """Have the run end at the next step: its goals are canceled and drained."""
+        """Have the run end at the next `advance`: its goals are canceled and drained."""
         self._loop.interrupt(self.now)
 
     def shutdown(self) -> None:

@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import pytest
-from std_msgs.msg import Int32
-from std_srvs.srv import SetBool
+from std_msgs.msg import Bool, Int32
+from std_srvs.srv import SetBool, Trigger
 
+from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.handle import Run, begun_in
@@ -182,6 +183,77 @@ def test_some_time_after_it_began_nobody_may_be_on_the_way_any_more(
     spoken.close()
 
 
+@pytest.mark.parametrize("qos", ["default", "latched"])
+def test_a_first_message_has_its_time_where_its_publisher_is_there(
+    world: World, name: str, qos: str
+) -> None:
+    alone = world.backend.subscription(Int32, f"{name}_alone", qos, lambda _: None)
+    world.until(lambda: alone.may_come() == 0.0)  # and the node is new no more
+    spoken = world.backend.publisher(Int32, name, qos)
+    heard = world.backend.subscription(Int32, name, qos, lambda _: None)
+    world.until(lambda: heard.may_come() > 0.0)
+    assert alone.may_come() == 0.0
+    world.until(lambda: heard.may_come() == 0.0)
+    for each in (alone, heard, spoken):
+        each.close()
+
+
+def test_what_was_published_before_is_heard_by_nobody_who_comes_later(
+    world: World, name: str
+) -> None:
+    came: list[int] = []
+    spoken = world.backend.publisher(Int32, name, "default")
+    spoken.publish(Int32(data=1))
+    heard = world.backend.subscription(Int32, name, "default", lambda each: came.append(each.data))
+    world.until(lambda: spoken.listeners == 1)
+    spoken.publish(Int32(data=2))
+    world.until(lambda: came)
+    assert came == [2]
+    heard.close()
+    spoken.close()
+
+
+def test_a_latched_message_goes_with_its_publisher(world: World, name: str) -> None:
+    came: list[int] = []
+    gone = world.backend.publisher(Int32, name, "latched")
+    gone.publish(Int32(data=1))
+    gone.close()
+    heard = world.backend.subscription(Int32, name, "latched", lambda each: came.append(each.data))
+    spoken = world.backend.publisher(Int32, name, "latched")
+    spoken.publish(Int32(data=2))
+    world.until(lambda: came)
+    assert came == [2]
+    heard.close()
+    spoken.close()
+
+
+def test_a_listener_that_raises_raises_where_messages_travel(world: World, name: str) -> None:
+    def take(_message: Any) -> None:
+        raise RuntimeError("a mistake of the listener's")
+
+    heard = world.backend.subscription(Int32, name, "default", take)
+    spoken = world.backend.publisher(Int32, name, "default")
+    world.until(lambda: spoken.listeners == 1)
+    spoken.publish(Int32(data=1))
+    with pytest.raises(RuntimeError, match="a mistake of the listener's"):
+        world.until(lambda: False)
+    heard.close()
+    spoken.close()
+
+
+@pytest.mark.parametrize("given", [None, True, SetBool.Response, Trigger.Response()], ids=str)
+def test_who_serves_has_to_return_the_response_of_the_service(
+    world: World, name: str, given: Any
+) -> None:
+    service = world.backend.service(SetBool, name)
+    world.serve(SetBool, name, lambda _: given)
+    world.until(lambda: service.ready)
+    service.call(SetBool.Request(data=True))
+    with pytest.raises(TypeError):
+        world.until(lambda: False)
+    service.close()
+
+
 def test_a_service_answers_and_wakes_who_runs_the_tree(
     world: World, name: str, told: list[Any]
 ) -> None:
@@ -200,6 +272,20 @@ def test_a_service_answers_and_wakes_who_runs_the_tree(
         assert told == [None]
         assert call.result() == SetBool.Response(success=data, message="switched")
     service.close()
+
+
+@pytest.mark.ros
+def test_a_name_that_is_in_use_with_another_type_is_told_with_both(ros: World, name: str) -> None:
+    full, backend = f"{ros.namespace}/{name}", ros.backend
+    made = [backend.publisher(Int32, name, "default"), backend.service(SetBool, name)]
+    with pytest.raises(TwoTypes, match=f"^{full} is used as std_msgs/msg/Bool, and also as"):
+        backend.subscription(Bool, name, "default", lambda _: None)
+    with pytest.raises(TwoTypes, match=r"/msg/Bool, and also as .*std_msgs/msg/Int32"):
+        backend.publisher(Bool, name, "default")
+    with pytest.raises(TwoTypes, match=r"/srv/Trigger, and also as .*std_srvs/srv/SetBool"):
+        backend.service(Trigger, name)
+    for each in made:
+        each.close()
 
 
 def test_an_answer_to_a_call_that_was_dropped_is_no_answer_to_the_next(

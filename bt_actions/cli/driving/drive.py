@@ -30,6 +30,7 @@ from bt_actions.cli.streams.writing import discard_stdout, note
 from bt_actions.cli.views.lines import QuietView
 from bt_actions.cli.views.view import View
 from bt_actions.cli.views.words import Closing, waiting_text
+from bt_actions.running.loop import UnusableTree
 from bt_actions.running.report import Report
 
 if TYPE_CHECKING:
@@ -305,6 +306,8 @@ class Drive:
             return Exit.UNKNOWN
         if self._stop is not None:
             return self._stop.code
+        if isinstance(self._error, UnusableTree):
+            return Exit.BAD_INPUT
         if self._error is not None or self._report.status is not Status.SUCCESS:
             return Exit.FAILURE
         return Exit.SUCCESS

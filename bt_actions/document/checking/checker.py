@@ -12,8 +12,9 @@ from collections.abc import Mapping as MappingType
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from bt_actions.document.checking.infer import BOOL, TEXT, Wrong, infer, named
+from bt_actions.document.checking.infer import Wrong, infer
 from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
+from bt_actions.document.checking.value_types import BOOL, TEXT, named
 from bt_actions.document.checking.variables import infer_variables, items_inside, type_of
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
@@ -367,6 +368,10 @@ class Checker:
             known = listing(f"${known}" for known in self.variables)
             nothing = None if maybe else "this tree has no inputs and saves nothing"
             hint = f"this tree has {known}" if known else nothing
+            if computed.expression.reads_field_of(name):
+                declared = f"topics: {{{name}: {{topic: {name}, type: package/msg/Name}}}}"
+                has = f"{hint}; " if known else ""
+                hint = f"{has}the messages of a topic are declared: {declared}"
         self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
 
 

@@ -260,6 +260,16 @@ PAGES: Mapping[str, Page] = {
         tree("topics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
              "root: {check: $door.data}\n"),
     ),
+    "BT217": Page(
+        "A name of ROS has one type. A tree, with all that it includes, uses this action server, "
+        "service or topic with two: the second could not even be connected to.",
+        tree("root:\n  sequence: S\n  children:\n"
+             "    - {publish: said, type: std_msgs/msg/String}\n"
+             "    - {publish: said, type: std_msgs/msg/Bool}\n"),
+        tree("root:\n  sequence: S\n  children:\n"
+             "    - {publish: said, type: std_msgs/msg/String}\n"
+             "    - {publish: on, type: std_msgs/msg/Bool}\n"),
+    ),
     **HAZARD_PAGES,
 }  # fmt: skip
 """The page of each rule by its code."""

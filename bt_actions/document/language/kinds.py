@@ -320,7 +320,7 @@ def _all() -> Iterable[Kind]:
     yield _leaf(
         "log",
         Text(values=True),
-        "Writes a line to the log.",
+        "Writes a line to the log. It never fails: `(no value)` stands for what has none.",
         "log: The level is $(level)\nlevel: warn",
         Key(
             "level",
