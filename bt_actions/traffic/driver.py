@@ -144,7 +144,7 @@ class Driver:
 
     def _send(self, handle: GoalHandle) -> None:
         """Count who gets it, have it on record, and send the request."""
-        endpoint, message, handle.message = self._endpoint, handle.message, None
+        endpoint, message = self._endpoint, handle.goal.message
         try:
             handle.replies.sent(endpoint.watch)
             self._put_on_record(handle)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
-__all__ = ["shorten", "shorten_fields"]
+__all__ = ["given_fields", "shorten", "shorten_fields"]
 
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
@@ -63,6 +63,23 @@ def shorten_fields(message: object, limit: int = 80) -> str:
         if len(text) > limit:
             return f"{text[: limit - 1]}…"
     return text
+
+
+def given_fields(message: object) -> dict[str, object]:
+    """Return the fields of a ROS message, by their names, that a new one of its type has not."""
+    fields = getattr(message, "get_fields_and_field_types", dict[str, str])()
+    plain = type(message)() if fields else None
+    given: dict[str, object] = {}
+    for name in fields:
+        value = getattr(message, name)
+        if hasattr(value, "get_fields_and_field_types"):
+            value = given_fields(value)
+            differs: object = bool(value)
+        else:
+            differs = value != getattr(plain, name)
+        if getattr(differs, "any", lambda: differs)():  # an array has one for each item
+            given[name] = value
+    return given
 
 
 def _parts(value: object) -> Iterator[Part] | None:
