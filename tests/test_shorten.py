@@ -74,6 +74,26 @@ def test_the_fields_that_a_message_gives_are_those_that_a_new_one_has_not() -> N
     assert given_fields("no message") == {}
 
 
+class Grid:
+    """A message with a field of a fixed length."""
+
+    def __init__(self) -> None:
+        self.cells, self.at = np.zeros(3), Point()
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        return {"cells": "double[3]", "at": "Point"}
+
+
+def test_a_field_with_others_in_it_is_given_where_one_of_them_is() -> None:
+    grid = Grid()
+    assert given_fields(grid) == {}
+    grid.at.x = 7.0
+    assert shorten(given_fields(grid)) == "{at: {x: 7.0}}"
+    grid.cells[1] = 1.0
+    assert shorten(given_fields(grid)) == "{cells: [0.0, 1.0, 0.0], at: {x: 7.0}}"
+
+
 def test_what_is_longer_than_the_limit_ends_with_an_ellipsis() -> None:
     assert shorten("a" * 1000, 10) == "'aaaaaaaa…"
     assert shorten({"a": "b" * 10, "c": "d" * 10}, 25) == "{a: 'bbbbbbbbbb', c: 'dd…"

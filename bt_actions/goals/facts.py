@@ -135,7 +135,7 @@ class Facts:
     @property
     def fields(self) -> str:
         """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
-        given = given_fields(self.message)
+        given = given_fields(self.message) or self.message  # one that gives none is told whole
         return shorten(given, FIELDS_SHOWN) if given else ""
 
     # For the steps

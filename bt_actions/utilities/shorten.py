@@ -73,13 +73,16 @@ def given_fields(message: object) -> dict[str, object]:
     for name in fields:
         value = getattr(message, name)
         if hasattr(value, "get_fields_and_field_types"):
-            value = given_fields(value)
-            differs: object = bool(value)
-        else:
-            differs = value != getattr(plain, name)
-        if getattr(differs, "any", lambda: differs)():  # an array has one for each item
+            if inner := given_fields(value):
+                given[name] = inner
+        elif not _equal(value, getattr(plain, name)):
             given[name] = value
     return given
+
+
+def _equal(value: object, other: object) -> bool:
+    equal = value == other
+    return bool(equal.all() if hasattr(equal, "all") else equal)  # numpy: one for each item
 
 
 def _parts(value: object) -> Iterator[Part] | None:
