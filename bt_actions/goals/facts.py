@@ -219,7 +219,12 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
     What docs/goal.md says of it is the first line of the function's docstring.
     """
-    return lambda does: Step(does, frozenset(to), (does.__doc__ or "").splitlines()[0].rstrip("."))
+
+    def step(does: Does) -> Step:
+        says = (does.__doc__ or "").partition("\n")[0]  # python -OO leaves no docstring
+        return Step(does, frozenset(to), says.rstrip("."))
+
+    return step
 
 
 @leads_to()

@@ -6,6 +6,7 @@ private. Does not import rclpy.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 from collections.abc import Iterable
@@ -17,7 +18,6 @@ PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _PROFILES = (PROFILE, "FASTDDS_DEFAULT_PROFILES_FILE")
 _TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _IN_THIS_FOLDER = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
-_LOGS = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 _RANGES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
 
 
@@ -47,13 +47,27 @@ def prepare(reach: Reach = Reach.NETWORK) -> None:
     if not _any_is_set(_PROFILES) and not any(Path(name).exists() for name in _IN_THIS_FOLDER):
         os.environ[PROFILE] = str(SHORT_LEASE)
         os.environ.setdefault(_TRANSPORTS, "UDPv4")
-    if not _any_is_set(_LOGS):
-        os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")  # rcl insists on one
     if reach is Reach.PROCESS:
         for name in _RANGES:
             os.environ.pop(name, None)
     if reach is not Reach.NETWORK and not _any_is_set(_RANGES):
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = reach.value
+
+
+def keep_log() -> None:
+    """Have ROS's log in a temporary folder where nothing can be written in the user's home.
+
+    Without a log no ROS program starts. A ROS_LOG_DIR that the user has set stands.
+    """
+    if _any_is_set(["ROS_LOG_DIR"]):
+        return
+    home = os.environ.get("ROS_HOME") or "~/.ros"
+    folder = Path(os.path.expanduser(home), "log")  # noqa: PTH111 - Path's raises without a home
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    if not os.environ.get("HOME") or not os.access(folder, os.W_OK):
+        with contextlib.suppress(OSError):  # then rcl says why
+            os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")
 
 
 def _any_is_set(names: Iterable[str]) -> bool:
