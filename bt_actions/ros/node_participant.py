@@ -24,7 +24,7 @@ from bt_actions.ros.environment import sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
 from bt_actions.ros.graph import enclave, is_valid
 from bt_actions.ros.host import host
-from bt_actions.ros.in_sight import elsewhere
+from bt_actions.ros.in_sight import elsewhere, unmatched_action
 from bt_actions.ros.log import log
 from bt_actions.ros.receiving import Receiver
 from bt_actions.ros.rediscovery import look_for
@@ -156,18 +156,20 @@ class NodeParticipant:
 
     def instead(self, action_type: Any, name: str) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
-        actions = dict[str, str]()
+        actions, ours = dict[str, str](), interface_name(action_type)
         try:
             for topic, _ in self.node.get_topic_names_and_types():
                 if topic.endswith(FEEDBACK):
                     for info in self.node.get_publishers_info_by_topic(topic):
                         kind = info.topic_type.removesuffix("_FeedbackMessage")
                         actions[topic.removesuffix(FEEDBACK)] = kind
+            kind = actions.get(name)
+            why = unmatched_action(self.node, name) if kind == ours else ""
         except Exception:  # noqa: BLE001 - our node was destroyed
             return ""
-        ours, kind = interface_name(action_type), actions.get(name)
         if kind == ours:
-            return ": it is in sight, but was not ready, or has requests enough to answer"
+            why = why or "was not ready, or has requests enough to answer"
+            return f": it is in sight, but {why}"
         if kind is not None:
             return f"; there is one of another type or version, {kind}"
         if not actions:
