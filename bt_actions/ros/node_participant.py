@@ -20,7 +20,7 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.connections import Publisher, Service, Subscription
-from bt_actions.ros.environment import sees_nobody_else
+from bt_actions.ros.environment import of_other_users, sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
 from bt_actions.ros.graph import enclave, is_valid
 from bt_actions.ros.host import host
@@ -154,6 +154,10 @@ class NodeParticipant:
             for part in its
         )
 
+    def unheard(self) -> str:
+        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
+        return of_other_users()
+
     def instead(self, action_type: Any, name: str) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
         actions, ours = dict[str, str](), interface_name(action_type)
@@ -168,7 +172,7 @@ class NodeParticipant:
         except Exception:  # noqa: BLE001 - our node was destroyed
             return ""
         if kind == ours:
-            why = why or "was not ready, or has requests enough to answer"
+            why = why or f"was not ready, or has requests enough to answer{of_other_users()}"
             return f": it is in sight, but {why}"
         if kind is not None:
             return f"; there is one of another type or version, {kind}"

@@ -190,5 +190,9 @@ class VirtualParticipant:
             return "; no action server at all is on this network"
         return did_you_mean(name, served)
 
+    def unheard(self) -> str:
+        """Nothing: here nobody is another user."""
+        return ""
+
     def seek(self, seeker: Seeker) -> None:
         """Look for nothing: a second participant would see the same."""

@@ -175,6 +175,9 @@ class Participant(Opener, Protocol):
     def instead(self, action_type: Any, name: str) -> str:
         """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
 
+    def unheard(self) -> str:
+        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
+
     def seek(self, seeker: Seeker) -> None:
         """Have another participant look for what is missed, soon.
 

@@ -149,6 +149,9 @@ class ModelParticipant:
     def instead(self, action_type: Any, name: str) -> str:
         return ""
 
+    def unheard(self) -> str:
+        return ""
+
     def seek(self, seeker: Any) -> None:
         """There is nothing that is out of sight for good."""
 
