@@ -19,6 +19,8 @@ from bt_actions.traffic.handle import Effect, Endpoint, GoalHandle, Standing, wa
 from bt_actions.traffic.host import Entry, Host
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
 
+_UNANSWERED = (Outcome.ACCEPT_TIMEOUT, None)
+
 
 class Driver:
     """Drives the goals of one endpoint."""
@@ -116,9 +118,8 @@ class Driver:
         host.trace.told(handle, event, detail, commands)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
             goal.reason += why_not(handle)
-        elif event is Event.ACCEPT_DUE and goal.planned is Outcome.ACCEPT_TIMEOUT:
-            if goal.outcome is None:
-                goal.reason += self._endpoint.participant.unheard()
+        elif event is Event.ACCEPT_DUE and (goal.planned, goal.outcome) == _UNANSWERED:
+            goal.reason += self._endpoint.participant.unheard()
         if (due := goal.due_in(now)) is not None:
             host.scheduler.wake_by(now.steady + due)
         self._endpoint.domain.effects.run(handle, self._what_follows(handle, commands))
