@@ -22,7 +22,7 @@ from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.connections import Publisher, Service, Subscription
 from bt_actions.ros.environment import of_other_users, sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
-from bt_actions.ros.graph import enclave, is_valid
+from bt_actions.ros.graph import enclave, is_shut_down, is_valid
 from bt_actions.ros.host import host
 from bt_actions.ros.in_sight import elsewhere, unmatched_action
 from bt_actions.ros.log import log
@@ -102,6 +102,10 @@ class NodeParticipant:
     def alive(self) -> bool:
         """Whether the node is there, and its context was not shut down."""
         return is_valid(self.node)
+
+    def shut_down(self) -> bool:
+        """Whether the context was shut down; else who is not alive was destroyed."""
+        return is_shut_down(self.node)
 
     def full_name(self, action: str) -> str:
         """Return the full name of an action; raises ValueError for one that ROS refuses."""

@@ -170,6 +170,10 @@ class VirtualParticipant:
         """Be gone, as a node that was destroyed."""
         self._alive = False
 
+    def shut_down(self) -> bool:
+        """It never is."""
+        return False
+
     def full_name(self, action: str) -> str:
         """Return the full name of an action."""
         if action.startswith("/"):

@@ -169,6 +169,10 @@ class Participant(Opener, Protocol):
     def alive(self) -> bool:
         """Whether it is there, and can send and hear."""
 
+    def shut_down(self) -> bool:
+        """Whether all of ROS was shut down here, as by Ctrl-C; else one that is not alive has gone
+        from under its goals."""
+
     def full_name(self, action: str) -> str:
         """Return the full name of an action; raises ValueError for one that ROS refuses."""
 

@@ -140,6 +140,9 @@ class ModelParticipant:
     def alive(self) -> bool:
         return True
 
+    def shut_down(self) -> bool:
+        return False
+
     def full_name(self, action: str) -> str:
         return action
 
