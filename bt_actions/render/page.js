@@ -138,6 +138,16 @@ function go_to(node, focus = true) {
   view.scrollBy(way(box.left, box.right, frame.left, frame.right), way(box.top, box.bottom, frame.top, frame.bottom));
 }
 
+// Go to a node and show its card, which on a small screen takes room from the view: then once more.
+
+function present(node, focus) {
+  go_to(node, focus);
+  hovered = null;
+  shut = false;
+  show();
+  go_to(node, focus);
+}
+
 // The card.
 
 const put = (name, parent, text, kind) => {
@@ -268,9 +278,7 @@ svg.addEventListener("keydown", (event) => {
   if (!(event.key in keys)) return;
   event.preventDefault();
   keys[event.key]();
-  hovered = null;
-  shut = false;
-  show();
+  present(current);
 });
 view.addEventListener("focusin", (event) => {  // on the SVG it would make that focusable
   const node = node_at(event.target);
@@ -307,10 +315,7 @@ find("query").addEventListener("keydown", (event) => {
   if (event.key !== "Enter" || !hits.length) return;
   next = (next + (event.shiftKey ? -1 : 1) + hits.length) % hits.length;
   find("found").textContent = `${next + 1} of ${hits.length}`;
-  go_to(hits[next], false);
-  hovered = null;
-  shut = false;
-  show();
+  present(hits[next], false);
 });
 
 function refold(depth) {
