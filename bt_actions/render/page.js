@@ -258,7 +258,10 @@ view.addEventListener("wheel", (event) => {
   zoom(Math.exp(-event.deltaY / 300), event.clientX, event.clientY);
 }, { passive: false });
 view.addEventListener("scroll", () => { if (!card.hidden) show(); }, { passive: true });
-window.addEventListener("resize", show);
+window.addEventListener("resize", () => {  // a phone that is turned, or opens its keyboard
+  show();
+  if (!shut) go_to(current, false);
+});
 
 // Keyboard, as the pattern for trees has it (WAI-ARIA).
 

@@ -35,7 +35,9 @@ def node_name(tree: str) -> str:
     return re.sub(r"\W", "_", f"bt_actions_{''.join(plain)}")[:LONGEST]
 
 
-def start(context: Context, words: Sequence[str] | None = None, domain: int | None = None) -> None:
+def open_context(
+    context: Context, words: Sequence[str] | None = None, domain: int | None = None
+) -> None:
     """Initialise a context with these words, or with the program's; raises what rclpy raises.
 
     A byte that is no UTF-8, as names of files may have it, is escaped: rclpy reads all words.
@@ -58,7 +60,7 @@ def own_node(
     """Return a node in a context of its own, without services; raises what rclpy raises."""
     context = Context()
     try:
-        start(context, args, domain)
+        open_context(context, args, domain)
         return Node(
             name, context=context, enable_rosout=False, start_parameter_services=False, **given
         )

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from rclpy.task import Task
 
 from bt_actions.ros.graph import is_valid
-from bt_actions.ros.naming import named_node, start
+from bt_actions.ros.naming import named_node, open_context
 from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.workarounds import participant
 from bt_actions.ros.workarounds.once_executor import OnceExecutor
@@ -93,7 +93,7 @@ class Spinner:
             context = brought.context
         elif context is None:
             context = self._context = Context()
-            start(context)
+            open_context(context)
         unique = name or f"bt_actions_{os.getpid()}_{next(_number)}"
         try:
             self.node = node or named_node(unique, context, namespace)
