@@ -9,12 +9,15 @@ from __future__ import annotations
 import itertools
 import os
 import re
+import sys
 import unicodedata
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.context import Context
 from rclpy.node import Node
 
+from bt_actions.ros.environment import keep_log
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds import participant
 
@@ -32,13 +35,32 @@ def node_name(tree: str) -> str:
     return re.sub(r"\W", "_", f"bt_actions_{''.join(plain)}")[:LONGEST]
 
 
+def open_context(
+    context: Context, words: Sequence[str] | None = None, domain: int | None = None
+) -> None:
+    """Initialise a context with these words, or with the program's; raises what rclpy raises.
+
+    A byte that is no UTF-8, as names of files may have it, is escaped: rclpy reads all words.
+    """
+    keep_log()
+    words = sys.argv if words is None else words
+    legible = [word.encode(errors="backslashreplace").decode() for word in words]
+    try:
+        context.init(args=legible, domain_id=domain)
+    except RuntimeError as error:
+        if "initialize logging" not in str(error):
+            raise
+        remedy = "set ROS_LOG_DIR to a folder that can be written"
+        raise RuntimeError(f"the log cannot be written; {remedy}") from error
+
+
 def own_node(
     name: str, *, args: list[str] | None = None, domain: int | None = None, **given: Any
 ) -> Node:
     """Return a node in a context of its own, without services; raises what rclpy raises."""
     context = Context()
     try:
-        context.init(args=args, domain_id=domain)
+        open_context(context, args, domain)
         return Node(
             name, context=context, enable_rosout=False, start_parameter_services=False, **given
         )

@@ -20,11 +20,11 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.connections import Publisher, Service, Subscription
-from bt_actions.ros.environment import sees_nobody_else
+from bt_actions.ros.environment import of_other_users, sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
-from bt_actions.ros.graph import enclave, is_valid
+from bt_actions.ros.graph import enclave, is_shut_down, is_valid
 from bt_actions.ros.host import host
-from bt_actions.ros.in_sight import elsewhere
+from bt_actions.ros.in_sight import elsewhere, unmatched_action
 from bt_actions.ros.log import log
 from bt_actions.ros.receiving import Receiver
 from bt_actions.ros.rediscovery import look_for
@@ -103,6 +103,10 @@ class NodeParticipant:
         """Whether the node is there, and its context was not shut down."""
         return is_valid(self.node)
 
+    def shut_down(self) -> bool:
+        """Whether the context was shut down; else who is not alive was destroyed."""
+        return is_shut_down(self.node)
+
     def full_name(self, action: str) -> str:
         """Return the full name of an action; raises ValueError for one that ROS refuses."""
         name: str = expand_topic_name(action, self.name, self.namespace)
@@ -154,20 +158,26 @@ class NodeParticipant:
             for part in its
         )
 
+    def unheard(self) -> str:
+        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
+        return of_other_users()
+
     def instead(self, action_type: Any, name: str) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
-        actions = dict[str, str]()
+        actions, ours = dict[str, str](), interface_name(action_type)
         try:
             for topic, _ in self.node.get_topic_names_and_types():
                 if topic.endswith(FEEDBACK):
                     for info in self.node.get_publishers_info_by_topic(topic):
                         kind = info.topic_type.removesuffix("_FeedbackMessage")
                         actions[topic.removesuffix(FEEDBACK)] = kind
+            kind = actions.get(name)
+            why = unmatched_action(self.node, name) if kind == ours else ""
         except Exception:  # noqa: BLE001 - our node was destroyed
             return ""
-        ours, kind = interface_name(action_type), actions.get(name)
         if kind == ours:
-            return ": it is in sight, but was not ready, or has requests enough to answer"
+            why = why or f"was not ready, or has requests enough to answer{of_other_users()}"
+            return f": it is in sight, but {why}"
         if kind is not None:
             return f"; there is one of another type or version, {kind}"
         if not actions:

@@ -170,6 +170,10 @@ class VirtualParticipant:
         """Be gone, as a node that was destroyed."""
         self._alive = False
 
+    def shut_down(self) -> bool:
+        """It never is."""
+        return False
+
     def full_name(self, action: str) -> str:
         """Return the full name of an action."""
         if action.startswith("/"):
@@ -189,6 +193,10 @@ class VirtualParticipant:
         if not served:
             return "; no action server at all is on this network"
         return did_you_mean(name, served)
+
+    def unheard(self) -> str:
+        """Nothing: here nobody is another user."""
+        return ""
 
     def seek(self, seeker: Seeker) -> None:
         """Look for nothing: a second participant would see the same."""

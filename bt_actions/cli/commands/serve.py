@@ -207,7 +207,11 @@ def _server(node: Any, options: Mapping[str, Any]) -> TreeServer:
             descriptor.additional_constraints = listing(_POLICIES)
         elif name == "max":
             descriptor.integer_range = [IntegerRange(from_value=1, to_value=MOST, step=1)]
-        node.declare_parameter(name, value, descriptor, ignore_override=True)
+        try:
+            node.declare_parameter(name, value, descriptor, ignore_override=True)
+        except UnicodeEncodeError as error:
+            words = listing([value] if isinstance(value, str) else value)
+            raise BadInput(f"--{name}: {words} is no UTF-8, as ROS wants it") from error
     try:
         return TreeServer(
             node,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.one_goal import GoalView
+from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
 
 if TYPE_CHECKING:
@@ -72,9 +73,10 @@ class CallView(GoalView):
         if result is None:
             return []
         actions = [_action(each) for each in result.actions]
+        names = told_apart(tuple(each["path"].split(" / ")) for each in actions)
         body = [
             (
-                str(each["path"]).rpartition(" / ")[2],
+                names[tuple(each["path"].split(" / "))],
                 str(each["server"]),
                 str(each["attempts"]),
                 str(each["outcome"]),
