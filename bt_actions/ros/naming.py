@@ -14,12 +14,19 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds import participant
 
 LONGEST = 100
 """Characters of a node's name, which the names of its services begin with."""
+
+
+def overrides(node: Node) -> dict[str, Parameter]:
+    """Return the parameters that ROS arguments give a node, by name."""
+    with node.handle:
+        return dict(node.handle.get_parameters(Parameter))
 
 
 def node_name(tree: str) -> str:
@@ -67,11 +74,12 @@ class Outlook:
 def named_node(name: str, context: Context, namespace: str) -> Node:
     """A new node; its name has a number behind it where another node is seen to have it already.
 
-    One that was given by ``__node:=`` stands as it is. There is a warning in both cases.
+    One that was given by ``__node:=`` stands as it is. There is a warning in both cases. Parameters
+    are those of the name without a number.
     """
-    wanted, taken = name, ""
+    wanted, taken, given = name, "", list[Parameter]()
     for number in itertools.count(2):
-        node = Node(name, context=context, namespace=namespace)
+        node = Node(name, context=context, namespace=namespace, parameter_overrides=given)
         ours = node.get_fully_qualified_name()
         if taken:
             log.warning(
@@ -88,6 +96,7 @@ def named_node(name: str, context: Context, namespace: str) -> Node:
             )
             break
         taken, ending = ours, f"_{number}"
+        given = given or list(overrides(node).values())
         node.destroy_node()
         name = wanted[: LONGEST - len(ending)] + ending
     return node

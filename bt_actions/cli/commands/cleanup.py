@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.options import seconds
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.driving.sweep import sweep
 from bt_actions.cli.exits import BadInput
 
@@ -81,5 +81,5 @@ def run(args: argparse.Namespace) -> int:
     for name in args.actions:
         if why := why_not(name):
             raise BadInput(f"{name!r} cannot be the name of an action server: {why}")
-    parameters(args.ros_args)
+    no_parameters(args.ros_args, "cleanup", "bt_actions_cleanup")
     return sweep(args.look, args.patience, args.actions or None, accept=args.accept)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
     from bt_actions.cli.arguments.parser import Subparsers
+    from bt_actions.ros.arguments import Given
     from bt_actions.ros.naming import Outlook
     from bt_actions.simulation.faults import Fault
 
@@ -116,14 +117,17 @@ def run(args: argparse.Namespace) -> int:
         keep_results_apart()
     _refuse_without_sim(args)
     faults = _faults(args.fault)
-    given = parameters(args.ros_args, args.namespace)
-    root = load(args.tree, args.set, python=args.python, parameters=given)
+    root = load(
+        args.tree,
+        args.set,
+        python=args.python,
+        parameters=(lambda tree: _given(args, tree)) if args.ros_args else None,
+    )
 
     outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name
     try:
         from bt_actions.cli.driving.session import Session, SimulationWish
         from bt_actions.document import tree_name
-        from bt_actions.ros.naming import node_name as node_name_of
 
         if args.cleanup_first and not args.sim:  # which is private
             code = _clean_up(_actions(root), args.namespace)
@@ -139,11 +143,24 @@ def run(args: argparse.Namespace) -> int:
         executor=args.executor,
         namespace=args.namespace,
         simulation=wish,
-        name=args.name or node_name_of(tree_name(root)),
+        name=_node_name(args, tree_name(root)),
         outlook=outlook,
     ) as session:
         view = session.view(as_json=args.json, plain=args.plain, verbose=args.verbose)
         return session.run(view, timeout=args.timeout, part_at=args.check_part)
+
+
+def _node_name(args: argparse.Namespace, tree: str) -> str:
+    """Return the name that the node of the run is to have, before remapping."""
+    from bt_actions.ros.naming import node_name as name_for
+
+    name: str = args.name or name_for(tree)
+    return name
+
+
+def _given(args: argparse.Namespace, tree: str) -> Given | None:
+    with importing_ros():
+        return parameters(args.ros_args, _node_name(args, tree), args.namespace)
 
 
 def _outlook() -> Outlook:
