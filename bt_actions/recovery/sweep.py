@@ -68,11 +68,10 @@ class Cleanup:
 
     Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
     canceled to end. `found` is called with each at once, and again where it was `awaited` when it
-    turns up. The actions in `wanted`, whose relative names belong to `namespace` (None: all in
-    sight), and those of goals that were found, are looked at until they are known, for LOOK_LONGEST
-    seconds at most, or `look`, if that is more; `waits` is called with those that are not, once,
-    when it begins to wait for one that is silent. Ends in the next turn when `stopped` says so.
-    Blocks.
+    turns up. The actions in `wanted`, by the full names of their servers (None: all in sight), and
+    those of goals that were found, are looked at until they are known, for LOOK_LONGEST seconds at
+    most, or `look`, if that is more; `waits` is called with those that are not, once, when it
+    begins to wait for one that is silent. Ends in the next turn when `stopped` says so. Blocks.
 
     A goal that was sent and not answered is awaited: until it has been denied for `accept` seconds,
     for as long as its sender gave the server to decide, and for DENIED_FOR_GOOD, whichever is most.
@@ -89,7 +88,6 @@ class Cleanup:
     accept: float = 0.0
     found: Callable[[LeftBehind], None] = lambda left: None
     wanted: Collection[str] | None = None
-    namespace: str = ""
     waits: Callable[[list[str]], None] = lambda actions: None
     stopped: Callable[[], bool] = lambda: False
 
@@ -113,7 +111,7 @@ class Cleanup:
             still = Stalls()
             still.lives(time.monotonic())  # it counts from when the participant is made
             try:
-                with onlooker(self.namespace) as sight:
+                with onlooker() as sight:
                     self._begin(sight)
                     if self._goes_through(still, breaks_off=tries_before < 2):
                         break
@@ -128,7 +126,7 @@ class Cleanup:
         self._sight = sight
         self._views: dict[RollCall, ActionView] = {}
         self._questions: dict[tuple[RollCall, int], LeftBehind] = {}
-        self._wanted = {self._call(sight.full_name(name)) for name in self.wanted or ()}
+        self._wanted = {self._call(name) for name in self.wanted or ()}
         for call in self._calls.values():
             call.begin()
         for left in self._left.values():

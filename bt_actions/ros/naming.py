@@ -10,15 +10,19 @@ import itertools
 import os
 import re
 import unicodedata
+from collections.abc import Iterable
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds import participant
 
+SEND_GOAL = "/_action/send_goal"
+"""What the name of an action's service for goals ends with."""
 LONGEST = 100
 """Characters of a node's name, which the names of its services begin with."""
 
@@ -52,6 +56,41 @@ def own_node(
     except BaseException:
         context.try_shutdown()
         raise
+
+
+def server_name(node: Node, action: str) -> str:
+    """Return the full name of the server that a node's goals for an action go to.
+
+    ROS remaps no action, but its parts: the service that takes goals says which server it is.
+    Raises ValueError for a name that ROS refuses.
+    """
+    name: str = expand_topic_name(action, node.get_name(), node.get_namespace())
+    service: str = node.resolve_service_name(name + SEND_GOAL)
+    return service.removesuffix(SEND_GOAL) if service.endswith(SEND_GOAL) else name
+
+
+def server_names(actions: Iterable[str], name: str, namespace: str = "") -> list[str]:
+    """Return the servers that a node to come has for actions; for a moment there is another.
+
+    `name` and `namespace` are that node's, before remapping. Raises what rclpy raises.
+    """
+    node = own_node(name, namespace=namespace)
+    try:
+        return sorted({server_name(node, each) for each in actions})
+    finally:
+        participant.close(node)
+
+
+def warn_of_remapping(node: Node, action: str) -> None:
+    """Say it where a rule would have an action another full name: ROS remaps no action."""
+    name: str = expand_topic_name(action, node.get_name(), node.get_namespace())
+    other, part = node.resolve_service_name(name), name + SEND_GOAL
+    if other != name and node.resolve_service_name(part) == part:
+        log.warning(
+            f"a rule remaps {name} to {other}, and has no effect: ROS does not remap actions. "
+            f"Name {other} itself, set the namespace of the node, or remap its parts: {part}, "
+            "cancel_goal, get_result, feedback and status"
+        )
 
 
 class Outlook:

@@ -254,9 +254,7 @@ class TreeServer:
             admitted.inputs,
             self.node,
             ended=lambda outcome: self._ended(goal, outcome),
-            begins=lambda actions: self._underway.begins(
-                goal.id, {self.node.resolve_topic_name(each, only_expand=True) for each in actions}
-            ),
+            begins=lambda servers: self._underway.begins(goal.id, servers),
         )
         goal = Goal(client, run, admitted.name)
         with self._answered:

@@ -15,6 +15,7 @@ from bt_actions.recovery import sweep as module
 from bt_actions.recovery.roll_call import LeftBehind
 from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros import onlooker as sight
+from bt_actions.ros.naming import server_names
 from bt_actions.ros.onlooker import CannotStart
 from tests.support.processes import HostFactory, Journal, Process
 
@@ -123,14 +124,30 @@ def test_a_domain_that_is_none_is_refused(
         Cleanup().run()
 
 
-def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
+@pytest.mark.usefixtures("domain", "no_leaks")
+def test_a_server_is_the_one_that_a_node_with_the_same_words_for_ros_would_ask(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What `ros2 launch` gives a node as its namespace, and as rules, is in force."""
+    rules = [f"{one}/_action/send_goal:={other}/_action/send_goal"
+             for one, other in (("left", "/r1/right"), ("right", "/r1/left"), ("base", "/base"))]
+    rules += ["__ns:=/r1", "move:=/no/effect", "other:far/_action/send_goal:=/no/effect"]
+    words = [word for rule in rules for word in ("-r", rule)]
+    monkeypatch.setattr("sys.argv", ["", "--ros-args", *words])
+    asked = {name: server_names([name], "deliver") for name in
+             ("left", "/r1/right", "base", "move", "far", "/r2/move")}  # fmt: skip
+    assert asked == {
+        "left": ["/r1/right"], "/r1/right": ["/r1/left"], "base": ["/base"],
+        "move": ["/r1/move"], "far": ["/r1/far"], "/r2/move": ["/r2/move"],
+    }  # fmt: skip
+
+
+def test_cleanup_looks_at_the_servers_whose_names_it_is_given(
     domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What `ros2 launch` gives a node as its namespace is in force for relative names, too."""
     monkeypatch.setattr(module, "LOOK_LONGEST", 0.2)
     told = list[list[str]]()
-    monkeypatch.setattr("sys.argv", ["", "--ros-args", "-r", "__ns:=/r1"])
-    swept = sweep({"move", "/r2/move"}, look=0.1, patience=0.1, waits=told.append)
+    swept = sweep({"/r1/move", "/r2/move"}, look=0.1, patience=0.1, waits=told.append)
     assert told == [swept.missing] == [["/r1/move", "/r2/move"]]
     assert swept.domain == domain, "the one in force"
 

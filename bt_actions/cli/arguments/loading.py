@@ -66,7 +66,7 @@ def load(
     except DocumentError as error:
         raise BadInput(findings_text(error), prefixed=False) from error
     except InputError as error:
-        remedy = f": --set {error.missing}=VALUE" if error.missing else ""
+        remedy = f", such as --set {error.missing}=..." if error.missing else ""
         raise BadInput(f"{error}{remedy}") from error
     except TreeNotFoundError as error:
         raise BadInput(str(error)) from error

@@ -124,13 +124,15 @@ def run(args: argparse.Namespace) -> int:
         parameters=(lambda tree: _given(args, tree)) if args.ros_args else None,
     )
 
+    cleans_up = args.cleanup_first and not args.sim  # which is private
+    servers = _servers(args, root) if cleans_up else []
     outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name
     try:
         from bt_actions.cli.driving.session import Session, SimulationWish
         from bt_actions.document import tree_name
 
-        if args.cleanup_first and not args.sim:  # which is private
-            code = _clean_up(_actions(root), args.namespace)
+        if cleans_up:
+            code = _clean_up(servers)
             if code is not Exit.SUCCESS:
                 outlook.close()
                 return code
@@ -170,19 +172,24 @@ def _outlook() -> Outlook:
         return Outlook()
 
 
-def _actions(root: Behaviour) -> set[str]:
-    """Return the names of the actions that a tree uses, as they are given."""
+def _servers(args: argparse.Namespace, root: Behaviour) -> list[str]:
+    """Return the full names of the servers that the run will send goals to."""
     from bt_actions.behaviours.action import ActionBehaviour
+    from bt_actions.document import tree_name
 
-    return {leaf.action_name for leaf in root.iterate() if isinstance(leaf, ActionBehaviour)}
+    actions = {each.action_name for each in root.iterate() if isinstance(each, ActionBehaviour)}
+    name = _node_name(args, tree_name(root))
+    with importing_ros():
+        from bt_actions.ros.naming import server_names
+    with starting_ros():
+        return server_names(actions, name, args.namespace)
 
 
-def _clean_up(wanted: set[str], namespace: str) -> Exit:
+def _clean_up(wanted: list[str]) -> Exit:
     """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
     from bt_actions.cli.driving.sweep import sweep
 
-    instead = "run without --cleanup-first"
-    return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=instead)
+    return sweep(look=5.0, patience=5.0, wanted=wanted, first="run without --cleanup-first")
 
 
 def _refuse_without_sim(args: argparse.Namespace) -> None:

@@ -78,8 +78,8 @@ def check_inputs(
         elif "default" in declared.values:
             values[name] = _fit(document, name, declared.values["default"], text, types=types)
         else:
-            needs = f"the tree {document.name!r} needs a value for its input {name!r} ({text})"
-            raise InputError(needs, missing=name)
+            needs = f"the tree {document.name!r} needs the input {name!r} ({text})"
+            raise InputError(f"{needs}: give it a value", missing=name)
     return values
 
 
