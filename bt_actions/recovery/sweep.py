@@ -50,7 +50,7 @@ class Swept:
     known: list[str]
     """The actions of which every server has told what it runs."""
     unknown: dict[str, str]
-    """The others in sight, or wanted, each with the reason, in whose braces belongs its name."""
+    """The others that were asked, each with the reason, in whose braces belongs its name."""
     domain: int
     """The ROS domain in force."""
     trouble: OSError | None
@@ -171,7 +171,7 @@ class Cleanup:
     def _ends(self) -> Swept:
         """Return all that was seen, and put it on record."""
         self._keep_record()
-        lacks = self._lacks()
+        lacks, required = self._lacks(), self._required()
         calls = self._calls.values()
         return Swept(
             left=list(self._left.values()),
@@ -179,7 +179,7 @@ class Cleanup:
             unknown={
                 call.action: call.trouble
                 for call in calls
-                if not call.known and (call.servers or call in lacks)
+                if not call.known and call in required and (call.servers or call in lacks)
             },
             domain=self._sight.domain,
             trouble=self._trouble,
@@ -208,12 +208,16 @@ class Cleanup:
 
     def _lacks(self) -> list[RollCall]:
         """Return the actions that are looked for, and not known."""
-        required = {left.call for left in self._left.values()} | self._wanted
+        named = {left.call for left in self._left.values()} | self._wanted
         return [
-            call
-            for call in self._calls.values()
-            if not call.known and (call in required or (self.wanted is None and call.servers))
+            call for call in self._required() if not call.known and (call in named or call.servers)
         ]
+
+    def _required(self) -> set[RollCall]:
+        """Return the actions whose servers are to tell what they run; others are not asked."""
+        if self.wanted is None:
+            return set(self._calls.values())
+        return {left.call for left in self._left.values()} | self._wanted
 
     def _awaits(self, now: float) -> bool:
         """Whether a goal may turn up yet at a server in sight."""
@@ -236,9 +240,10 @@ class Cleanup:
         for call, view in self._views.items():
             call.sees(view.servers(), now)
         self._find()
-        for call, view in self._views.items():
+        for call in self._required() & self._views.keys():
             # of a goal that is nobody's: any answer shows that a server lives
-            if call.due(now) and (question := view.cancel(uuid.uuid4().bytes)) is not None:
+            view, due = self._views[call], not call.known and call.due(now)
+            if due and (question := view.cancel(uuid.uuid4().bytes)) is not None:
                 call.asked(question, now)
         self._cancel(now)
 
@@ -254,6 +259,7 @@ class Cleanup:
                 self._turns_up(left)
 
     def _read(self, call: RollCall, message: Any) -> None:
+        call.tells()
         one_server = len(call.servers) <= 1  # or else another may run what has ended
         for entry in message.status_list:
             goal_id, ended = bytes(entry.goal_info.goal_id.uuid), entry.status in ENDS

@@ -247,6 +247,12 @@ def test_an_option_of_ours_that_stands_behind_is_told_where_it_belongs() -> None
     )
 
 
+def test_a_command_says_how_a_missing_input_is_given_on_its_line(tree: Path) -> None:
+    with pytest.raises(BadInput) as raised:
+        load(str(tree), [])
+    assert str(raised.value).endswith("(float64): give it a value, such as --set far=...")
+
+
 def test_what_is_set_wins_over_parameters_and_they_over_defaults() -> None:
     given = {"pick_at": 4.0, "place_at": 6.0}
     root: Any = load("pick_and_place", ["place_at=7.0"], parameters=lambda _: Given(values=given))

@@ -11,13 +11,14 @@ import pytest
 
 from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
+from bt_actions.recovery import roll_call
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.roll_call import LeftBehind
 from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros import onlooker as sight
 from bt_actions.ros.naming import server_names
 from bt_actions.ros.onlooker import CannotStart
-from tests.support.processes import HostFactory, Journal, Process
+from tests.support.processes import Host, HostFactory, Journal, Process
 
 SEND = (
     "import sys, rclpy;"
@@ -116,6 +117,18 @@ def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
     assert [goal.goal_id.hex() for goal in swept.left] == [left]
 
 
+def test_a_server_that_tells_its_goals_is_not_waited_for_and_no_other_is_asked(
+    left: str, name: str, host: Host, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(roll_call, "SETTLE", math.inf)
+    other = host.open(f"{name}/other")
+    swept = sweep([name], look=5.0)
+    host.close_server(f"{name}/other")
+    assert (swept.known, swept.missing, swept.unknown) == ([name], [], {})
+    assert [(goal.goal_id.hex(), goal.end) for goal in swept.left] == [(left, End.CANCELED)]
+    assert other.events() == []
+
+
 def test_a_domain_that_is_none_is_refused(
     domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -129,8 +142,10 @@ def test_a_server_is_the_one_that_a_node_with_the_same_words_for_ros_would_ask(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What `ros2 launch` gives a node as its namespace, and as rules, is in force."""
-    rules = [f"{one}/_action/send_goal:={other}/_action/send_goal"
-             for one, other in (("left", "/r1/right"), ("right", "/r1/left"), ("base", "/base"))]
+    rules = [
+        f"{one}/_action/send_goal:={other}/_action/send_goal"
+        for one, other in (("left", "/r1/right"), ("right", "/r1/left"), ("base", "/base"))
+    ]
     rules += ["__ns:=/r1", "move:=/no/effect", "other:far/_action/send_goal:=/no/effect"]
     words = [word for rule in rules for word in ("-r", rule)]
     monkeypatch.setattr("sys.argv", ["", "--ros-args", *words])
@@ -168,7 +183,8 @@ def test_cleanup_does_not_take_silence_for_nothing(
 
     swept = look(wanted=[])
     assert swept.missing == told == [], "who wants no action is in no server's way"
-    assert name in swept.unknown, "and it is named all the same"
+    assert name not in swept.known
+    assert name not in swept.unknown, "it was not asked"
     assert name in look(wanted=None).missing
     assert [name in actions for actions in told] == [True]
 

@@ -35,7 +35,7 @@ in a launch file:
 exit codes:
   0 no server in sight has a goal that was left (should none take longer to accept one: --accept)
   3 the end of a goal is unknown, or no action server is in sight, or one is silent; with an ACTION,
-  where its server is (of others it is told)
+  where its server is (others are not asked)
   129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
 """
 

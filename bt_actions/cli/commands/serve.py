@@ -149,7 +149,8 @@ def _clean_up() -> Exit:
     if not left:
         return Exit.SUCCESS
     actions = sorted(set().union(*left.values()))
-    note(f"bt-actions serve: one was killed while a tree ran; cleaning up: {listing(actions)}")
+    before = "an earlier one ended before it knew how its goals had ended"
+    note(f"bt-actions serve: {before}; cleaning up: {listing(actions)}")
     files = listing(map(str, left))
     instead = f"remove {files} if it will not come back, and nothing moves"
     code = sweep(look=1.0, patience=5.0, wanted=actions, first=instead)
