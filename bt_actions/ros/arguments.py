@@ -12,6 +12,7 @@ import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
@@ -48,15 +49,13 @@ def given_by(words: Sequence[str], name: str, namespace: str = "") -> Given:
 
     Raises ValueError, with a remedy, for words that rcl does not understand.
     """
-    with _understood():
-        node = own_node(
-            name, args=["--ros-args", *words], namespace=namespace, parameter_overrides=_SETTLED
-        )
-    try:
+    with _understood(), _asking(words, name, namespace) as node:
         found = _without_common(overrides(node))
         mine = set[str]()
         written, unused = dict[str, str](), list[tuple[str, str]]()
         for option, word in _sources(words):
+            if option == FILE and not Path(word).is_file():
+                continue  # a pipe is read once
             its = _given_alone(node, node.get_name(), option, word)
             others = dict[str, Parameter]()
             if option == FILE:
@@ -74,6 +73,18 @@ def given_by(words: Sequence[str], name: str, namespace: str = "") -> Given:
             frozenset(found.keys() - mine),
             unused,
         )
+
+
+@contextlib.contextmanager
+def _asking(words: Sequence[str], name: str, namespace: str) -> Iterator[Node]:
+    node = own_node(
+        name,
+        args=["--ros-args", *words],
+        namespace=namespace,
+        parameter_overrides=_SETTLED,
+    )
+    try:
+        yield node
     finally:
         participant.close(node)
 
@@ -120,8 +131,10 @@ def _understood() -> Iterator[None]:
     except RuntimeError as error:  # rclpy's RCLError
         if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
             unknown = shlex.join(ast.literal_eval(str(error)))
-            why = f"ROS does not know {unknown}; options of bt-actions stand before --ros-args"
-            raise ValueError(why) from error
+            remedy = "options of bt-actions stand before --ros-args"
+            if ":=" in unknown:
+                remedy = "a parameter is written -p NAME:=VALUE, and a rule -r FROM:=TO"
+            raise ValueError(f"ROS does not know {unknown}; {remedy}") from error
         raise ValueError(_in_our_words(str(error).splitlines()[0])) from error
     finally:
         set_logger_level("rcl", LoggingSeverity.UNSET)
@@ -131,8 +144,9 @@ def _in_our_words(text: str) -> str:
     """Return what is wrong with a word of `--ros-args`, and how it is written."""
     told = re.sub(r", at /.*", "", text).partition(": ")[2] or text
     rule = re.match(r"Couldn't parse (remap|parameter override) rule: '(-\S+ (.*?))'\.", told)
+    namespace = "a namespace has letters, digits and _, each part after a slash, as in"
     if rule is None:
-        return told
+        return f"{namespace} __ns:=/r1" if "invalid node namespace" in told else told
     kind, given, word = rule.groups()
     left, assigned, right = word.partition(":=")
     if kind != "remap":
@@ -142,7 +156,7 @@ def _in_our_words(text: str) -> str:
         elif assigned and "lexeme" not in told and "token" not in told:
             remedy = f"its value is read as YAML, and {told.rpartition('Error: ')[2]}"
     elif left.endswith("__ns"):
-        remedy = f"a namespace begins with a slash, as in {left}:=/r1"
+        remedy = f"{namespace} {left}:=/r1"
     elif left.endswith(("__node", "__name")):
         remedy = f"a node's name has letters, digits and _ alone, as in {left}:=patrol"
     else:

@@ -274,7 +274,12 @@ def test_what_is_set_wins_over_parameters_and_they_over_defaults() -> None:
         ),
         (["-p", "pick_at:="], "an empty text is written -p \"pick_at:=''\""),
         (["-p", "pick_at:=[1, a]"], "its value is read as YAML, and Sequence should be of same"),
-        (["-r", "__ns:=x"], "a namespace begins with a slash, as in __ns:=/r1"),
+        (
+            ["-r", "__ns:=x"],
+            "a namespace has letters, digits and _, each part after a slash, as in",
+        ),
+        (["-r", "__ns:=/x/"], "each part after a slash, as in __ns:=/r1"),
+        (["pick_at:=2.0"], "ROS does not know pick_at:=2.0; a parameter is written -p NAME:=VALUE"),
         (["-r", "__node:=a/b"], "a node's name has letters, digits and _ alone"),
         (["-r", "move_robot"], "a rule is written -r FROM:=TO"),
         (["--params-file", "no_such.yaml"], "no_such.yaml"),

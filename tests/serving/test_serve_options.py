@@ -120,6 +120,14 @@ def test_an_empty_list_is_as_if_it_were_not_given(name: str) -> None:
     assert _options(args, given.values)["trees"] == ["trees"]
 
 
+def test_a_rule_for_the_name_of_the_action_is_told_to_have_no_effect(
+    serve_trees: Serve, space: str
+) -> None:
+    server = serve_trees("--ros-args", "-r", "run_tree:=do")
+    assert any(f"a rule remaps {space}/run_tree to {space}/do, and has no effect" in line
+               for line in server.errors)  # fmt: skip
+
+
 def test_ready_counts_the_trees_that_can_be_run_and_names_the_others(serve_trees: Serve) -> None:
     server = serve_trees()
     assert server.lines[0].endswith("/run_tree, 2 trees, 1 broken: broken")
