@@ -138,14 +138,18 @@ def test_what_a_file_gives_to_other_nodes_too_may_be_no_input_and_is_told(
 ) -> None:
     tree, file = tmp_path / "keyed.yaml", tmp_path / "parameters.yaml"
     tree.write_text(KEYED)
-    shared = "/**:\n  ros__parameters: {speed: 0.2, waypoints: [], names: [], seed: 3}\n"
+    shared = "/**:\n  ros__parameters: {speed: 0.2, waypoints: [], names: [], seed: 3, "
+    shared += "names.of: {others: 1}}\n"
     run = ["run", str(tree), "--ros-args", "--params-file", str(file)]
     file.write_text(shared)
     assert main(run) == 0
     said = capfd.readouterr()
     assert "used: 0.2\nmany: 0" in said.out
     (line,) = said.err.splitlines()
-    assert "no input of the tree 'keyed', and not used: waypoints, seed (did you mean" in line
+    assert (
+        "no input of the tree 'keyed', and not used: waypoints, seed (did you mean 'speed'?), names.of"
+        in line
+    )
     file.write_text(f"{shared}bt_actions_keyed:\n  ros__parameters: {{seed: 4}}\n")
     is_refused(run, "the parameter 'seed' is no input of the tree 'keyed'", capfd)
 
@@ -182,7 +186,8 @@ def test_a_field_of_an_input_is_set_whatever_way_the_default_is_written(tmp_path
         ("header.stmp.sec", 5, "'header.stmp.sec' is 5, and the input 'header' is std_msgs/"),
         ("header.stmp.sec", 5, ": Header has no field 'stmp'; did you mean 'stamp'?"),
         ("pause.sec.x", 5, ": a whole number (int32) is needed, not a mapping"),
-        ("big.x", 5, "the parameter 'big.x' is a field, and the input is uint64, which has none"),
+        ("big.x", 5, "the parameter 'big.x' is no input of the tree 't'"),
+        ("names", [1, True], "quotes make it one: -p \"names:=['1', 'true']\""),
         ("header.frame_id", True, "quotes make it one: -p \"header.frame_id:='on'\""),
     ],
 )

@@ -65,21 +65,26 @@ def no_parameters(words: Sequence[str], command: str, name: str, namespace: str 
 
 
 def taken(
-    given: Given | None, known: Collection[str], what: str, *, other_users: bool = False
+    given: Given | None,
+    known: Collection[str],
+    what: str,
+    *,
+    with_fields: Collection[str] = (),
+    other_users: bool = False,
 ) -> dict[str, object]:
-    """Return those parameters, or fields of them, that are `known`; `what` they are is a noun.
+    """Return those parameters that are `known`, or fields of one `with_fields`.
 
     Raises BadInput for another one that is meant for this node, unless the node has `other_users`
     of parameters and the name is like no known one. Tells of all others: a file gives some to
-    other nodes, too.
+    other nodes, too. `what` is the noun for a known one.
     """
     if given is None:
         return {}
-    others = {
-        name: did_you_mean(name.partition(".")[0], known)
-        for name in given.values
-        if name.partition(".")[0] not in known
-    }
+    others = dict[str, str]()
+    for name in given.values:
+        first, _, field = name.partition(".")
+        if name not in known and not (field and first in with_fields):
+            others[name] = did_you_mean(first, known)
     for name, near in others.items():
         if name not in given.shared and (near or not other_users):
             there = near or (f"; there is {listing(known)}" if known else "")
@@ -102,14 +107,12 @@ def as_inputs(given: Given | None, declared: Mapping[str, TreeInput], tree: str)
     from bt_actions.messages.fields import Message
 
     inputs: dict[str, object] = {}
-    values = taken(given, declared, f"input of the tree {tree!r}")
+    kinds = {name: parse_type(each.type) for name, each in declared.items()}
+    messages = [name for name, kind in kinds.items() if isinstance(kind, Message)]
+    values = taken(given, declared, f"input of the tree {tree!r}", with_fields=messages)
     for name in dict.fromkeys(each.partition(".")[0] for each in values):
-        kind = parse_type(declared[name].type)
+        path, kind = name, kinds[name]
         fields = {each: one for each, one in values.items() if each.startswith(f"{name}.")}
-        path = name
-        if fields and kind is not None and not isinstance(kind, Message):
-            why = f"the parameter {min(fields)!r} is a field, and the input is {kind}"
-            raise BadInput(f"--ros-args: {why}, which has none")
         try:
             value = _read(values[name], kind) if name in values else declared[name].default
             if fields:
@@ -137,10 +140,13 @@ def _no_fit(
     value = f" is {values[name]!r}, and" if name in values else ":"
     of = "" if name == whole else f" {whole!r}"
     text = f"--ros-args: the parameter {name!r}{value} the input{of} is {kind}: {why}"
-    written = given.written.get(name, str(values.get(name)).lower())
-    if "a text is needed" not in why or isinstance(values.get(name), list):
+    if "a text is needed" not in why:
         return text
-    return f"""{text}; quotes make it one: -p "{name}:='{written}'\""""
+    given_value = values.get(name)
+    written = f"'{given.written.get(name, str(given_value).lower())}'"
+    if isinstance(given_value, list):
+        written = str([str(each).lower() for each in given_value])
+    return f'{text}; quotes make it one: -p "{name}:={written}"'
 
 
 def _over(value: Any, fields: Any, kind: FieldType | None) -> Any:
