@@ -82,7 +82,7 @@ class NodeParticipant:
         self._receiver = Receiver(node)
         self._servers: dict[str, str] = {}
         self._asked_by: dict[str, str] = {}
-        """The action by which our node asks a server, by the server's full name."""
+        """The action by which our node asks a server, by the server's name; both are full names."""
 
     @classmethod
     def of(cls, node: Node) -> NodeParticipant:
@@ -111,16 +111,16 @@ class NodeParticipant:
 
         Raises ValueError for a name that ROS refuses.
         """
-        name = self._servers.get(action)
-        if name is None:
-            name = self._servers[action] = server_name(self.node, action)
-            self._asked_by.setdefault(name, action)
-            warn_of_remapping(self.node, action)
-        return name
+        if action not in self._servers:
+            full = expand_topic_name(action, self.name, self.namespace)
+            self._servers[action] = server = server_name(self.node, full)
+            self._asked_by.setdefault(server, full)
+            warn_of_remapping(self.node, full)
+        return self._servers[action]
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
         """Become a client of an action, by the name that rules may remap the parts of."""
-        action = expand_topic_name(self._asked_by.get(name, name), self.name, self.namespace)
+        action = self._asked_by.get(name, name)
         is_private = sees_nobody_else()  # no server can come to be seen later than another
         seen_since = NEVER if is_private else self.seen_since
         leave = self._receiver.leave
@@ -146,7 +146,7 @@ class NodeParticipant:
             self.node.resolve_topic_name: ("status", "feedback"),
             self.node.resolve_service_name: ("send_goal", "cancel_goal", "get_result"),
         }
-        action = expand_topic_name(self._asked_by.get(name, name), self.name, self.namespace)
+        action = self._asked_by.get(name, name)
         return all(
             resolve(f"{action}/_action/{part}") == f"{name}/_action/{part}"
             for resolve, its in parts.items()

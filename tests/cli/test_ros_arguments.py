@@ -146,10 +146,8 @@ def test_what_a_file_gives_to_other_nodes_too_may_be_no_input_and_is_told(
     said = capfd.readouterr()
     assert "used: 0.2\nmany: 0" in said.out
     (line,) = said.err.splitlines()
-    assert (
-        "no input of the tree 'keyed', and not used: waypoints, seed (did you mean 'speed'?), names.of"
-        in line
-    )
+    assert "no input of the tree 'keyed', and not used: waypoints, seed (did you mean" in line
+    assert "names.of.others" in line
     file.write_text(f"{shared}bt_actions_keyed:\n  ros__parameters: {{seed: 4}}\n")
     is_refused(run, "the parameter 'seed' is no input of the tree 'keyed'", capfd)
 
