@@ -157,6 +157,17 @@ def test_a_server_is_the_one_that_a_node_with_the_same_words_for_ros_would_ask(
     }  # fmt: skip
 
 
+def test_no_rule_leads_a_cleanup_away_from_the_server_that_it_is_given(
+    left: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two names that a run has exchanged, say."""
+    rules = [f"{name}/_action/{part}:={name}/nobody/_action/{part}"
+             for part in ("cancel_goal", "status", "send_goal")]  # fmt: skip
+    words = [word for rule in rules for word in ("-r", rule)]
+    monkeypatch.setattr("sys.argv", ["", "--ros-args", *words])
+    assert [(each.goal_id.hex(), each.end) for each in sweep([name]).left] == [(left, End.CANCELED)]
+
+
 def test_cleanup_looks_at_the_servers_whose_names_it_is_given(
     domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -131,13 +131,15 @@ def _no_fit(
     given: Given | None, name: str, kind: str, values: Mapping[str, object], why: str
 ) -> str:
     """Say that a parameter is no value of the input that it is, or is a field of."""
+    from bt_actions.messages.conversion import show
+
     assert given is not None
     whole = name.partition(".")[0]
     name = next((each for each in values if each.startswith(f"{name}.")), name)
     while name not in values and "." in name:  # the item of a list, a field of a text
         name, _, below = name.rpartition(".")
         why = f"{below}: {why}"
-    value = f" is {values[name]!r}, and" if name in values else ":"
+    value = f" is {show(values[name])}, and" if name in values else ":"
     of = "" if name == whole else f" {whole!r}"
     text = f"--ros-args: the parameter {name!r}{value} the input{of} is {kind}: {why}"
     if "a text is needed" not in why:
