@@ -39,6 +39,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "t", "u"], "unexpected argument 'u'\n"),
         (["run", "t", "x=2"], "unexpected argument 'x=2'; write --set x=2"),
         (["run", "t", "--set", "x", "2"], "unexpected argument '2'; write --set x=2"),
+        (["run", "t", "--set", "x", "-2.5"], "unexpected argument '-2.5'; write --set x=-2.5"),
         (["call", "t", "--set", "x", "=", "2"], "unexpected argument '='; write --set x=VALUE"),
         (["sim", "x=2"], "unexpected argument 'x=2'\n"),
         (["run"], "the following arguments are required: TREE"),

@@ -52,7 +52,8 @@ class Parser(argparse.ArgumentParser):
         """Report arguments that nothing takes; `settings` are the words of --set."""
         word = unknown[0]
         options = [name for action in self._actions for name in action.option_strings]
-        if "--set" in options and not word.startswith("-"):
+        is_value = not word.startswith("-") or word[1:2].isdigit()
+        if "--set" in options and is_value:
             name = next((each for each in settings if "=" not in each), "")
             meant = f"{name}={word.strip('=') or 'VALUE'}" if name else word
             if "=" in meant:
