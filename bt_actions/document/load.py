@@ -200,8 +200,13 @@ def _built(
 
 def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
     """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
+    return tree_head(path)[1]
+
+
+def tree_head(path: PathLike) -> tuple[str, dict[str, TreeInput]]:
+    """The name that its file gives a tree, and its inputs; as `tree_inputs`."""
     _, document = _open(path, types=False)
-    return inputs_of(document)
+    return document.name, inputs_of(document)
 
 
 def given_inputs(root: Behaviour) -> dict[str, tuple[TreeInput, object]]:

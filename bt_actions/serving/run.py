@@ -17,6 +17,7 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import Event, NodeChanged
 from bt_actions.messages.conversion import to_plain
+from bt_actions.ros.naming import server_name
 from bt_actions.running.report import Report
 from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
@@ -45,7 +46,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: where goals are sent from; somebody spins it.
-        begins: called with the names of the actions that it uses, before it sends a goal.
+        begins: called with the full names of the servers that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
     """
 
@@ -131,9 +132,8 @@ class Run:
 
     def _to_end(self) -> RunOutcome:
         root = self.tree.build(self._inputs)
-        self._begins(
-            {each.action_name for each in root.iterate() if isinstance(each, ActionBehaviour)}
-        )
+        leaves = [each for each in root.iterate() if isinstance(each, ActionBehaviour)]
+        self._begins({server_name(self._node, each.action_name) for each in leaves})
         report = Report(root)
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node)

@@ -271,9 +271,7 @@ class TreeServer:
             admitted.inputs,
             self.node,
             ended=lambda outcome: self._ended(goal, outcome),
-            begins=lambda actions: self._underway.begins(
-                goal.id, {self.node.resolve_topic_name(each, only_expand=True) for each in actions}
-            ),
+            begins=lambda servers: self._underway.begins(goal.id, servers),
         )
         called = clean(client.request.goal_name)[:ECHO]
         begin = begins(admitted.file, admitted.tree, admitted.inputs, called)

@@ -184,8 +184,7 @@ def test_inputs_are_converted_to_their_types_and_outputs_are_read_after_the_run(
 @pytest.mark.parametrize(
     ("inputs", "text"),
     [
-        ({}, ("the tree 't' needs the input 'names' (string[]): give it a value, such as"
-             " --set names=...")),
+        ({}, "the tree 't' needs the input 'names' (string[]): give it a value"),
         ({"names": [], "sped": 1}, "the tree 't' has no input 'sped'; did you mean 'speed'?"),
         ({"names": [], "other": 1}, ("the tree 't' has no input 'other'; its inputs are speed,"
                                     " names")),

@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.options import add_option
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.writing import note, write
 
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         raise BadInput(
             f"{args.goal!r} is no goal's id: 32 hexadecimal digits, or the first of them"
         )
-    parameters(args.ros_args, args.namespace)
+    no_parameters(args.ros_args, "control", "bt_actions_asks")
     server = args.server if args.server.startswith("/") else f"{args.namespace}/{args.server}"
     with importing_ros():
         from bt_actions.serving.asking import NotControlled, control

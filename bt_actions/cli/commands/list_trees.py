@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import add_option
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.exits import Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart, results
 from bt_actions.cli.streams.writing import note
@@ -42,7 +42,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask all servers in sight, and print what they say."""
-    parameters(args.ros_args, args.namespace)
+    no_parameters(args.ros_args, "list", "bt_actions_asks")
     keep_results_apart()
     with importing_ros():
         from bt_actions.serving.asking import trees_in_sight

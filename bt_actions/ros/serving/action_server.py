@@ -20,6 +20,7 @@ from rclpy.action.server import (
     ServerGoalHandle,
 )
 
+from bt_actions.ros.naming import warn_of_remapping
 from bt_actions.ros.serving.endpoints import Endpoints
 
 
@@ -57,6 +58,7 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
         self._admitted: dict[int, Any] = {}
         """What `admit` returned, until it is handed over; by the request's id in Python, as rclpy
         tells of no other."""
+        warn_of_remapping(endpoints.node, name)
         super().__init__(
             endpoints.node,
             action_type,
