@@ -72,10 +72,12 @@ completion in editors. The files on this page are in [examples/](../examples).
   its section says so; for the others it is what they do, and `name:` is optional.
 - `timeout` and `retry` are settings of an action, and kinds only beside `child:`.
 - Unknown keys, keys that are there twice and values of the wrong form are errors.
-- Scalars are those of YAML 1.2: `on` and `yes` are texts. Files are read with libyaml, which
-  PyYAML's wheels hold.
+- Scalars are those of YAML 1.2: `on` and `yes` are texts, U+2028, U+2029 and U+0085 end no line,
+  and in double quotes the two halves that JSON writes (`"\\ud83d\\ude00"`) are one character. Files
+  are read with libyaml, which PyYAML's wheels hold.
 - Durations carry a unit ({", ".join(f"`{unit}`" for unit in DURATION_UNITS)}); a bare number is
-  seconds. Where a limit can be left out, `none` says so.
+  seconds, with a warning from 500 on. Deadlines and pauses are never negative. Where a limit can be
+  left out, `none` says so.
 - Numbers and durations are plain, so that deadlines can be checked before a robot moves; where
   `$name` may stand for one, the tables say "or `$name`".
 
@@ -101,7 +103,7 @@ Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, 
 may hold `.inf` and `.nan`; inputs are finite. A mapping that is written out
 (`set: {{stop: {{at: 2.0}}}}`, the items of a `for_each`) has the keys that it was written with
 (`$stop.at`), and may fill a message.
-The names of nodes are taken as they stand.
+The names of nodes are taken as they stand: a variable in one is shown as it is written.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices and
 slices (`$list[-1]`, `$list[1:3]`), `true` and `false`, and constants
@@ -120,7 +122,7 @@ In the fields of a message, and in variables that fill them (but for `now` and c
 | field | may be written |
 |---|---|
 | builtin_interfaces/Time | `now`, seconds, or `{{sec, nanosec}}` |
-| builtin_interfaces/Duration | `500 ms`, seconds, or `{{sec, nanosec}}` |
+| builtin_interfaces/Duration | `500 ms`, `-1 s`, seconds, or `{{sec, nanosec}}` |
 | geometry_msgs/Quaternion | `{{yaw: 90 deg}}` (`$a`: radians), `roll`, `pitch`; or its fields |
 | a number with constants | `STATUS_MOVING`, `MoveRobot.Feedback.STATUS_MOVING`, `pkg/msg/X.NAME` |
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_actions.utilities.shorten import shorten, shorten_fields
+from bt_actions.utilities.shorten import given_fields, shorten, shorten_fields
 
 
 class Point:
@@ -68,6 +68,34 @@ def test_the_fields_of_a_message_are_shown_without_quotes_and_cut() -> None:
     message.x = "moving" * 1_000_000  # type: ignore[assignment]
     assert shorten_fields(message, 12) == "x movingmov…"
     assert shorten_fields(SimpleNamespace(no="message")) == ""
+
+
+def test_the_fields_that_a_message_gives_are_those_that_a_new_one_has_not() -> None:
+    message = Point()
+    assert given_fields(message) == {}
+    message.on, message.data = False, array.array("B", [7]) * 4_000_000
+    assert shorten(given_fields(message)) == "{on: false, data: [7, 7, 7, … 4000000 items]}"
+    assert given_fields("no message") == {}
+
+
+class Grid:
+    """A message with a field of a fixed length."""
+
+    def __init__(self) -> None:
+        self.cells, self.at = np.zeros(3), Point()
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        return {"cells": "double[3]", "at": "Point"}
+
+
+def test_a_field_with_others_in_it_is_given_where_one_of_them_is() -> None:
+    grid = Grid()
+    assert given_fields(grid) == {}
+    grid.at.x = 7.0
+    assert shorten(given_fields(grid)) == "{at: {x: 7.0}}"
+    grid.cells[1] = 1.0
+    assert shorten(given_fields(grid)) == "{cells: [0.0, 1.0, 0.0], at: {x: 7.0}}"
 
 
 def test_what_is_longer_than_the_limit_ends_with_an_ellipsis() -> None:

@@ -17,6 +17,7 @@ from bt_actions.utilities.suggest import did_you_mean, what_it_has
 
 RUN_TREE = "bt_actions_interfaces/action/RunTree"
 """The action of servers of trees."""
+DURATION = "builtin_interfaces/msg/Duration"
 Kind = Literal["action", "srv", "msg"]
 _WORDS = {"action": "action", "srv": "service", "msg": "message"}
 PARTS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",

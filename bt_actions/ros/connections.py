@@ -23,7 +23,7 @@ from rclpy.qos import (
 )
 
 from bt_actions.messages.interfaces import TwoTypes, interface_name
-from bt_actions.ros.in_sight import mismatch
+from bt_actions.ros.in_sight import mismatch, unmatched_service
 from bt_actions.ros.workarounds.closable import closable
 from bt_actions.traffic.backend import ARRIVES, Call
 from bt_actions.traffic.handle import waker
@@ -201,7 +201,8 @@ class Service:
                 return f": nobody offers it{elsewhere(self.name, kind, known)}"
             if others := sorted(set(known[self.name]) - {kind}):
                 return f": what is there is {listing(others)}, not {kind}"
-            return ": it is in sight, but was not ready"
+            why = unmatched_service(node, self.name)
+            return f": it is in sight, but {f'it {why}' if why else 'was not ready'}"
         return ""
 
     def call(self, request: Any) -> Call:

@@ -164,6 +164,7 @@ class TickLoop:
         Raises it at once where that has begun.
         """
         if self._drain is not None:
+            self._error = None  # what has ended the run is not raised again by `shutdown`
             self._rest()
             raise error
         self._error, self._status = error, Status.INVALID

@@ -170,6 +170,10 @@ class VirtualParticipant:
         """Be gone, as a node that was destroyed."""
         self._alive = False
 
+    def shut_down(self) -> bool:
+        """It never is."""
+        return False
+
     def full_name(self, action: str) -> str:
         """Return the full name of an action."""
         if action.startswith("/"):
@@ -194,6 +198,10 @@ class VirtualParticipant:
         if of_its_type := sorted(each for each in served if served[each] == ours):
             return f"; of its type there is {listing(of_its_type)}"
         return did_you_mean(name, served)
+
+    def unheard(self) -> str:
+        """Nothing: here nobody is another user."""
+        return ""
 
     def seek(self, seeker: Seeker) -> None:
         """Look for nothing: a second participant would see the same."""

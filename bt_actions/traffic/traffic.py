@@ -157,7 +157,7 @@ class Traffic:
                 return
             with self.host.lock:
                 if at_once or (endpoint.participant.alive() and self._may_send(handle)):
-                    handle.message = message
+                    handle.goal.message = message
                     endpoint.tell(handle, Event.SERVER_READY)
 
     def _is_due(self, handle: GoalHandle) -> bool:

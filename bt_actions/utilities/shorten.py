@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
-__all__ = ["shorten", "shorten_fields"]
+__all__ = ["given_fields", "shorten", "shorten_fields"]
 
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
@@ -65,6 +65,26 @@ def shorten_fields(message: object, limit: int = 80) -> str:
         if len(text) > limit:
             return f"{text[: limit - 1]}…"
     return text
+
+
+def given_fields(message: object) -> dict[str, object]:
+    """Return the fields of a ROS message, by their names, that a new one of its type has not."""
+    fields = getattr(message, "get_fields_and_field_types", dict[str, str])()
+    plain = type(message)() if fields else None
+    given: dict[str, object] = {}
+    for name in fields:
+        value = getattr(message, name)
+        if hasattr(value, "get_fields_and_field_types"):
+            if inner := given_fields(value):
+                given[name] = inner
+        elif not _equal(value, getattr(plain, name)):
+            given[name] = value
+    return given
+
+
+def _equal(value: object, other: object) -> bool:
+    equal = value == other
+    return bool(equal.all() if hasattr(equal, "all") else equal)  # numpy: one for each item
 
 
 def _parts(value: object) -> Iterator[Part] | None:

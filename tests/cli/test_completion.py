@@ -38,6 +38,7 @@ def test_bash_completes_commands_options_and_choices(script: str) -> None:
     assert bash_completes(script, "bt-actions", "run", "--exec") == ["--executor"]
     assert bash_completes(script, "bt-actions", "run", "--executor", "m") == ["multi"]
     assert bash_completes(script, "bt-actions", "completion", "z") == ["zsh"]
+    assert bash_completes(script, "bt-actions", "control", "/run_tree", "p") == ["pause"]
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")

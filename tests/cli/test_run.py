@@ -157,7 +157,7 @@ class TestExitCode1:
         )
         assert run.wait() == 1, run
         assert run.lines[-5].endswith(", status: 3, message: 'fault: abort'}"), "its result"
-        assert [line.partition("; its result is: ")[0] for line in run.lines[-6:]] == [
+        assert [line.partition("; goal {distance: ")[0] for line in run.lines[-6:]] == [
             "Deliver the part / Pick and place / To the part",
             "  ABORTED after 3 attempts: aborted by /move_robot",
             "  trees/pick_and_place.yaml:22:11",

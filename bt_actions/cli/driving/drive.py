@@ -292,7 +292,8 @@ class Drive:
         ]
         if self._abandoned:
             lines += [
-                f"{row.path[-1]} on {row.server}, goal {goal_id}, {state.lower()} when left"
+                f"{self._report.called(row.behaviour)} on {row.server}, goal {goal_id}, "
+                f"{state.lower()} when left"
                 for row in self._report.live
                 for goal_id, state in row.live.items()
                 if goal_id not in goals

@@ -119,6 +119,28 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree("root: {python: py_trees.timers.Timer, arguments: {duration: 5.0}}\n"),
         tree("root: {wait: 5 s}\n"),
     ),
+    "BT317": Page(
+        "A bare number is seconds. From 500 on, milliseconds are as likely to be meant: other "
+        "tools have them. A unit says which.",
+        tree("root: {wait: 500}\n"),
+        tree("root: {wait: 500 ms}\n"),
+    ),
+    "BT318": Page(
+        "Roll, pitch and yaw are radians where they have no unit, and this is more than a full "
+        "turn. A unit says what is meant.",
+        tree("root:\n  publish: heading\n  type: geometry_msgs/msg/Quaternion\n"
+             "  message: {yaw: 90}\n"),
+        tree("root:\n  publish: heading\n  type: geometry_msgs/msg/Quaternion\n"
+             "  message: {yaw: 90 deg}\n"),
+    ),
+    "BT319": Page(
+        "The name of a node is fixed when the tree is loaded, and nothing is put into it: a "
+        "variable in it would be shown as it is written. A 'log' can show the value.",
+        tree("inputs: {part: string}\nroot:\n  sequence: Take $(part)\n"
+             "  children: [{check: $part != ''}]\n"),
+        tree("inputs: {part: string}\nroot:\n  sequence: Take the part\n"
+             "  children: [{log: Take $(part)}]\n"),
+    ),
     "BT320": Page(
         "A later child of a 'fallback' reads the value without which an earlier child fails: while "
         "nothing has come on the topic, or nothing has written the variable, both fail, and what "
@@ -150,5 +172,12 @@ HAZARD_PAGES: Mapping[str, Page] = {
              "root: {check: $battery.percentage < 20}\n"),
         tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
              "root: {check: $battery.percentage < 0.2}\n"),
+    ),
+    "BT322": Page(
+        "YAML knows the quotes ' and \" alone. Those that chats and word processors put in their "
+        "place are a part of the text, and are sent with it. Plain quotes around them say that they"
+        " are meant.",
+        tree("root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: “map”}\n"),
+        tree('root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: "map"}\n'),
     ),
 }  # fmt: skip

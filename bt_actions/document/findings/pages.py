@@ -248,7 +248,8 @@ PAGES: Mapping[str, Page] = {
         tree("root: {python: py_trees.behaviours.Success}\n"),
     ),
     "BT215": Page(
-        "The arguments do not fit the constructor of the class. Its name is given by the node.",
+        "The arguments do not fit the constructor of the class. Its name is given by the node. "
+        "Where a parameter is annotated with an enum, the argument is the name of a member.",
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {number: 3}}\n"),
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {n: 3}}\n"),
     ),

@@ -19,7 +19,7 @@ from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.bounds import MAX_ITEMS, refuse_large
 from bt_actions.document.yaml.braces import report_braces
 from bt_actions.document.yaml.compose import compose
-from bt_actions.document.yaml.cut import cut_hint, warn_cut
+from bt_actions.document.yaml.cut import cut_hint, warn_cut, warn_quotes
 from bt_actions.document.yaml.inner import inner_span
 from bt_actions.document.yaml.nodes import (
     Listing,
@@ -133,6 +133,7 @@ def read_value(node: Node, source: Source) -> object:
                 warn_cut(node, source, "expression")
         elif isinstance(value, (str, Interpolated)):
             warn_cut(node, source, "text")
+            warn_quotes(node, source)
         return value
     bad = False
     if isinstance(node, Listing):
