@@ -3,6 +3,7 @@
 All of them on this machine. Takes the arguments of serve.launch.py, too, for each of them.
 """
 
+import runpy
 from pathlib import Path
 
 from launch import LaunchContext, LaunchDescription
@@ -22,6 +23,8 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="r1 r2",
                 description="The robots' namespaces, with spaces between them.",
             ),
+            # Here, too: launch does not look into a function for what --show-args lists.
+            *(each for each in runpy.run_path(SERVE)["ARGUMENTS"] if each.name != "namespace"),
             OpaqueFunction(function=_fleet),
         ]
     )

@@ -31,6 +31,7 @@ from bt_actions.document.language.kinds import KINDS, SERVICE_TIMEOUT, Group, Ki
 from bt_actions.document.language.scalars import Text
 from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import Key, Record
+from bt_actions.expressions.functions import ARGUMENTS
 from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Busy
 from bt_actions.utilities.units import DURATION_UNITS
 
@@ -38,6 +39,20 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
 PAGES_FILE = "bt_actions/document/findings/pages.py"
+
+FUNCTIONS = {
+    "len": "`len($list)` | how many items, characters or keys there are",
+    "abs": "`abs($x)` | a number without its sign",
+    "min": "`min($list)`, `min($a, $b)` | the least number or text",
+    "max": "`max($list)`, `max($a, $b)` | the greatest number or text",
+    "round": "`round($x)`, `round($x, 2)` | the nearest whole number, or so many digits",
+    "int": "`int($x)` | a number without its fraction; the whole number that a text holds",
+    "float": "`float($x)` | the number that a text holds",
+    "str": "`str($x)` | a number, true or false as a text",
+    "known": "`known($x)`, `known($door.data)` | whether there is a value; it never fails",
+}
+"""How each function of expressions is called, and what it gives."""
+ROWS = "\n".join(f"| {FUNCTIONS[name]} |" for name in ARGUMENTS)
 
 HEAD = f"""\
 # Trees in YAML
@@ -57,10 +72,12 @@ completion in editors. The files on this page are in [examples/](../examples).
   its section says so; for the others it is what they do, and `name:` is optional.
 - `timeout` and `retry` are settings of an action, and kinds only beside `child:`.
 - Unknown keys, keys that are there twice and values of the wrong form are errors.
-- Scalars are those of YAML 1.2: `on` and `yes` are texts. Files are read with libyaml, which
-  PyYAML's wheels hold.
+- Scalars are those of YAML 1.2: `on` and `yes` are texts, U+2028, U+2029 and U+0085 end no line,
+  and in double quotes the two halves that JSON writes (`"\\ud83d\\ude00"`) are one character. Files
+  are read with libyaml, which PyYAML's wheels hold.
 - Durations carry a unit ({", ".join(f"`{unit}`" for unit in DURATION_UNITS)}); a bare number is
-  seconds. Where a limit can be left out, `none` says so.
+  seconds, with a warning from 500 on. Deadlines and pauses are never negative. Where a limit can be
+  left out, `none` says so.
 - Numbers and durations are plain, so that deadlines can be checked before a robot moves; where
   `$name` may stand for one, the tables say "or `$name`".
 
@@ -78,7 +95,7 @@ A tree sees only its own names: inputs, outputs, topics, and what its nodes `sav
 over. A subtree gets what `with` passes and gives back outputs by `save`; each visit begins without
 what the one before it wrote, but for what stands below a `run_once`, and an output that it does not
 give leaves the name as it was. A variable that has no value yet makes a goal INVALID_GOAL and a
-check FAILURE, and says so.
+check FAILURE, and says so; a `log` has `(no value)` in its place. `known($name)` asks for it.
 
 Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, `int8` to `int64`,
 `uint8` to `uint64`, any `package/msg/Name`, and lists of them: `float64[]`, `float64[3]`,
@@ -86,20 +103,26 @@ Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, 
 may hold `.inf` and `.nan`; inputs are finite. A mapping that is written out
 (`set: {{stop: {{at: 2.0}}}}`, the items of a `for_each`) has the keys that it was written with
 (`$stop.at`), and may fill a message.
-The names of nodes are taken as they stand.
+The names of nodes are taken as they stand: a variable in one is shown as it is written.
 
-Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices, `len`,
-`abs`, `min` and `max`, `true` and `false`, and constants (`MoveRobot.Result.STATUS_FAULT`). In
-`expect`, `save` and `when` the bare name
-`result` is the result, and of a `run_tree` `outputs` what its tree gave; in `until` and `save` of
-`wait_for_message`, `message` is the message.
+Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices and
+slices (`$list[-1]`, `$list[1:3]`), `true` and `false`, and constants
+(`MoveRobot.Result.STATUS_FAULT`). A plus sign also joins two texts, and two lists:
+`= $names + ['part ' + str($count)]`. In `expect`, `save` and `when` the bare name `result` is the
+result, and of a `run_tree` `outputs` what its tree gave; in `until` and `save` of
+`wait_for_message`, `message` is the message. A float32 is read as the shortest number that
+gives it: 0.7, not 0.699999988. The functions are:
+
+| function | gives |
+|---|---|
+{ROWS}
 
 In the fields of a message, and in variables that fill them (but for `now` and constants):
 
 | field | may be written |
 |---|---|
 | builtin_interfaces/Time | `now`, seconds, or `{{sec, nanosec}}` |
-| builtin_interfaces/Duration | `500 ms`, seconds, or `{{sec, nanosec}}` |
+| builtin_interfaces/Duration | `500 ms`, `-1 s`, seconds, or `{{sec, nanosec}}` |
 | geometry_msgs/Quaternion | `{{yaw: 90 deg}}` (`$a`: radians), `roll`, `pitch`; or its fields |
 | a number with constants | `STATUS_MOVING`, `MoveRobot.Feedback.STATUS_MOVING`, `pkg/msg/X.NAME` |
 
@@ -159,7 +182,8 @@ TOPICS = """\
 The latest message of a topic, read as a variable. While the first one may still be on its way (the
 process is younger than 3.5 s, or subscribed less than a second ago to a publisher that is there), a
 node that reads it is `RUNNING`; afterwards it counts as missing, and a check fails. So does
-`check: not $door.data` then; an `invert` around `check: $door.data` succeeds: its child failed."""
+`check: not $door.data` then; an `invert` around `check: $door.data` succeeds: its child failed.
+What is to be done while nobody knows begins with `check: not known($door)`."""
 DEFAULTS = """\
 `timeout`, `retry` and `busy` for all actions. They merge key by key, and the nearest wins: the
 node's own, the action's under `actions`, the tree's `defaults`, those that it imports."""

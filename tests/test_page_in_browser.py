@@ -186,6 +186,39 @@ def test_searching_finds_a_folded_node_and_shows_it(show: Open) -> None:
     assert window.run("return document.querySelectorAll('.node.hit').length") == 1
 
 
+@pytest.mark.parametrize("name", ["Leg 19.8", "Leg 0.0", "Part 9"])
+@pytest.mark.parametrize("way", ["search", "keyboard"])
+def test_on_a_phone_what_is_found_or_gone_to_is_above_the_card(
+    name: str, way: str, show: Open
+) -> None:
+    window = show(long(200), width=390)
+    if way == "search":
+        window.keys("/", *name, "Enter")
+    else:
+        window.run("document.getElementById('unfold').click()")
+        window.run("document.querySelector('#n0').focus()")
+        window.keys(*["Down"] * names(window).index(name))
+    window.wait_for(SHOWN)
+    for height in (800, 500):  # its keyboard opens
+        window.resize(390, height)
+        assert window.wait_for(
+            "(() => { const box = document.querySelector('.node.shown .shape')"
+            ".getBoundingClientRect();"
+            "const above = box.top - document.getElementById('view').getBoundingClientRect().top;"
+            f"return innerHeight === {height} && above >= 0"
+            f" && box.bottom <= {CARD}.getBoundingClientRect().top; }})()"
+        )
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_a_large_tree_opens_at_its_root_and_its_first_child(width: int, show: Open) -> None:
+    window = show(long(10_000), width=width)
+    for name in ("All", "Part 0"):
+        x, y = middle(window, name)
+        assert 0 < x < width
+        assert 50 < y < 800
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_every_text_can_be_read_in_light_and_dark(scheme: str, show: Open) -> None:
     window = show(sample(), scheme=scheme)

@@ -52,6 +52,18 @@ def test_it_is_known_when_all_questions_were_answered_for_long_enough() -> None:
     assert not roll.overdue(roll.now)
 
 
+def test_it_is_known_when_a_server_that_is_alone_has_told_its_goals() -> None:
+    roll = Roll()
+    roll.tells()
+    assert not roll.known, "none is in sight"
+    roll.shows(A)
+    roll.tells()
+    assert roll.known
+    roll.shows(A, B)
+    roll.tells()
+    assert not roll.known, "nobody knows which of them has told"
+
+
 def test_an_answer_alone_is_no_proof() -> None:
     """It was stopped after the first, with a status that it had not delivered."""
     roll = Roll()

@@ -11,7 +11,7 @@ import pytest
 
 from bt_actions import load_tree
 from bt_actions.cli import main
-from bt_actions.document import DocumentError
+from bt_actions.document import DocumentError, open_tree
 from bt_actions.document.building.build import build
 from bt_actions.document.building.scope import Scope
 from bt_actions.document.reading.workspace import Workspace
@@ -119,6 +119,22 @@ def calls() -> Iterator[tuple[Path, ast.Call]]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call):
                 yield path, node
+
+
+def test_a_served_tree_reads_what_lies_or_is_linked_in_its_folders_and_nothing_else(
+    tmp_path: Path,
+) -> None:
+    folder, elsewhere = tmp_path / "trees", tmp_path / "elsewhere.yaml"
+    folder.mkdir()
+    elsewhere.write_text("tree: elsewhere\nroot: {success: }\n")
+    (folder / "linked.yaml").symlink_to(elsewhere)
+    tree = folder / "tree.yaml"
+    tree.write_text("tree: tree\nroot: {subtree: linked.yaml}\n")
+    open_tree(tree, within=[folder])
+    for path in ("../elsewhere.yaml", str(elsewhere), "../trees/../elsewhere.yaml"):
+        tree.write_text(f"tree: tree\nroot: {{subtree: {path}}}\n")
+        with pytest.raises(DocumentError, match="lies outside of the folders"):
+            open_tree(tree, within=[folder])
 
 
 def test_the_package_evaluates_no_text_and_starts_no_command() -> None:

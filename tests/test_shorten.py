@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_actions.utilities.shorten import shorten, shorten_fields
+from bt_actions.utilities.shorten import given_fields, shorten, shorten_fields
 
 
 class Point:
@@ -45,6 +46,9 @@ class Rude:
         (array.array("i", [7]) * 4_000_000, "[7, 7, 7, … 4000000 items]"),
         (np.zeros(3), "[0.0, 0.0, 0.0]"),
         (np.float64(2.0), "2.0"),
+        (np.float32(0.7), "0.7"),
+        (np.array([0.7, 16777217.0], np.float32), "[0.7, 16777216.0]"),
+        (array.array("f", [0.7, -1e-30, math.inf]), "[0.7, -1e-30, inf]"),
         ([[7] * 100] * 2, "[[7, 7, 7, … 100 items], [7, 7, 7, … 100 items]]"),
         ([Rude()], "[<Rude>]"),
         (SimpleNamespace(a=1), "namespace(a=1)"),
@@ -64,6 +68,34 @@ def test_the_fields_of_a_message_are_shown_without_quotes_and_cut() -> None:
     message.x = "moving" * 1_000_000  # type: ignore[assignment]
     assert shorten_fields(message, 12) == "x movingmov…"
     assert shorten_fields(SimpleNamespace(no="message")) == ""
+
+
+def test_the_fields_that_a_message_gives_are_those_that_a_new_one_has_not() -> None:
+    message = Point()
+    assert given_fields(message) == {}
+    message.on, message.data = False, array.array("B", [7]) * 4_000_000
+    assert shorten(given_fields(message)) == "{on: false, data: [7, 7, 7, … 4000000 items]}"
+    assert given_fields("no message") == {}
+
+
+class Grid:
+    """A message with a field of a fixed length."""
+
+    def __init__(self) -> None:
+        self.cells, self.at = np.zeros(3), Point()
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        return {"cells": "double[3]", "at": "Point"}
+
+
+def test_a_field_with_others_in_it_is_given_where_one_of_them_is() -> None:
+    grid = Grid()
+    assert given_fields(grid) == {}
+    grid.at.x = 7.0
+    assert shorten(given_fields(grid)) == "{at: {x: 7.0}}"
+    grid.cells[1] = 1.0
+    assert shorten(given_fields(grid)) == "{cells: [0.0, 1.0, 0.0], at: {x: 7.0}}"
 
 
 def test_what_is_longer_than_the_limit_ends_with_an_ellipsis() -> None:

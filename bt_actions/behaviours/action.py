@@ -349,7 +349,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         assert outcome is not None
         if outcome is Outcome.SUCCEEDED:
             if why := self._read_result(goal.result):
-                outcome, reason = Outcome.UNEXPECTED_RESULT, why
+                outcome, reason = Outcome.UNEXPECTED_RESULT, why + goal.blamed
         elif more := self.explain(outcome, goal.result):
             reason += f"; {more}"
         return self._record(handle, outcome, reason, backend)
@@ -358,6 +358,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self, handle: GoalHandle, outcome: Outcome, reason: str, backend: Backend
     ) -> AttemptRecord:
         goal, begun, ended = handle.goal, handle.begun_at.ros, backend.now().ros
+        goal.message = None  # as large as the user's data
         return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:

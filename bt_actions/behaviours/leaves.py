@@ -93,13 +93,13 @@ class Log(Leaf):
         level: one of `LEVELS`.
     """
 
-    def __init__(self, name: str, text: Callable[[], object], level: str) -> None:
+    def __init__(self, name: str, text: Callable[[], str], level: str) -> None:
         super().__init__(name)
         self._text = text
         self._level = level
 
     def do(self) -> Status:
-        self.feedback_message = line = str(self._text())
+        self.feedback_message = line = self._text()
         if self._backend is None:
             logging.getLogger("bt_actions").log(LEVELS[self._level], line)
         else:

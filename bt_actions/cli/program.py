@@ -25,6 +25,7 @@ COMMANDS = {
     "serve": "serve",
     "list": "list_trees",
     "call": "call",
+    "control": "control",
     "sim": "sim",
     "cleanup": "cleanup",
     "check": "check",

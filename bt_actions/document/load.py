@@ -113,7 +113,7 @@ class Tree:
 
     @property
     def files(self) -> dict[Path, str]:
-        """Every file that it is made of, resolved, with the text that was read (none of data)."""
+        """Every file that it is made of, as named, with the text that was read (none of data)."""
         return self._workspace.files
 
     def check_inputs(self, inputs: Mapping[str, object]) -> None:
@@ -143,7 +143,7 @@ def open_tree(
 
     `types` and `python` as for `load_tree`; `python` may also be the names of the packages whose
     classes a tree may name. With `within`, no file is read that does not lie in one of these
-    folders, wherever links lead.
+    folders; links in them are followed wherever they lead.
 
     Raises DocumentError with everything that is wrong with the tree.
     """
@@ -200,8 +200,13 @@ def _built(
 
 def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
     """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
+    return tree_head(path)[1]
+
+
+def tree_head(path: PathLike) -> tuple[str, dict[str, TreeInput]]:
+    """The name that its file gives a tree, and its inputs; as `tree_inputs`."""
     _, document = _open(path, types=False)
-    return inputs_of(document)
+    return document.name, inputs_of(document)
 
 
 def given_inputs(root: Behaviour) -> dict[str, tuple[TreeInput, object]]:
@@ -299,7 +304,7 @@ def _open(
     if document.root is None:
         message = "this file is for trees to import: it holds no tree itself"
         document.source.report("BT106", Span(1, 1, 1, 2), message)
-        raise DocumentError(document.source.findings)
+        raise DocumentError(_errors(workspace))
     return workspace, document
 
 
@@ -319,7 +324,9 @@ def _found(path: PathLike) -> Path:
         return find_tree(path)
     except TreeNotFoundError as error:
         source = Source(os.fspath(path) or '""', "")
-        hint = None if "mean" in str(error) else f"installed are {', '.join(installed_trees())}"
+        hint = None
+        if error.hint and "mean" not in str(error):
+            hint = f"installed are {', '.join(installed_trees())}"
         source.report("BT100", Span(1, 1, 1, 2), str(error), hint=hint)
         raise DocumentError(source.findings) from None
 

@@ -1,7 +1,7 @@
 """Expressions of a tree: ``result.stalled and $count < 3``, parsed once, evaluated often.
 
-No ROS here. Evaluating calls nothing but `len`, `abs`, `min` and `max`, reads no name that begins
-with an underscore, makes no large number and no large text, and raises nothing but
+No ROS here. Evaluating calls nothing but what `functions.py` lists, reads no name that begins with
+an underscore, makes no large number and no large text, and raises nothing but
 `ExpressionError`. What stands in a text is parsed in `form.py`.
 """
 
@@ -80,6 +80,15 @@ class Expression:
         return frozenset(self.variables)
 
     @property
+    def asked(self) -> frozenset[str]:
+        """The variables that `known` asks for: this expression is right where they lack a value."""
+        asked = self.form.asked
+        if not asked:
+            return frozenset()
+        read = zip(self.variables, self.form.variables, strict=True)
+        return frozenset(name for name, at in read if at in asked)
+
+    @property
     def variable_spans(self) -> tuple[tuple[str, tuple[int, int]], ...]:
         """Each of `variables` with the columns it spans (the dollar sign included)."""
         spans = map(self.span, self.form.variables.values())
@@ -122,6 +131,13 @@ class Expression:
         starts = [self.form.span(node)[0] for node in self.form.variables.values()]
         return at + sum(
             len(name) - 1 for name, start in zip(self.variables, starts, strict=True) if start < at
+        )
+
+    def reads_field_of(self, name: str) -> bool:
+        """Whether it reads a field of a variable, as it does of a message."""
+        return any(
+            isinstance(node, ast.Attribute) and self.variable_of(node.value) == name
+            for node in ast.walk(self.tree)
         )
 
     def variable_of(self, node: ast.AST) -> str | None:

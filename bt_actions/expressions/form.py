@@ -10,17 +10,15 @@ import ast
 import re
 from collections.abc import Callable, Iterable, Mapping
 
+from bt_actions.expressions.functions import ARGUMENTS, FUNCTIONS, KNOWN, instead_of, listed
 from bt_actions.expressions.text import ExpressionError, foreign_in, translate
 from bt_actions.expressions.values import (
     BINARY,
     COMPARE,
-    FUNCTIONS,
-    LENGTHS,
     MAX_BITS,
-    ONE_VALUE,
     UNARY,
     bounded,
-    call,
+    cut,
     field,
     item,
     truth,
@@ -34,13 +32,16 @@ _INFINITE = float("inf")
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
 _ANSWERS = frozenset({"result", "feedback", "message"})
 _SAVE = "save what it holds, and read that as $name"
+_ASKED = "known($name) is true where there is a value"
 _EXAMPLE = "MoveRobot.Result.STATUS_FAULT"
 _FOREIGN = {
-    "null": "there is no 'null' here",
+    "null": f"there is no 'null' here: {_ASKED}",
     "TRUE": "write 'true'",
     "FALSE": "write 'false'",
 }
 _INTERFACE = re.compile(r"[a-z]\w*(?:/(?:msg|srv|action))?/(?P<constant>[A-Z]\w*(?:\.\w+)+)")
+_PERCENT = re.compile(r"(?<![\w.$])(\d+(?:\.\d+)?) *%(?= *(?:$|[)\],]|and\b|or\b))")
+"""What is not the remainder of a division."""
 _COMPARED = re.compile(r"(?:[=!]=|[\[,]) *\Z")
 """What stands before a word that may be meant as a text."""
 Variable = Callable[[str], object]
@@ -52,8 +53,8 @@ _Closure = Callable[[_Roots, Variable, _Names], object]
 class Form:
     """A text that was parsed and compiled, for all expressions that differ in names alone."""
 
-    __slots__ = ("_constants", "_source", "constants", "evaluate", "roots", "text", "tree",
-                 "variables")  # fmt: skip
+    __slots__ = ("_constants", "_source", "asked", "constants", "evaluate", "roots", "text",
+                 "tree", "variables")  # fmt: skip
 
     def __init__(
         self, text: str, roots: frozenset[str], constants: Callable[[str], object] | None
@@ -66,6 +67,8 @@ class Form:
         self.tree = self._parse()
         self.variables: dict[int, ast.Name] = {}
         """The nodes that read a variable, by their places, in reading order."""
+        self.asked: set[int] = set()
+        """The places of those that `known` asks for."""
         self.evaluate = self._compile(self.tree, 0)
 
     def span(self, node: ast.expr) -> tuple[int, int]:
@@ -109,6 +112,9 @@ class Form:
         except SyntaxError as error:
             if foreign := foreign_in(self.text):
                 raise foreign from None
+            if percent := _PERCENT.search(self.text):
+                said = f"{percent[0]!r}: write {float(percent[1]) / 100:g}"
+                raise ExpressionError(said, *percent.span()) from None
             column = source.origin[
                 min(
                     offset + ((error.offset or 0) - 1 if error.offset else len(source.text)),
@@ -154,6 +160,9 @@ class Form:
                         node, f"{attr!r}: names with a leading underscore are private"
                     )
                 return self._guard(node, field, part(inner), _constant(attr))
+            case ast.Subscript(value=inner, slice=ast.Slice(lower=start, upper=end, step=None)):
+                parts = (_NOTHING if each is None else part(each) for each in (inner, start, end))
+                return self._guard(node, cut, *parts)
             case ast.Subscript(value=inner, slice=index) if not isinstance(index, ast.Slice):
                 return self._guard(node, item, part(inner), part(index))
             case ast.UnaryOp(op=op, operand=inner) if type(op) in UNARY:
@@ -166,15 +175,13 @@ class Form:
                 return self._compile_compare(node, [left, *rights], ops, part)
             case ast.List(elts=items) | ast.Tuple(elts=items):
                 return _listing([part(item) for item in items])
-            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
-                if not args:
-                    raise self._refusal(node, f"{name}() needs a value")
-                if len(args) > 1 and name in ONE_VALUE:
-                    raise self._refusal(node, f"{name}() takes one value, not {len(args)}")
-                return self._guard(node, call(name), *(part(arg) for arg in args))
-            case ast.Call(func=function, args=args) if measured := _measured(function, args):
-                start, end = self.span(measured)
-                raise self._refusal(node, f"write len({self.text[start:end]})")
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in ARGUMENTS:
+                self._refuse_arguments(node, name, args)
+                if name == KNOWN:
+                    return self._compile_known(args[0], part)
+                return self._guard(node, FUNCTIONS[name], *(part(arg) for arg in args))
+            case ast.Call(func=function, args=args) if meant := self._meant(function, args):
+                raise self._refusal(node, f"write {meant}")
         raise self._refusal(node, _why_not(node))
 
     def _compile_name(self, node: ast.Name) -> _Closure:
@@ -191,6 +198,41 @@ class Form:
             compared = _COMPARED.search(self.text, 0, start) is not None
             raise ExpressionError(_unknown_name(node.id, self.roots, compared), start, end)
         return _root(node)
+
+    def _refuse_arguments(self, node: ast.expr, name: str, args: list[ast.expr]) -> None:
+        most = ARGUMENTS[name]
+        if not args:
+            raise self._refusal(node, f"{name}() needs a value")
+        if most and len(args) > most:
+            takes = "one value" if most == 1 else f"at most {most} values"
+            raise self._refusal(node, f"{name}() takes {takes}, not {len(args)}")
+
+    def _compile_known(self, node: ast.expr, part: Callable[[ast.expr], _Closure]) -> _Closure:
+        """A closure that tells whether a part has a value, and never fails."""
+        if not isinstance(node, (ast.Name, ast.Attribute, ast.Subscript)):
+            raise self._refusal(node, "known() asks for one value: known($name), known($a.b.0)")
+        before = len(self.variables)
+        read = part(node)
+        self.asked.update([*self.variables][before:])
+
+        def known(roots: _Roots, variable: Variable, names: _Names) -> object:
+            try:
+                read(roots, variable, names)
+            except (Failed, ExpressionError):
+                return False
+            return True
+
+        return known
+
+    def _meant(self, function: ast.expr, args: list[ast.expr]) -> str | None:
+        """What to write for a function or a method of another language."""
+        given = [self.text[slice(*self.span(arg))] for arg in args]
+        match function:
+            case ast.Name(id=name):
+                return instead_of(name, None, given)
+            case ast.Attribute(value=inner, attr=name):
+                return instead_of(name, self.text[slice(*self.span(inner))], given)
+        return None
 
     def _compile_bool(
         self, is_and: bool, values: list[ast.expr], part: Callable[[ast.expr], _Closure]
@@ -256,6 +298,9 @@ def _constant(value: object) -> _Closure:
     return lambda _roots, _variable, _names: value
 
 
+_NOTHING = _constant(None)
+
+
 def _listing(parts: list[_Closure]) -> _Closure:
     return lambda roots, variable, names: [part(roots, variable, names) for part in parts]
 
@@ -311,26 +356,16 @@ def _unknown_name(name: str, roots: Iterable[str], compared: bool) -> str:
     return f"unknown name {name!r}: a variable is written ${name}{given}"
 
 
-def _measured(function: ast.expr, args: list[ast.expr]) -> ast.expr | None:
-    """What is measured where other languages measure: ``length($x)``, ``$x.size()``."""
-    match function:
-        case ast.Name(id=name) if name in LENGTHS and len(args) == 1:
-            return args[0]
-        case ast.Attribute(value=inner, attr=name) if name in LENGTHS and not args:
-            return inner
-    return None
-
-
 def _why_not(node: ast.expr) -> str:
     if isinstance(node, ast.Call):
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if foreign := foreign_in(name):
             return foreign.message
-        if name in FUNCTIONS:
+        if name in ARGUMENTS:
             return f"{name}() takes values only, not {node.keywords[0].arg or '**'}="
-        return "only len, abs, min and max can be called"
+        return f"only {listed()} can be called"
     if isinstance(node, ast.Constant) and node.value is None:
-        return "there is no 'None' here"
+        return f"there is no 'None' here: {_ASKED}"
     names: dict[type[ast.expr], str] = {
         ast.Lambda: "a lambda",
         ast.IfExp: "'if'",
@@ -338,7 +373,7 @@ def _why_not(node: ast.expr) -> str:
         ast.Set: "a set",
         ast.ListComp: "a comprehension",
         ast.GeneratorExp: "a comprehension",
-        ast.Subscript: "a slice",
+        ast.Subscript: "a step",
         ast.JoinedStr: "an f-string",
         ast.NamedExpr: "':='",
         ast.Starred: "'*'",

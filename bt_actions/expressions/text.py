@@ -26,6 +26,7 @@ _FOREIGN = re.compile(
 """What other languages write, and Python cannot read."""
 _NEGATED = re.compile(r"!\s*(\$?[\w.$\[\]]+)")
 _BAD_WORDS = {
+    # of other languages, and of chats and word processors
     "&&": "write 'and'",
     "||": "write 'or'",
     "&": "write 'and'",
@@ -36,6 +37,17 @@ _BAD_WORDS = {
     "#": "a comment has no place in an expression",
     "\\": "a backslash has no place here",
     "`": "a backtick has no place here",
+    **dict.fromkeys("“”„«»‘’‚", "write ' around a text"),
+    **dict.fromkeys("‐‑–—−", "write '-'"),
+    **dict.fromkeys("×·", "write '*'"),
+    "÷": "write '/'",
+    "≥": "write '>='",
+    "≤": "write '<='",
+    "≠": "write '!='",
+    "∧": "write 'and'",
+    "∨": "write 'or'",
+    "¬": "write 'not'",
+    "…": "write out what it stands for",
 }
 
 

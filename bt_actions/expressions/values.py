@@ -9,53 +9,21 @@ from __future__ import annotations
 
 import ast
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sized
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from bt_actions.utilities.plain_data import plain, scalar
+from bt_actions.utilities.plain_data import field_of, item_of, plain, scalar
 from bt_actions.utilities.plain_text import in_words
 from bt_actions.utilities.shorten import shorten
 
 MAX_BITS = 256
 MAX_ITEMS = 10_000
-FUNCTIONS: dict[str, Callable[..., object]] = {"len": len, "abs": abs, "min": min, "max": max}
-
-ONE_VALUE = frozenset({"len", "abs"})
-"""The functions that take no list of arguments."""
-
-
+MAX_JOINED = 100_000
+"""Items in a list that is joined of others."""
 LENGTHS = frozenset({"length", "size", "count"})
 """What other languages call `len`."""
-
-
-def call(name: str) -> Callable[..., object]:
-    function = FUNCTIONS[name]
-    if name == "len":
-        return _length
-    if name == "abs":
-        return lambda value: abs(number(value))
-
-    def call(*values: object) -> object:
-        items = plain(values[0]) if len(values) == 1 else [plain(value) for value in values]
-        if not isinstance(items, (list, tuple)):
-            raise ValueError(f"{name}() of one value needs a list, not {show(items)}")
-        if not items:
-            raise ValueError(f"{name}() of an empty list")
-        try:
-            return function(items)
-        except TypeError:
-            raise ValueError(f"{name}() is of numbers alone, or of texts alone") from None
-
-    return call
-
-
-def _length(value: object) -> int:
-    value = scalar(value)
-    if not isinstance(value, Sized):
-        raise ValueError(f"{show(value)} has no length")
-    return len(value)
 
 
 def number(value: object) -> int | float:
@@ -66,9 +34,28 @@ def number(value: object) -> int | float:
 
 
 def add(left: object, right: object) -> object:
+    """The sum of two numbers, two texts as one, or the items of two lists in a new one."""
+    left, right = _items(left), _items(right)
     if isinstance(left, str) and isinstance(right, str):
         return left + right
+    if isinstance(left, list) and isinstance(right, list):
+        if len(left) + len(right) > MAX_JOINED:
+            raise ValueError(f"the list would have more than {MAX_JOINED:,} items")
+        return left + right
+    for one, other in ((left, right), (right, left)):
+        if isinstance(one, list):
+            raise ValueError(f"a list is joined with a list: write [...] around {show(other)}")
+        if isinstance(one, str):
+            raise ValueError(f"a text is joined with a text: write str(...) around {show(other)}")
     return number(left) + number(right)
+
+
+def _items(value: object) -> object:
+    """A list, whatever holds it, as one of Python's; any other value as it is."""
+    if hasattr(value, "__len__") and len(value) > MAX_JOINED and not isinstance(value, str):
+        raise ValueError(f"a list of more than {MAX_JOINED:,} items cannot be joined")
+    value = plain(value)
+    return list(value) if isinstance(value, (tuple, bytes, bytearray)) else value
 
 
 def _arithmetic(function: Callable[[int | float, int | float], object]) -> Callable[..., object]:
@@ -105,7 +92,7 @@ def field(value: object, name: str) -> object:
     if described is not None:
         known = described()
         if name in known or name.isupper():
-            return scalar(getattr(value, name))
+            return field_of(value, name, known)
         raise ValueError(f"{type(value).__name__} has no field {name!r}{_among(known)}")
     public: Iterable[str] = ()
     if is_dataclass(value):
@@ -139,7 +126,19 @@ def item(value: object, index: object) -> object:
     size = len(value)
     if not -size <= index < size:
         raise ValueError(f"index {index} is outside of {size} items")
-    return scalar(value[index])
+    return item_of(value, index)
+
+
+def cut(value: object, start: object, end: object) -> object:
+    """The items of a list, or the characters of a text, from `start` to before `end`; None: all."""
+    value = scalar(value)
+    if isinstance(value, Mapping) or not hasattr(value, "__getitem__"):
+        raise ValueError(f"{show(value)} has no items")
+    bounds = [plain(bound) for bound in (start, end)]
+    for bound in bounds:
+        if isinstance(bound, bool) or not isinstance(bound, int | None):
+            raise ValueError(f"an index is a whole number, not {show(bound)}")
+    return _items(value[slice(*bounds)])
 
 
 def bounded(value: object) -> object:

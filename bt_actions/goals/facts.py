@@ -25,13 +25,20 @@ from bt_actions.goals.terms import (
     Now,
     State,
 )
+from bt_actions.utilities.shorten import given_fields, shorten
 
 PATIENCE = 5.0
 """Seconds for an answer that nobody wants any more, where the user gave no deadline."""
+FIELDS_SHOWN = 60
+"""Characters of a goal's fields in a reason that blames the goal."""
 
 
 class Facts:
     """One goal as it stands."""
+
+    message: Any = None
+    """The goal message, until its leaf has the outcome: reasons tell of it, and no step depends
+    on it."""
 
     def __init__(
         self,
@@ -119,12 +126,26 @@ class Facts:
         said = words.get(self.asking.answer)
         return f"; {self.server} {said}" if said else ""
 
+    @property
+    def blamed(self) -> str:
+        """What to add to a reason that blames the goal: its fields, or ""."""
+        fields = self.fields
+        return f"; goal {fields}" if fields else ""
+
+    @property
+    def fields(self) -> str:
+        """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
+        given = given_fields(self.message) or self.message  # one that gives none is told whole
+        return shorten(given, FIELDS_SHOWN) if given else ""
+
     # For the steps
 
     def say(self, why: str) -> str:
         """Return a reason with the names and numbers of this goal in it."""
         names = ", ".join(sorted(self.resources))
-        return why.format(names=names, server=self.server, limits=self.timeouts, detail=self.detail)
+        return why.format(
+            names=names, server=self.server, limits=self.timeouts, detail=self.detail, goal=self
+        )
 
     def plan(self, outcome: Outcome, reason: str) -> None:
         """Let it have this outcome when it has ended, unless that is decided."""
@@ -198,7 +219,12 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
     What docs/goal.md says of it is the first line of the function's docstring.
     """
-    return lambda does: Step(does, frozenset(to), (does.__doc__ or "").splitlines()[0].rstrip("."))
+
+    def step(does: Does) -> Step:
+        says = (does.__doc__ or "").partition("\n")[0]  # python -OO leaves no docstring
+        return Step(does, frozenset(to), says.rstrip("."))
+
+    return step
 
 
 @leads_to()

@@ -78,8 +78,12 @@ _in(
     State.EXECUTING,
     FEEDBACK=running.feedback,
     RESULT=running.finished,
-    RESULT_DUE=canceling.cancel(Outcome.RESULT_TIMEOUT, "not finished within {limits.result:g} s"),
-    FEEDBACK_DUE=canceling.cancel(Outcome.STALLED, "no feedback for {limits.feedback:g} s"),
+    RESULT_DUE=canceling.cancel(
+        Outcome.RESULT_TIMEOUT, "not finished within {limits.result:g} s{goal.blamed}"
+    ),
+    FEEDBACK_DUE=canceling.cancel(
+        Outcome.STALLED, "no feedback for {limits.feedback:g} s{goal.blamed}"
+    ),
     SERVER_AMBIGUOUS=canceling.cancel(Outcome.SERVER_AMBIGUOUS, _TWO),
 )
 _in(

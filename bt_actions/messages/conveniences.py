@@ -15,7 +15,7 @@ from typing import Any
 from bt_actions.messages.fields import constants
 from bt_actions.messages.interfaces import PARTS, UnknownInterface, called, interface, short_name
 from bt_actions.utilities.suggest import did_you_mean, what_it_has
-from bt_actions.utilities.units import parse_duration
+from bt_actions.utilities.units import parse_seconds
 
 _BILLION = 1_000_000_000
 _CONSTANT = re.compile(r"(?:([A-Za-z0-9_./]+)\.)?([A-Z][A-Z0-9_]*)")
@@ -33,8 +33,8 @@ def time_of(value: object, now: Callable[[], int]) -> object:
 
 
 def duration_of(value: object) -> object:
-    """``500 ms`` or seconds as the fields of a builtin_interfaces/Duration."""
-    return _seconds(parse_duration(value) if isinstance(value, str) else value)
+    """``500 ms``, ``-1 s`` or seconds as the fields of a builtin_interfaces/Duration."""
+    return _seconds(parse_seconds(value) if isinstance(value, str) else value)
 
 
 def _seconds(value: object) -> object:

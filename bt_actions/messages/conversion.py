@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from bt_actions.messages.as_fields import as_fields
 from bt_actions.messages.conveniences import constant, duration_of, quaternion_of, time_of
 from bt_actions.messages.fields import (
     FLOATS,
@@ -25,8 +26,8 @@ from bt_actions.messages.fields import (
     describe,
     no_field,
 )
-from bt_actions.messages.interfaces import interface_name, short_name
-from bt_actions.utilities.plain_data import numbers_only, plain, scalar
+from bt_actions.messages.interfaces import DURATION, interface_name, short_name
+from bt_actions.utilities.plain_data import field_of, numbers_only, plain, scalar
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.units import parse_angle
 
@@ -36,6 +37,8 @@ M = TypeVar("M")
 _CODES = dict(zip([*FLOATS, *INTEGERS], "fdbhiqBHIQ", strict=False))
 """How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code. Those
 of the last type, `byte`, it keeps in a list."""
+ANGLE = Scalar("float64")
+"""The type of roll, pitch and yaw: this very object says that they are radians."""
 _NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")
 
 _NO_TEXT = re.compile(r"[\0\ud800-\udfff]")
@@ -107,12 +110,9 @@ def to_plain(message: object) -> Any:
     """Dictionaries, lists and scalars that JSON can say (except NaN and infinities)."""
     fields = getattr(type(message), "get_fields_and_field_types", None)
     if fields is not None:
-        return {name: to_plain(getattr(message, name)) for name in fields()}
-    if isinstance(message, bytes) and len(message) == 1:
-        return message[0]
-    to_list = getattr(message, "tolist", None)  # array.array and numpy alike
-    if to_list is not None:
-        return to_list()
+        types = fields()
+        return {name: to_plain(field_of(message, name, types)) for name in types}
+    message = plain(message)  # array.array and numpy alike
     if isinstance(message, (list, tuple, bytes)):
         if numbers_only(message):
             return list(message)
@@ -158,7 +158,9 @@ class _Filler:
             return value
         value = self._convenience(cls, value, path)
         if not isinstance(value, (dict, Mapping)):
-            raise ValueError(f"the fields of a {short_name(cls)} are needed, not {show(value)}")
+            near = as_fields(cls, value)
+            said = f"the fields of a {short_name(cls)} are needed, not {show(value)}"
+            raise ValueError(f"{said}: write {near}" if near else said)
         known = describe(cls)
         message = cls() if self._hole is None else None
         outer, self._owner = self._owner, cls
@@ -179,7 +181,7 @@ class _Filler:
         name = interface_name(cls)
         if name == "builtin_interfaces/msg/Time":
             return time_of(value, self._now)
-        if name == "builtin_interfaces/msg/Duration":
+        if name == DURATION:
             return duration_of(value)
         if name == "geometry_msgs/msg/Quaternion":
             return quaternion_of(value, lambda name, angle: self._angle(angle, (*path, name)))
@@ -187,7 +189,7 @@ class _Filler:
 
     def _angle(self, value: object, path: Path) -> float:
         """In radians; one that is settled elsewhere is a number."""
-        if self._hole is not None and self._hole(value, Scalar("float64"), path):
+        if self._hole is not None and self._hole(value, ANGLE, path):
             return 0.0
         return parse_angle(value)
 
@@ -195,7 +197,7 @@ class _Filler:
         name = str(kind.item)
         items: Any = array.array("B", value) if isinstance(value, (bytes, bytearray)) else value
         if hasattr(items, "tolist") and getattr(items, "typecode", None) != _CODES.get(name):
-            items = items.tolist()  # numpy's, too
+            items = plain(items)  # numpy's, too
         if not isinstance(items, (list, tuple, array.array)):
             raise ValueError(f"a list of {name} is needed, not {show(value)}")
         converted: Any = None if self._hole else _numbers(name, items)  # there may be millions

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import re
 import sys
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -16,6 +17,7 @@ from bt_actions.utilities.suggest import did_you_mean, what_it_has
 
 RUN_TREE = "bt_actions_interfaces/action/RunTree"
 """The action of servers of trees."""
+DURATION = "builtin_interfaces/msg/Duration"
 Kind = Literal["action", "srv", "msg"]
 _WORDS = {"action": "action", "srv": "service", "msg": "message"}
 PARTS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
@@ -27,6 +29,16 @@ _NAME = re.compile(r"([a-z][a-z0-9_]*)/(?:(action|srv|msg)/)?([A-Za-z][A-Za-z0-9
 
 class UnknownInterface(LookupError, ValueError):
     """No such interface is installed; the text says which package is missing or what it has."""
+
+
+class TwoTypes(TypeError):
+    """A name of ROS is in use in this process with another type: nothing can be connected to it."""
+
+    def __init__(self, name: str, kind: type, others: Iterable[str]) -> None:
+        """`others` are the full names of the types that it is in use with."""
+        known = sorted({*others} - {interface_name(kind)})
+        also = f", and also as {', '.join(known)}" if known else ", and not with that type alone"
+        super().__init__(f"{name} is used as {interface_name(kind)}{also}")
 
 
 @lru_cache(maxsize=1024)

@@ -1,9 +1,11 @@
 """Have all servers of an action been alive for long enough to tell what they run? No ROS.
 
 Nobody can ask a server for all of its goals: it publishes them, and its middleware delivers that
-when it does. But a server that has answered every question for some seconds has had the time. An
-answer does not say whose it is; so as many have to come as there are servers in sight. The same
-holds of a goal that they deny: one that was sent, and not accepted yet, may turn up later.
+when it does. A server that has had no goal yet publishes nothing. But a server that has answered
+every question for some seconds has had the time. Neither a status nor an answer says whose it is:
+so a status tells of a server that is alone, and as many answers have to come as there are servers
+in sight. The same holds of a goal that they deny: one that was sent, and not accepted yet, may turn
+up later.
 
 Times are seconds of the steady clock. Looks for nothing itself.
 """
@@ -74,7 +76,7 @@ class RollCall:
         self.action = action
         self.servers: frozenset[bytes] = frozenset()
         """All that were ever in sight."""
-        self._settled: frozenset[bytes] = frozenset()  # those that had the time
+        self._settled: frozenset[bytes] = frozenset()  # those that have told it, or had the time
         self._settle = SETTLE
         self._answers = Answers()
         self._asked_at = 0.0  # last; 0: not since one came in sight
@@ -89,7 +91,7 @@ class RollCall:
 
     @property
     def known(self) -> bool:
-        """Whether every server that was ever in sight has had the time to tell what it runs."""
+        """Whether every server that was ever in sight has told what it runs, or had the time."""
         return bool(self.servers) and self.servers <= self._settled
 
     @property
@@ -116,6 +118,11 @@ class RollCall:
             self._asked_at, self._complete_at = 0.0, now
         self.servers |= shown
         self._shown = shown
+
+    def tells(self) -> None:
+        """A status has come, with all goals of its server: that is known which is alone."""
+        if len(self.servers) == 1:
+            self._settled |= self.servers
 
     def due(self, now: float) -> bool:
         """Whether to ask the next question now."""

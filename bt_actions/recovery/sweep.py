@@ -50,7 +50,7 @@ class Swept:
     known: list[str]
     """The actions of which every server has told what it runs."""
     unknown: dict[str, str]
-    """The others in sight, or wanted, each with the reason, in whose braces belongs its name."""
+    """The others that were asked, each with the reason, in whose braces belongs its name."""
     domain: int
     """The ROS domain in force."""
     trouble: OSError | None
@@ -68,11 +68,10 @@ class Cleanup:
 
     Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
     canceled to end. `found` is called with each at once, and again where it was `awaited` when it
-    turns up. The actions in `wanted`, whose relative names belong to `namespace` (None: all in
-    sight), and those of goals that were found, are looked at until they are known, for LOOK_LONGEST
-    seconds at most, or `look`, if that is more; `waits` is called with those that are not, once,
-    when it begins to wait for one that is silent. Ends in the next turn when `stopped` says so.
-    Blocks.
+    turns up. The actions in `wanted`, by the full names of their servers (None: all in sight), and
+    those of goals that were found, are looked at until they are known, for LOOK_LONGEST seconds at
+    most, or `look`, if that is more; `waits` is called with those that are not, once, when it
+    begins to wait for one that is silent. Ends in the next turn when `stopped` says so. Blocks.
 
     A goal that was sent and not answered is awaited: until it has been denied for `accept` seconds,
     for as long as its sender gave the server to decide, and for DENIED_FOR_GOOD, whichever is most.
@@ -89,7 +88,6 @@ class Cleanup:
     accept: float = 0.0
     found: Callable[[LeftBehind], None] = lambda left: None
     wanted: Collection[str] | None = None
-    namespace: str = ""
     waits: Callable[[list[str]], None] = lambda actions: None
     stopped: Callable[[], bool] = lambda: False
 
@@ -113,7 +111,7 @@ class Cleanup:
             still = Stalls()
             still.lives(time.monotonic())  # it counts from when the participant is made
             try:
-                with onlooker(self.namespace) as sight:
+                with onlooker() as sight:
                     self._begin(sight)
                     if self._goes_through(still, breaks_off=tries_before < 2):
                         break
@@ -128,7 +126,7 @@ class Cleanup:
         self._sight = sight
         self._views: dict[RollCall, ActionView] = {}
         self._questions: dict[tuple[RollCall, int], LeftBehind] = {}
-        self._wanted = {self._call(sight.full_name(name)) for name in self.wanted or ()}
+        self._wanted = {self._call(name) for name in self.wanted or ()}
         for call in self._calls.values():
             call.begin()
         for left in self._left.values():
@@ -173,7 +171,7 @@ class Cleanup:
     def _ends(self) -> Swept:
         """Return all that was seen, and put it on record."""
         self._keep_record()
-        lacks = self._lacks()
+        lacks, required = self._lacks(), self._required()
         calls = self._calls.values()
         return Swept(
             left=list(self._left.values()),
@@ -181,7 +179,7 @@ class Cleanup:
             unknown={
                 call.action: call.trouble
                 for call in calls
-                if not call.known and (call.servers or call in lacks)
+                if not call.known and call in required and (call.servers or call in lacks)
             },
             domain=self._sight.domain,
             trouble=self._trouble,
@@ -210,12 +208,16 @@ class Cleanup:
 
     def _lacks(self) -> list[RollCall]:
         """Return the actions that are looked for, and not known."""
-        required = {left.call for left in self._left.values()} | self._wanted
+        named = {left.call for left in self._left.values()} | self._wanted
         return [
-            call
-            for call in self._calls.values()
-            if not call.known and (call in required or (self.wanted is None and call.servers))
+            call for call in self._required() if not call.known and (call in named or call.servers)
         ]
+
+    def _required(self) -> set[RollCall]:
+        """Return the actions whose servers are to tell what they run; others are not asked."""
+        if self.wanted is None:
+            return set(self._calls.values())
+        return {left.call for left in self._left.values()} | self._wanted
 
     def _awaits(self, now: float) -> bool:
         """Whether a goal may turn up yet at a server in sight."""
@@ -238,9 +240,10 @@ class Cleanup:
         for call, view in self._views.items():
             call.sees(view.servers(), now)
         self._find()
-        for call, view in self._views.items():
+        for call in self._required() & self._views.keys():
             # of a goal that is nobody's: any answer shows that a server lives
-            if call.due(now) and (question := view.cancel(uuid.uuid4().bytes)) is not None:
+            view, due = self._views[call], not call.known and call.due(now)
+            if due and (question := view.cancel(uuid.uuid4().bytes)) is not None:
                 call.asked(question, now)
         self._cancel(now)
 
@@ -256,6 +259,7 @@ class Cleanup:
                 self._turns_up(left)
 
     def _read(self, call: RollCall, message: Any) -> None:
+        call.tells()
         one_server = len(call.servers) <= 1  # or else another may run what has ended
         for entry in message.status_list:
             goal_id, ended = bytes(entry.goal_info.goal_id.uuid), entry.status in ENDS

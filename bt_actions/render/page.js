@@ -138,6 +138,16 @@ function go_to(node, focus = true) {
   view.scrollBy(way(box.left, box.right, frame.left, frame.right), way(box.top, box.bottom, frame.top, frame.bottom));
 }
 
+// Go to a node and show its card, which on a small screen takes room from the view: then once more.
+
+function present(node, focus) {
+  go_to(node, focus);
+  hovered = null;
+  shut = false;
+  show();
+  go_to(node, focus);
+}
+
 // The card.
 
 const put = (name, parent, text, kind) => {
@@ -248,7 +258,10 @@ view.addEventListener("wheel", (event) => {
   zoom(Math.exp(-event.deltaY / 300), event.clientX, event.clientY);
 }, { passive: false });
 view.addEventListener("scroll", () => { if (!card.hidden) show(); }, { passive: true });
-window.addEventListener("resize", show);
+window.addEventListener("resize", () => {  // a phone that is turned, or opens its keyboard
+  show();
+  if (!shut) go_to(current, false);
+});
 
 // Keyboard, as the pattern for trees has it (WAI-ARIA).
 
@@ -268,9 +281,7 @@ svg.addEventListener("keydown", (event) => {
   if (!(event.key in keys)) return;
   event.preventDefault();
   keys[event.key]();
-  hovered = null;
-  shut = false;
-  show();
+  present(current);
 });
 view.addEventListener("focusin", (event) => {  // on the SVG it would make that focusable
   const node = node_at(event.target);
@@ -307,10 +318,7 @@ find("query").addEventListener("keydown", (event) => {
   if (event.key !== "Enter" || !hits.length) return;
   next = (next + (event.shiftKey ? -1 : 1) + hits.length) % hits.length;
   find("found").textContent = `${next + 1} of ${hits.length}`;
-  go_to(hits[next], false);
-  hovered = null;
-  shut = false;
-  show();
+  present(hits[next], false);
 });
 
 function refold(depth) {

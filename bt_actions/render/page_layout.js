@@ -5,6 +5,7 @@ const NAME = 13, UNDER = 10.5, LINE = 1.25;       // font sizes and line height,
 const BETWEEN = 14, LEVELS = 42, MARGIN = 40;     // gaps between nodes, between levels, around all
 const data = JSON.parse(document.getElementById("data").textContent);
 const nodes = data.nodes, down = data.down;
+const NEAR = down ? 700 : 300;                    // how far a node may stand from where its room begins
 
 // The tree. `nodes` are in reading order: a parent comes before its children.
 
@@ -32,7 +33,8 @@ function visible() {
   return shown;
 }
 
-// The layout: a node stands in the middle of the room that its children need side by side.
+// The layout: a node stands in the middle of the room that its children need side by side, but no
+// farther than about half a screen from the first of them: a large tree begins where its root is.
 
 const brush = document.createElement("canvas").getContext("2d");
 const family = getComputedStyle(document.body).fontFamily;
@@ -70,7 +72,7 @@ function lay_out(shown) {
   levels.forEach((size, depth) => starts.push(starts[depth] + size + LEVELS));
   shown.forEach((node) => {
     if (!node.index) node.from = MARGIN;
-    const middle = node.from + node.room / 2, level = starts[node.depth] + levels[node.depth] / 2;
+    const middle = node.from + Math.min(node.room / 2, NEAR), level = starts[node.depth] + levels[node.depth] / 2;
     [node.x, node.y] = down ? [middle, level] : [starts[node.depth] + node.w / 2, middle];
     let from = node.from + (node.room - node.inner) / 2;
     if (node.open) node.children.forEach((child) => { child.from = from; from += child.room; });

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -22,12 +22,12 @@ from rclpy.qos import (
     qos_profile_services_default,
 )
 
-from bt_actions.messages.interfaces import interface_name
-from bt_actions.ros.in_sight import elsewhere, mismatch
+from bt_actions.messages.interfaces import TwoTypes, interface_name
+from bt_actions.ros.in_sight import mismatch, unmatched_service
 from bt_actions.ros.workarounds.closable import closable
-from bt_actions.traffic.backend import Call
+from bt_actions.traffic.backend import ARRIVES, Call
 from bt_actions.traffic.handle import waker
-from bt_actions.utilities.suggest import listing
+from bt_actions.utilities.suggest import elsewhere, listing
 
 DISCOVERS = 3.5
 """Seconds that a new participant takes, at most, to discover who was there before it.
@@ -36,9 +36,6 @@ Fast DDS as it comes announces a participant every 3 s, and answers the first an
 one at once; that answer is lost in about half of all cases, as it may come before the new one
 listens. Up to 2.8 s were measured.
 """
-ARRIVES = 1.0
-"""Seconds that a message is given to arrive: a latched one, once its publisher is in sight, and
-what we have published, before the process ends."""
 
 
 def qos_profile(name: str) -> QoSProfile:
@@ -55,6 +52,20 @@ def qos_profile(name: str) -> QoSProfile:
             lifespan=Duration(seconds=10),
         ),
     }[name]
+
+
+@contextlib.contextmanager
+def _one_type(node: Node, kind: type, name: str) -> Iterator[None]:
+    """Tell in the tree's words why rclpy cannot make something, where the name has another type."""
+    try:
+        yield
+    except RuntimeError as error:  # RCLError, which is public nowhere
+        full = node.resolve_topic_name(name)
+        known = [*node.get_topic_names_and_types(), *node.get_service_names_and_types()]
+        others = {each for found, kinds in known if found == full for each in kinds}
+        if others - {interface_name(kind)}:
+            raise TwoTypes(full, kind, others) from error
+        raise
 
 
 class _Topic:
@@ -103,9 +114,11 @@ class Subscription(_Topic):
         super().__init__(node, seen_since, message_type, qos)
         self._made_at = time.monotonic()
         group = MutuallyExclusiveCallbackGroup()
-        self._subscription = closable(
-            node.create_subscription(message_type, topic, take, self._qos, callback_group=group)
-        )
+        with _one_type(node, message_type, topic):
+            made = node.create_subscription(
+                message_type, topic, take, self._qos, callback_group=group
+            )
+        self._subscription = closable(made)
         self.name = self._subscription.topic_name
 
     def may_come(self) -> float:
@@ -131,7 +144,9 @@ class Publisher(_Topic):
         self, node: Node, seen_since: float, message_type: type, topic: str, qos: str
     ) -> None:
         super().__init__(node, seen_since, message_type, qos)
-        self._publisher = closable(node.create_publisher(message_type, topic, self._qos))
+        with _one_type(node, message_type, topic):
+            made = node.create_publisher(message_type, topic, self._qos)
+        self._publisher = closable(made)
         self._has_all_by = 0.0
         self.name = self._publisher.topic_name
 
@@ -165,7 +180,8 @@ class Service:
         self._node = node
         self._type = service_type
         group = MutuallyExclusiveCallbackGroup()
-        self._client = node.create_client(service_type, name, callback_group=group)
+        with _one_type(node, service_type, name):
+            self._client = node.create_client(service_type, name, callback_group=group)
         self.name: str = self._client.service_name
         """The service's full name."""
 
@@ -185,7 +201,8 @@ class Service:
                 return f": nobody offers it{elsewhere(self.name, kind, known)}"
             if others := sorted(set(known[self.name]) - {kind}):
                 return f": what is there is {listing(others)}, not {kind}"
-            return ": it is in sight, but was not ready"
+            why = unmatched_service(node, self.name)
+            return f": it is in sight, but {f'it {why}' if why else 'was not ready'}"
         return ""
 
     def call(self, request: Any) -> Call:

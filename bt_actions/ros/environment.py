@@ -6,6 +6,7 @@ private. Does not import rclpy.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 from collections.abc import Iterable
@@ -15,9 +16,11 @@ from pathlib import Path
 SHORT_LEASE = Path(__file__).with_name("short_lease.xml")
 PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _PROFILES = (PROFILE, "FASTDDS_DEFAULT_PROFILES_FILE")
+SHARED = "/dev/shm"  # nosec B108
+_SEGMENT = "fastrtps_"
+"""Where Linux has the memory that processes share, and how names of Fast DDS's begin there."""
 _TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _IN_THIS_FOLDER = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
-_LOGS = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 _RANGES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
 
 
@@ -47,13 +50,43 @@ def prepare(reach: Reach = Reach.NETWORK) -> None:
     if not _any_is_set(_PROFILES) and not any(Path(name).exists() for name in _IN_THIS_FOLDER):
         os.environ[PROFILE] = str(SHORT_LEASE)
         os.environ.setdefault(_TRANSPORTS, "UDPv4")
-    if not _any_is_set(_LOGS):
-        os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")  # rcl insists on one
     if reach is Reach.PROCESS:
         for name in _RANGES:
             os.environ.pop(name, None)
     if reach is not Reach.NETWORK and not _any_is_set(_RANGES):
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = reach.value
+
+
+def keep_log() -> None:
+    """Have ROS's log in a temporary folder where nothing can be written in the user's home.
+
+    Without a log no ROS program starts. A ROS_LOG_DIR that the user has set stands.
+    """
+    if _any_is_set(["ROS_LOG_DIR"]):
+        return
+    home = os.environ.get("ROS_HOME") or "~/.ros"
+    folder = Path(os.path.expanduser(home), "log")  # noqa: PTH111 - Path's raises without a home
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    if not os.environ.get("HOME") or not os.access(folder, os.W_OK):
+        with contextlib.suppress(OSError):  # then rcl says why
+            os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="bt_actions-log-")
+
+
+def of_other_users() -> str:
+    """Say, as the end of a sentence, why a server in sight may not hear us, nor we it; or "".
+
+    It is a guess: processes of another user are there, and Fast DDS talks to all in shared memory.
+    """
+    with contextlib.suppress(OSError):  # one has gone meanwhile, say
+        segments = [each for each in os.scandir(SHARED) if each.name.startswith(_SEGMENT)]
+        others = any(each.stat().st_uid != os.getuid() for each in segments)
+        if others and f"{SHARED}/{_SEGMENT}" in Path("/proc/self/maps").read_text():
+            return (
+                "; its server may be another user's, with whom Fast DDS shares no memory: set "
+                f"{_TRANSPORTS}=UDPv4 for both, and no {_RANGES[0]}=LOCALHOST"
+            )
+    return ""
 
 
 def _any_is_set(names: Iterable[str]) -> bool:

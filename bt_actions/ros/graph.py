@@ -41,6 +41,16 @@ def is_valid(node: Node) -> bool:
         return False
 
 
+def is_shut_down(node: Node) -> bool:
+    """Whether the context of a node was shut down, as by Ctrl-C; asked as `is_valid` does it."""
+    try:
+        context = node.context.handle
+        with context:
+            return not context.ok()
+    except InvalidHandle:
+        return True
+
+
 def enclave(node: Node) -> str:
     """Return the SROS 2 enclave of a node of ours, by whatever way it was given.
 

@@ -1,23 +1,27 @@
 """Why a topic or a service finds nobody, in words, of what the ROS graph shows.
 
 What is there in vain is told first: another type, or a quality of service that does not match; then
-one of the same type in another namespace. The texts follow a name and go on as a sentence.
+one of the same type in another namespace. The texts follow a name and go on as a sentence. Looked
+at only where a reason is given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import itertools
+from collections import defaultdict
+from collections.abc import Sequence
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_profile_action_status_default,
+    qos_profile_services_default,
+)
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from bt_actions.utilities.suggest import did_you_mean, listing
-
-NAMED = 3
-"""Names of one type in other namespaces that are told, at most."""
-
-ALIKE = 0.75
-"""How alike two full names must be: they share their namespaces."""
+from bt_actions.utilities.suggest import listing
 
 
 def mismatch(
@@ -48,14 +52,40 @@ def mismatch(
     return ""
 
 
-def elsewhere(name: str, kind: str, known: Mapping[str, Collection[str]]) -> str:
-    """Name those of a type that end as `name` does, in other namespaces; or what looks like it.
+def unmatched_action(node: Node, action: str) -> str:
+    """Say what in the quality of service of an action's server keeps our clients from it; or ""."""
+    said: dict[str, list[str]] = defaultdict(list)
+    for part, ours in (
+        ("feedback", qos_profile_services_default),
+        ("status", qos_profile_action_status_default),
+    ):
+        topic = node.get_publishers_info_by_topic(f"{action}/_action/{part}")
+        said[_gap([each.qos_profile for each in topic], [ours])].append(part)
+    for part in ("send_goal", "get_result", "cancel_goal"):
+        said[unmatched_service(node, f"{action}/_action/{part}")].append(f"{part} service")
+    said.pop("", None)
+    return "; ".join(f"its {listing(parts)} {why}" for why, parts in said.items())
 
-    `known` has the types of each full name.
-    """
-    of_kind = [each for each, kinds in known.items() if kind in kinds and each != name]
-    base = name.rpartition("/")[2]
-    found = sorted(each for each in of_kind if each.rpartition("/")[2] == base)
-    if found:
-        return f"; there is {listing(found, NAMED)} of that type"
-    return did_you_mean(name, of_kind, cutoff=ALIKE)
+
+def unmatched_service(node: Node, service: str) -> str:
+    """Say the same of a service, whose two topics have the names of ROS 2's middlewares for DDS."""
+    name, ours = node.resolve_service_name(service), [qos_profile_services_default]
+    replies = node.get_publishers_info_by_topic(f"rr{name}Reply", no_mangle=True)
+    requests = node.get_subscriptions_info_by_topic(f"rq{name}Request", no_mangle=True)
+    return _gap([each.qos_profile for each in replies], ours) or _gap(
+        ours, [each.qos_profile for each in requests], "asks for {asks}, and gets {offers}"
+    )
+
+
+def _gap(
+    offers: Sequence[QoSProfile],
+    asks: Sequence[QoSProfile],
+    words: str = "is {offers}, and {asks} is asked for",
+) -> str:
+    """Name the policy by which what a publisher offers is less than a subscription asks for."""
+    for offered, asked in itertools.product(offers, asks):
+        if offered.reliability is ReliabilityPolicy.BEST_EFFORT is not asked.reliability:
+            return words.format(offers="best effort", asks="reliable")
+        if offered.durability is DurabilityPolicy.VOLATILE is not asked.durability:
+            return words.format(offers="volatile", asks="transient local")
+    return ""

@@ -9,17 +9,30 @@ from __future__ import annotations
 import itertools
 import os
 import re
+import sys
 import unicodedata
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
+from bt_actions.ros.environment import keep_log
 from bt_actions.ros.log import log
 from bt_actions.ros.workarounds import participant
 
+SEND_GOAL = "/_action/send_goal"
+"""What the name of an action's service for goals ends with."""
 LONGEST = 100
 """Characters of a node's name, which the names of its services begin with."""
+
+
+def overrides(node: Node) -> dict[str, Parameter]:
+    """Return the parameters that ROS arguments give a node, by name."""
+    with node.handle:
+        return dict(node.handle.get_parameters(Parameter))
 
 
 def node_name(tree: str) -> str:
@@ -32,19 +45,73 @@ def node_name(tree: str) -> str:
     return re.sub(r"\W", "_", f"bt_actions_{''.join(plain)}")[:LONGEST]
 
 
+def open_context(
+    context: Context, words: Sequence[str] | None = None, domain: int | None = None
+) -> None:
+    """Initialise a context with these words, or with the program's; raises what rclpy raises.
+
+    A byte that is no UTF-8, as names of files may have it, is escaped: rclpy reads all words.
+    """
+    keep_log()
+    words = sys.argv if words is None else words
+    legible = [word.encode(errors="backslashreplace").decode() for word in words]
+    try:
+        context.init(args=legible, domain_id=domain)
+    except RuntimeError as error:
+        if "initialize logging" not in str(error):
+            raise
+        remedy = "set ROS_LOG_DIR to a folder that can be written"
+        raise RuntimeError(f"the log cannot be written; {remedy}") from error
+
+
 def own_node(
     name: str, *, args: list[str] | None = None, domain: int | None = None, **given: Any
 ) -> Node:
     """Return a node in a context of its own, without services; raises what rclpy raises."""
     context = Context()
     try:
-        context.init(args=args, domain_id=domain)
+        open_context(context, args, domain)
         return Node(
             name, context=context, enable_rosout=False, start_parameter_services=False, **given
         )
     except BaseException:
         context.try_shutdown()
         raise
+
+
+def server_name(node: Node, action: str) -> str:
+    """Return the full name of the server that a node's goals for an action go to.
+
+    ROS remaps no action, but its parts: the service that takes goals says which server it is.
+    Raises ValueError for a name that ROS refuses.
+    """
+    name: str = expand_topic_name(action, node.get_name(), node.get_namespace())
+    service: str = node.resolve_service_name(name + SEND_GOAL)
+    return service.removesuffix(SEND_GOAL) if service.endswith(SEND_GOAL) else name
+
+
+def server_names(actions: Iterable[str], name: str, namespace: str = "") -> list[str]:
+    """Return the servers that a node to come has for actions; for a moment there is another.
+
+    `name` and `namespace` are that node's, before remapping. Raises what rclpy raises.
+    """
+    node = own_node(name, namespace=namespace)
+    try:
+        return sorted({server_name(node, each) for each in actions})
+    finally:
+        participant.close(node)
+
+
+def warn_of_remapping(node: Node, action: str) -> None:
+    """Say it where a rule would have an action another full name: ROS remaps no action."""
+    name: str = expand_topic_name(action, node.get_name(), node.get_namespace())
+    other, part = node.resolve_service_name(name), name + SEND_GOAL
+    if other != name and node.resolve_service_name(part) == part:
+        log.warning(
+            f"a rule remaps {name} to {other}, and has no effect: ROS does not remap actions. "
+            f"Name {other} itself, set the namespace of the node, or remap its parts: {part}, "
+            "cancel_goal, get_result, feedback and status"
+        )
 
 
 class Outlook:
@@ -67,11 +134,12 @@ class Outlook:
 def named_node(name: str, context: Context, namespace: str) -> Node:
     """A new node; its name has a number behind it where another node is seen to have it already.
 
-    One that was given by ``__node:=`` stands as it is. There is a warning in both cases.
+    One that was given by ``__node:=`` stands as it is. There is a warning in both cases. Parameters
+    are those of the name without a number.
     """
-    wanted, taken = name, ""
+    wanted, taken, given = name, "", list[Parameter]()
     for number in itertools.count(2):
-        node = Node(name, context=context, namespace=namespace)
+        node = Node(name, context=context, namespace=namespace, parameter_overrides=given)
         ours = node.get_fully_qualified_name()
         if taken:
             log.warning(
@@ -88,6 +156,7 @@ def named_node(name: str, context: Context, namespace: str) -> Node:
             )
             break
         taken, ending = ours, f"_{number}"
+        given = given or list(overrides(node).values())
         node.destroy_node()
         name = wanted[: LONGEST - len(ending)] + ending
     return node

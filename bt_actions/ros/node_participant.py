@@ -20,17 +20,18 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.clocks import Clocks
 from bt_actions.ros.connections import Publisher, Service, Subscription
-from bt_actions.ros.environment import sees_nobody_else
+from bt_actions.ros.environment import of_other_users, sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
-from bt_actions.ros.graph import enclave, is_valid
+from bt_actions.ros.graph import enclave, is_shut_down, is_valid
 from bt_actions.ros.host import host
-from bt_actions.ros.in_sight import elsewhere
+from bt_actions.ros.in_sight import unmatched_action
 from bt_actions.ros.log import log
+from bt_actions.ros.naming import server_name, warn_of_remapping
 from bt_actions.ros.receiving import Receiver
 from bt_actions.ros.rediscovery import look_for
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import Listener, Seeker
-from bt_actions.utilities.suggest import did_you_mean, listing
+from bt_actions.utilities.suggest import did_you_mean, elsewhere, listing
 
 FEEDBACK = "/_action/feedback"
 _ON_NODE = "_bt_actions_participant"
@@ -79,7 +80,9 @@ class NodeParticipant:
         self.publisher = functools.partial(Publisher, node, sight.since)
         self.traffic = Traffic(host, self)
         self._receiver = Receiver(node)
-        self._warned_of: set[str] = set()
+        self._servers: dict[str, str] = {}
+        self._asked_by: dict[str, str] = {}
+        """The action by which our node asks a server, by the server's name; both are full names."""
 
     @classmethod
     def of(cls, node: Node) -> NodeParticipant:
@@ -103,71 +106,77 @@ class NodeParticipant:
         """Whether the node is there, and its context was not shut down."""
         return is_valid(self.node)
 
+    def shut_down(self) -> bool:
+        """Whether the context was shut down; else who is not alive was destroyed."""
+        return is_shut_down(self.node)
+
     def full_name(self, action: str) -> str:
-        """Return the full name of an action; raises ValueError for one that ROS refuses."""
-        name: str = expand_topic_name(action, self.name, self.namespace)
-        return name
+        """Return the full name of the server that goals for an action go to.
+
+        Raises ValueError for a name that ROS refuses.
+        """
+        if action not in self._servers:
+            full = expand_topic_name(action, self.name, self.namespace)
+            self._servers[action] = server = server_name(self.node, full)
+            self._asked_by.setdefault(server, full)
+            warn_of_remapping(self.node, full)
+        return self._servers[action]
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
-        """Become a client of an action."""
-        self._warn_of_remapping(name)
+        """Become a client of an action, by the name that rules may remap the parts of."""
+        action = self._asked_by.get(name, name)
         is_private = sees_nobody_else()  # no server can come to be seen later than another
         seen_since = NEVER if is_private else self.seen_since
         leave = self._receiver.leave
-        transport = RosTransport(self.node, action_type, name, listener, seen_since, leave)
+        transport = RosTransport(self.node, action_type, action, listener, seen_since, leave)
         self._receiver.join(transport)
         return transport
-
-    def _warn_of_remapping(self, name: str) -> None:
-        """Say it, once for a name, where a rule would have it another: ROS remaps no action."""
-        other, part = self.node.resolve_service_name(name), f"{name}/_action/send_goal"
-        remapped = self.node.resolve_service_name(part) != part
-        if other != name and not remapped and name not in self._warned_of:
-            self._warned_of.add(name)
-            log.warning(
-                f"a rule remaps {name} to {other}, and has no effect: ROS does not remap actions. "
-                f"Name {other} where the action is used, set the namespace of the node, or remap "
-                f"its parts: {part}, cancel_goal, get_result, feedback and status"
-            )
 
     def seek(self, seeker: Seeker) -> None:
         """Have a new participant look for what is missed.
 
-        Not where remapping rules give our node another server than that would find.
+        Not where remapping rules give our node parts of several servers.
         """
-        if not self._is_remapped(seeker.name):
+        if self._is_one_server(seeker.name):
             look_for(seeker, self.domain, self._enclave)
 
     @functools.cached_property
     def _enclave(self) -> str:
         return enclave(self.node)
 
-    def _is_remapped(self, name: str) -> bool:
-        """Whether rules of this node lead any part of an action elsewhere."""
+    def _is_one_server(self, name: str) -> bool:
+        """Whether all parts of an action, as rules of this node lead them, are of one server."""
         parts = {
             self.node.resolve_topic_name: ("status", "feedback"),
             self.node.resolve_service_name: ("send_goal", "cancel_goal", "get_result"),
         }
-        return any(
-            resolve(full := f"{name}/_action/{part}") != full
+        action = self._asked_by.get(name, name)
+        return all(
+            resolve(f"{action}/_action/{part}") == f"{name}/_action/{part}"
             for resolve, its in parts.items()
             for part in its
         )
 
+    def unheard(self) -> str:
+        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
+        return of_other_users()
+
     def instead(self, action_type: Any, name: str) -> str:
         """Say what is in sight where the action is not: another type, or a name like it."""
-        actions = dict[str, str]()
+        actions, ours = dict[str, str](), interface_name(action_type)
         try:
             for topic, _ in self.node.get_topic_names_and_types():
                 if topic.endswith(FEEDBACK):
                     for info in self.node.get_publishers_info_by_topic(topic):
                         kind = info.topic_type.removesuffix("_FeedbackMessage")
                         actions[topic.removesuffix(FEEDBACK)] = kind
+            kind = actions.get(name)
+            why = unmatched_action(self.node, name) if kind == ours else ""
         except Exception:  # noqa: BLE001 - our node was destroyed
             return ""
-        ours, kind = interface_name(action_type), actions.get(name)
         if kind == ours:
-            return ": it is in sight, but was not ready, or has requests enough to answer"
+            why = why or f"was not ready, or has requests enough to answer{of_other_users()}"
+            return f": it is in sight, but {why}"
         if kind is not None:
             return f"; there is one of another type or version, {kind}"
         if not actions:

@@ -12,7 +12,6 @@ from typing import Any
 
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
-from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from unique_identifier_msgs.msg import UUID
@@ -21,6 +20,7 @@ from bt_actions.ros.graph import servers
 from bt_actions.ros.naming import own_node
 from bt_actions.ros.workarounds import participant
 
+NODE = "bt_actions_cleanup"
 STATUS = "/_action/status"
 """What the name of an action's status topic ends with."""
 DEPTH = 100
@@ -93,10 +93,6 @@ class Onlooker:
         self.node = node
         self.domain = int(node.context.get_domain_id())
 
-    def full_name(self, name: str) -> str:
-        """Return the name as a run means it."""
-        return str(self.node.resolve_topic_name(name, only_expand=True))
-
     def actions(self) -> list[str]:
         """Return the names of the actions that anybody serves, or is a client of."""
         topics = [topic for topic, _types in self.node.get_topic_names_and_types()]
@@ -104,11 +100,11 @@ class Onlooker:
 
 
 @contextlib.contextmanager
-def onlooker(namespace: str) -> Iterator[Onlooker]:
-    """Look from a node in a context of its own. Raises CannotStart."""
+def onlooker() -> Iterator[Onlooker]:
+    """Look from a node in a context of its own, whose names nothing remaps. Raises CannotStart."""
     try:
-        node = own_node("bt_actions_cleanup", namespace=namespace)
-    except (RuntimeError, OSError, NameValidationException) as error:
+        node = own_node(NODE, use_global_arguments=False)
+    except (RuntimeError, OSError) as error:
         raise CannotStart(str(error).splitlines()[0]) from error
     try:
         yield Onlooker(node)

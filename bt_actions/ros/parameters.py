@@ -1,16 +1,9 @@
-"""A run's inputs as ROS parameters: those that `--ros-args` give before there is a node, and those
-that the node then shows.
-
-rcl reads the words: whatever it takes, finds in a file for this node, or refuses is its own to say.
-"""
+"""The ROS parameters that a node of ours shows: the inputs of a run, the options of a server."""
 
 from __future__ import annotations
 
-import ast
 import math
-import os
-import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -27,43 +20,7 @@ from bt_actions.messages.fields import (
     Scalar,
     describe,
 )
-from bt_actions.ros.naming import own_node
-from bt_actions.ros.workarounds import participant
 from bt_actions.utilities.plain_text import as_json
-
-_OF_EVERY_NODE = frozenset({"use_sim_time", "start_type_description_service"})
-
-
-def parameters_in(words: Sequence[str], namespace: str = "", name: str = "") -> dict[str, object]:
-    """The values that the words behind `--ros-args` give to a node, without rclpy's own parameters.
-
-    Raises ValueError, with rcl's reason, for words that it does not understand.
-    """
-    try:
-        node = own_node(
-            name or f"bt_actions_{os.getpid()}_parameters",
-            args=["--ros-args", *words],
-            namespace=namespace,
-            automatically_declare_parameters_from_overrides=True,
-        )
-        try:
-            found = node.get_parameters_by_prefix("")
-        finally:
-            participant.close(node)
-    except RuntimeError as error:  # rclpy's RCLError
-        if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
-            unknown = shlex.join(ast.literal_eval(str(error)))
-            why = f"ROS does not know {unknown}; options of bt-actions stand before --ros-args"
-            raise ValueError(why) from error
-        raise ValueError(str(error).splitlines()[0]) from error
-    for name in _OF_EVERY_NODE & found.keys():
-        if not isinstance(found[name].value, bool):
-            raise ValueError(f"{name} is true or false, not {found[name].value!r}")
-    return {
-        name: parameter.value
-        for name, parameter in found.items()
-        if name not in _OF_EVERY_NODE and not name.startswith("qos_overrides.")
-    }
 
 
 def declare_input(node: Node, name: str, kind: FieldType, value: object, description: str) -> bool:
@@ -76,10 +33,22 @@ def declare_input(node: Node, name: str, kind: FieldType, value: object, descrip
     if any(node.has_parameter(each.name) for each, _ in shown):
         return False
     for each, descriptor in shown:
-        node.declare_parameter(each.name, each.type_, ignore_override=True)
-        node.set_parameters([each])  # so a list may be empty
-        node.set_descriptor(each.name, descriptor)
+        declare(node, each, descriptor)
     return True
+
+
+def typed(name: str, value: object) -> Parameter:
+    """Return a parameter; a list is one of texts, an empty one too."""
+    kind = Parameter.Type.STRING_ARRAY if isinstance(value, list) else None
+    return Parameter(name, kind, value)
+
+
+def declare(node: Node, parameter: Parameter, descriptor: ParameterDescriptor) -> None:
+    """Show a parameter, read-only, with its type, which an empty list would not tell."""
+    descriptor.type, descriptor.read_only = parameter.type_.value, True
+    node.declare_parameter(parameter.name, parameter.type_, ignore_override=True)
+    node.set_parameters([parameter])
+    node.set_descriptor(parameter.name, descriptor)
 
 
 def _shown(
@@ -100,10 +69,8 @@ def _shown(
         limits, its_type = None, Parameter.Type.STRING
         value = as_json(value)  # which is YAML, and quick for many points
     descriptor = ParameterDescriptor(
-        type=its_type.value,
         description=description,
         additional_constraints=f"{kind}; fixed while the tree runs",
-        read_only=True,
     )
     if limits:
         least, most = limits[0], min(limits[1], _MOST)

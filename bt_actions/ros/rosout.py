@@ -15,6 +15,8 @@ from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
 
+Level = Literal["info", "warn", "error"]
+
 
 class Rosout:
     """Publishes on `/rosout` for one node, on any thread; to be closed before the node is gone."""
@@ -24,7 +26,7 @@ class Rosout:
         publisher = NodeParticipant.of(node).publisher(Log, "/rosout", "rosout")
         self._publish, self.close = publisher.publish, publisher.close
 
-    def say(self, level: Literal["info", "error"], text: str) -> None:
+    def say(self, level: Level, text: str) -> None:
         """Say something, and never raise; an error needs attention."""
         with contextlib.suppress(Exception):  # its node is gone, say: the log has it as well
             stamp, name = self._node.get_clock().now().to_msg(), self._node.get_logger().name

@@ -23,8 +23,9 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.node import Node
 from rclpy.task import Task
 
+from bt_actions.ros.environment import keep_log
 from bt_actions.ros.graph import is_valid
-from bt_actions.ros.naming import named_node
+from bt_actions.ros.naming import named_node, open_context
 from bt_actions.ros.node_participant import traffic_of
 from bt_actions.ros.workarounds import participant
 from bt_actions.ros.workarounds.once_executor import OnceExecutor
@@ -93,7 +94,7 @@ class Spinner:
             context = brought.context
         elif context is None:
             context = self._context = Context()
-            context.init()
+            open_context(context)
         unique = name or f"bt_actions_{os.getpid()}_{next(_number)}"
         try:
             self.node = node or named_node(unique, context, namespace)
@@ -120,6 +121,7 @@ class Spinner:
         Another one where it cannot be used any more, and in a callback of its own: who made that
         may be waiting for it to end.
         """
+        keep_log()  # it may set a variable
         settings = os.getpid(), *sys.argv, *sorted(os.environ.items())
         with _users_lock:
             found = _shared.get(settings)

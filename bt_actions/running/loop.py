@@ -20,6 +20,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
+from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.running.goals import RunGoals
 from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
@@ -37,6 +38,10 @@ LONGEST_WAIT = 3600.0
 
 class TreeError(Exception):
     """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
+
+
+class UnusableTree(TreeError):
+    """The tree cannot be set up as it is given, whatever the world does."""
 
 
 def check_seconds(timeout: float | None) -> None:
@@ -159,6 +164,7 @@ class TickLoop:
         Raises it at once where that has begun.
         """
         if self._drain is not None:
+            self._error = None  # what has ended the run is not raised again by `shutdown`
             self._rest()
             raise error
         self._error, self._status = error, Status.INVALID
@@ -274,6 +280,9 @@ class TickLoop:
             step()
         except Misbehaviour as error:
             raise TreeError(f"{'/'.join(path_of(error.behaviour))}: {error}") from None
+        except TwoTypes as error:
+            where = "/".join(path_of(culprit_of(error) or self.tree.root))
+            raise UnusableTree(f"{where}: {error}") from None
         except Exception as error:
             where = "/".join(path_of(culprit_of(error) or self.tree.root))
             raise TreeError(f"{where}: {self._doing} raised {raised(error)}") from error

@@ -18,7 +18,7 @@ from bt_actions import document
 from bt_actions.behaviours.decorators import Gate
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeStarted
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.utilities.places import path_of
+from bt_actions.utilities.places import path_of, told_apart
 
 DONE = "DONE"
 UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
@@ -147,6 +147,7 @@ class Report:
     _rows: dict[Behaviour, Row] = field(default_factory=dict)
     _changes: dict[Behaviour, NodeChanged] = field(default_factory=dict)  # of each node the latest
     _warnings: dict[Behaviour, Culprit] = field(default_factory=dict)
+    _called: dict[Behaviour, str] = field(default_factory=dict)
 
     def observe(self, event: Event) -> None:
         """Take in one event, in the order of their coming."""
@@ -175,6 +176,15 @@ class Report:
             self._rows[behaviour] = Row(behaviour, path_of(behaviour), place_of(behaviour), server)
         return self._rows[behaviour]
 
+    def called(self, leaf: Behaviour) -> str:
+        """Return a leaf's name; where others have it, behind what of its path tells them apart."""
+        if leaf not in self._called:  # also one that was added since
+            paths = {each: path_of(each) for each in self.root.iterate() if not each.children}
+            paths[leaf] = path_of(leaf)
+            names = told_apart(paths.values())
+            self._called = {each: names[path] for each, path in paths.items()}
+        return self._called[leaf]
+
     def elapsed(self) -> float:
         """Return the seconds since the tree started, between events too."""
         return time.monotonic() - self.started if self.started else 0.0
@@ -193,7 +203,9 @@ class Report:
     def servers_gone(self) -> list[str]:
         """The actions with a goal whose server went away; one that only stood still goes on."""
         return [
-            f"{row.path[-1]} on {row.server}" for row in self._rows.values() if row.left_at_server
+            f"{self.called(row.behaviour)} on {row.server}"
+            for row in self._rows.values()
+            if row.left_at_server
         ]
 
     @property

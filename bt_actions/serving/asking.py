@@ -1,6 +1,6 @@
-"""Questions to servers of trees in sight, from outside: which trees, and why a goal was rejected.
+"""Servers of trees in sight, asked from outside: which trees, why a goal was rejected, and control.
 
-Both block for some seconds.
+All of it blocks for some seconds.
 """
 
 from __future__ import annotations
@@ -8,12 +8,79 @@ from __future__ import annotations
 import contextlib
 
 from bt_actions_interfaces.msg import Rejection, TreeInfo
-from bt_actions_interfaces.srv import ListTrees
+from bt_actions_interfaces.srv import ControlTree, ListTrees
+from unique_identifier_msgs.msg import UUID
 
-from bt_actions.ros.serving.asking import answers, heard
+from bt_actions.ros.serving.asking import Asker, answers, heard
 from bt_actions.serving.rejections import REJECTIONS
+from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.suggest import listing
 
-__all__ = ["trees_in_sight", "why_rejected"]
+__all__ = ["NotControlled", "control", "trees_in_sight", "why_rejected"]
+
+_COMMANDS = {
+    "pause": ControlTree.Request.PAUSE,
+    "resume": ControlTree.Request.RESUME,
+    "halt": ControlTree.Request.HALT,
+}
+
+
+class NotControlled(Exception):
+    """Nothing was done. `unclear`: because it is not clear which run is meant."""
+
+    def __init__(self, message: str, *, unclear: bool = False) -> None:
+        super().__init__(clean(message))
+        self.unclear = unclear
+
+
+def control(action: str, command: str, beginning: str) -> str:
+    """Have a server pause, resume or halt the run whose id begins so; return which it is.
+
+    `action` is its full name; without a beginning, the one run there is. Raises NotControlled.
+    """
+    with Asker() as asker:
+        place, _, own = action.rpartition("/")
+        found = own == "run_tree" and asker.find(
+            ListTrees, lambda name: name.rsplit("/", 2)[0] == place
+        )
+        if not found:
+            raise NotControlled(
+                f"no server of trees offers {action}; is `bt-actions serve` running, in this "
+                "ROS_DOMAIN_ID, and in this namespace?"
+            )
+        told = asker.ask(ListTrees, found, ListTrees.Request())
+        if told is None:
+            raise NotControlled(f"{found} does not answer")
+        runs = {
+            bytes(each.uuid).hex(): clean(tree.name) for tree in told.trees for each in tree.running
+        }
+        goal_id = _chosen(action, runs, beginning)
+        request = ControlTree.Request(
+            command=_COMMANDS[command],
+            goal_id=UUID(uuid=list(bytes.fromhex(goal_id))),
+            requested_by="bt-actions control",
+        )
+        service = f"{found.removesuffix('/list_trees')}/control_tree"
+        answer = asker.ask(ControlTree, service, request)
+    if answer is None:
+        raise NotControlled(f"{service} does not answer")
+    if not answer.accepted:
+        raise NotControlled(answer.message)
+    return f"{runs[goal_id]} {goal_id}"
+
+
+def _chosen(action: str, runs: dict[str, str], beginning: str) -> str:
+    chosen = [goal_id for goal_id in runs if goal_id.startswith(beginning)]
+    if len(chosen) == 1:
+        return chosen[0]
+    there = listing(f"{goal_id} ({tree})" for goal_id, tree in runs.items())
+    if not runs:
+        raise NotControlled(f"no tree runs at {action}")
+    if not chosen:
+        raise NotControlled(
+            f"no run at {action} has an id that begins so; there is {there}", unclear=True
+        )
+    raise NotControlled(f"which one? Give the beginning of one of {there}", unclear=True)
 
 
 def why_rejected(goal_name: str) -> Rejection | None:

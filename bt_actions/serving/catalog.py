@@ -1,21 +1,25 @@
 """The trees that can be run, by name: looked up in named folders, never opened by a path. No ROS.
 
 A file that changed is read again when somebody asks. One that no longer checks keeps its last good
-version. What a tree includes, imports or reads must lie in the named folders, wherever links lead.
+version; so does one that cannot be read soon, which is not waited for again before it has been.
+What a tree includes, imports or reads must lie in the named folders, or be linked there.
 """
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import hashlib
 import threading
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from bt_actions.document import DocumentError, Finding, Tree, open_tree
 from bt_actions.serving.requests import Refused, Said, inputs_of
+from bt_actions.utilities.patience import Patience
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import did_you_mean
 
@@ -24,8 +28,13 @@ __all__ = ["Catalog", "Entry", "State"]
 _SUFFIXES = (".yaml", ".yml")
 _LONGEST_NAME = 60
 """Characters of a name that nobody knows in what is said of it."""
+PATIENCE = 2.0
+"""Seconds in which a file or a folder must be read: less than a client waits for its answer."""
+AT_START = 10.0
+"""The same when the trees are read first: nobody waits, and much is imported for them."""
 RACY = 1_000_000_000
 """Nanoseconds in which two changes of a file may have the same time of change."""
+_NOT_READ = f"this cannot be read: there is no answer within {PATIENCE:g} s; is its disk there?"
 _Stamp = tuple[int, int, int] | None
 
 
@@ -49,6 +58,8 @@ class Entry:
     findings: tuple[Said, ...]
     """What is wrong with the file as it is now."""
     stamps: Mapping[Path, _Stamp]
+    hides: tuple[Path, ...] = ()
+    """Files of the same name that are not served."""
 
     @property
     def state(self) -> State:
@@ -62,36 +73,46 @@ class Catalog:
     """The trees in some folders. May be asked on any thread.
 
     Args:
-        folders: where trees lie as NAME.yaml; of two of one name the first counts. Files without a
-            tree (they are for others to import), and with a name that no line shows, have no entry.
+        folders: where trees lie as NAME.yaml; of two of one name the first counts. No entry have
+            files without a tree (they are for others to import), those whose names begin with a
+            dot (of editors, say), and those with a name that no line shows.
         python: the packages whose classes a ``python:`` node may name.
 
     Raises NotADirectoryError for a folder that is none.
     """
 
     def __init__(self, folders: Iterable[Path], *, python: Iterable[str] = ()) -> None:
+        self._patience = Patience(AT_START)
         self.folders = tuple(Path(each) for each in folders)
-        for folder in self.folders:
-            if not folder.is_dir():
-                raise NotADirectoryError(f"{folder} is no folder of trees")
+        with self._patience:
+            for folder in self.folders:
+                try:
+                    is_folder = self._patience(folder, folder.is_dir)
+                except TimeoutError:
+                    raise NotADirectoryError(f"{folder}: {_NOT_READ}") from None
+                if not is_folder:
+                    raise NotADirectoryError(f"{folder} is no folder of trees")
         self._python = frozenset(python)
         self._lock = threading.Lock()
         self._entries: dict[str, Entry] = {}
+        self._listed: dict[Path, list[Path]] = {}
+        """What each folder held when it was last looked into."""
+        self._there: list[Path] = []
+        """The folders that answer."""
 
     def entries(self) -> list[Entry]:
         """All trees, by name."""
-        with self._lock:
-            files = self._files()
-            found = [self._entry(name, file) for name, file in sorted(files.items())]
+        with self._lock, self._patience:
+            found = [self._entry(name, paths) for name, paths in sorted(self._files().items())]
             self._entries = {each.name: each for each in found if each is not None}
+            self._patience.seconds = PATIENCE
             return list(self._entries.values())
 
     def find(self, name: str) -> Entry:
         """The tree of this name, as it is now. Raises Refused."""
-        with self._lock:
+        with self._lock, self._patience:
             files = self._files()
-            file = files.get(name)
-            entry = None if file is None else self._entry(name, file)
+            entry = self._entry(name, files.get(name, ()))
             if entry is None:
                 shown = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}..."
                 near = did_you_mean(name, files) or "; ListTrees tells which there are"
@@ -116,38 +137,64 @@ class Catalog:
             raise Refused("INPUTS", str(error), "inputs") from None
         return entry, entry.tree, values
 
-    def _files(self) -> dict[str, Path]:
-        found: dict[str, Path] = {}
+    def _files(self) -> dict[str, list[Path]]:
+        """The files of each name, in the order of the folders."""
+        self._there = []
         for folder in self.folders:
-            try:
-                files = sorted(folder.iterdir())
-            except OSError:
-                continue
-            for file in files:
-                if file.suffix in _SUFFIXES and clean(file.stem) == file.stem:
-                    found.setdefault(file.stem, file)
+            with contextlib.suppress(TimeoutError):
+                self._listed[folder] = self._patience(folder, partial(_trees_in, folder))
+                self._there.append(folder)
+        found: dict[str, list[Path]] = {}
+        for folder in self.folders:
+            for file in self._listed.get(folder, ()):
+                found.setdefault(file.stem, []).append(file)
         return found
 
-    def _entry(self, name: str, file: Path) -> Entry | None:
-        """The entry of a file as it is now; None for one that holds no tree."""
+    def _entry(self, name: str, files: Sequence[Path]) -> Entry | None:
+        """The entry of the first of some files that holds a tree, as it is now."""
         before = self._entries.get(name)
-        if before is not None and before.file != file:
-            before = None
+        for number, file in enumerate(files):
+            known = before if before is not None and before.file == file else None
+            try:
+                entry = self._patience(file, partial(self._read, name, file, known))
+            except TimeoutError:
+                said = Said("BT100", _NOT_READ, str(file))
+                known = known or Entry(name, file, None, "", (), {})
+                entry = replace(known, findings=(said,))
+            if entry is not None:
+                hides = tuple(files[number + 1 :])
+                return entry if entry.hides == hides else replace(entry, hides=hides)
+        return None
+
+    def _read(self, name: str, file: Path, before: Entry | None) -> Entry | None:
+        """The entry of a file; None for one that holds no tree. May hang, so it changes nothing."""
         if before is not None and not before.findings and _unchanged(before.stamps):
             return before
         begun = time.time_ns()
         try:
-            tree = open_tree(file, python=self._python, within=self.folders)
+            tree = open_tree(file, python=self._python, within=self._there)
         except DocumentError as error:
             if before is None and _holds_no_tree(error.findings):
                 return None
             said = tuple(_said(each) for each in error.findings)
             if before is None:
                 return Entry(name, file, None, "", said, {})
-            return Entry(name, file, before.tree, before.digest, said, before.stamps)
+            return replace(before, findings=said)
         files = tree.files
         stamps = {path: _stamp(path, before=begun - RACY) for path in files}
         return Entry(name, file, tree, _digest(files), (), stamps)
+
+
+def _trees_in(folder: Path) -> list[Path]:
+    try:
+        files = sorted(folder.iterdir())
+    except OSError:
+        return []
+    return [
+        each
+        for each in files
+        if each.suffix in _SUFFIXES and each.name[0] != "." and clean(each.stem) == each.stem
+    ]
 
 
 def _holds_no_tree(findings: Iterable[Finding]) -> bool:

@@ -25,6 +25,8 @@ class Standing(NamedTuple):
     tree: str
     state: State = State.OK
     running: int = 0
+    paused: int = 0
+    """Of those that run."""
     retrying: bool = False
     last: RunOutcome | None = None
     """How its last run ended."""
@@ -41,6 +43,8 @@ def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
         return ERROR, f"the last run is not settled: {last.unaccounted[0]} may still be running"
     if last is not None and not last.as_wanted and not running:
         return WARN, f"the last run failed: {last.message.partition(chr(10))[0]}"
+    if standing.paused:
+        return WARN, "paused"
     if standing.retrying:
         return WARN, "an action is tried again"
     if standing.state is State.KEPT_LAST_GOOD:
@@ -79,6 +83,7 @@ class Diagnostics:
         values = {
             "state": standing.state.name,
             "running": str(standing.running),
+            "paused": str(standing.paused),
             "last_error_code": "" if standing.last is None else str(standing.last.code),
         }
         return DiagnosticStatus(

@@ -22,7 +22,10 @@ class Goal:
     """rclpy's handle of it."""
     run: Run
     tree: str
-    begun: bool = False
+    begins: str = ""
+    """What is said when it begins."""
+    begun_at: float | None = None
+    """When it began, on the steady clock; None while it waits for its turn."""
     _told: int = -1
     _told_at: float = 0.0
 
@@ -31,9 +34,19 @@ class Goal:
         """Its goal id."""
         return bytes(self.client.goal_id.uuid)
 
+    @property
+    def begun(self) -> bool:
+        """Whether its turn has come."""
+        return self.begun_at is not None
+
+    @property
+    def label(self) -> str:
+        """What tells its run from others of the tree."""
+        return f"{self.tree} {self.id.hex()}"
+
     def tell(self, now: float) -> None:
         """Tell its client how far it is; to be called every FASTEST seconds."""
         changes = self.run.changes
         if changes != self._told or now - self._told_at >= SLOWEST - FASTEST / 2:
             self._told, self._told_at = changes, now
-            self.client.publish_feedback(feedback(self.run.running(), self.run.leaves_ended))
+            self.client.publish_feedback(feedback(self.run))

@@ -12,7 +12,8 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions.serving.catalog import Entry
 from bt_actions.serving.outcome import ActionOutcome, RunOutcome
 from bt_actions.serving.requests import Said
-from bt_actions.serving.run import Leaf
+from bt_actions.serving.run import Run
+from bt_actions.serving.story import warnings_of
 from bt_actions.utilities.plain_text import as_json
 
 __all__ = ["feedback", "finding", "info", "result"]
@@ -29,10 +30,10 @@ def result(outcome: RunOutcome) -> RunTree.Result:
     )
 
 
-def feedback(running: Iterable[Leaf], leaves_ended: int) -> RunTree.Feedback:
+def feedback(run: Run) -> RunTree.Feedback:
     """How far a run is."""
-    leaves = [RunningLeaf(**leaf._asdict()) for leaf in running]
-    return RunTree.Feedback(running=leaves, leaves_ended=leaves_ended)
+    leaves = [RunningLeaf(**leaf._asdict()) for leaf in run.running()]
+    return RunTree.Feedback(running=leaves, leaves_ended=run.leaves_ended, paused=run.paused)
 
 
 def finding(said: Said) -> Finding:
@@ -40,17 +41,18 @@ def finding(said: Said) -> Finding:
     return Finding(**said._asdict())
 
 
-def info(entry: Entry, running: Iterable[UUID]) -> TreeInfo:
-    """A tree that can be run."""
-    tree = entry.tree
+def info(entry: Entry, running: Iterable[tuple[UUID, Run]]) -> TreeInfo:
+    """A tree that can be run, and the goals and runs that there are of it."""
+    tree, running = entry.tree, list(running)
     return TreeInfo(
         name=entry.name,
         description="" if tree is None else tree.description,
         file=str(entry.file),
         digest=entry.digest,
         state=entry.state.value,
-        findings=[finding(each) for each in entry.findings],
-        running=list(running),
+        findings=[finding(each) for each in (*entry.findings, *warnings_of(entry))],
+        running=[goal_id for goal_id, _ in running],
+        paused=[goal_id for goal_id, run in running if run.paused],
         inputs=[
             TreeInput(
                 name=each.name,

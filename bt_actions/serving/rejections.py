@@ -5,8 +5,8 @@ from __future__ import annotations
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import Rejection
 
-from bt_actions.ros.log import log
 from bt_actions.ros.serving.endpoints import Endpoints, kept
+from bt_actions.ros.serving.telling import Telling
 from bt_actions.serving.requests import Refused
 from bt_actions.utilities.plain_text import clean
 
@@ -20,7 +20,8 @@ ECHO = 200
 class Rejections:
     """The log, and the topic ``~/rejections``, which keeps the last ten."""
 
-    def __init__(self, endpoints: Endpoints) -> None:
+    def __init__(self, endpoints: Endpoints, say: Telling) -> None:
+        self._say = say
         self._node = endpoints.node
         self._publisher = endpoints.publisher(Rejection, "~/rejections", kept(REJECTIONS))
 
@@ -28,8 +29,9 @@ class Rejections:
         """Say why a goal is rejected."""
         said = refused.finding
         place = f" ({said.place})" if said.place else ""
-        log.warning(f"goal for {clean(goal.tree)[:ECHO]!r} rejected: {said.code}: "
-                    f"{said.message}{place}")  # fmt: skip
+        called = f", called {clean(goal.goal_name)[:ECHO]!r}," if goal.goal_name else ""
+        self._say("warn", f"goal for {clean(goal.tree)[:ECHO]!r}{called} rejected: {said.code}: "
+                          f"{said.message}{place}")  # fmt: skip
         self._publisher.publish(
             Rejection(
                 stamp=self._node.get_clock().now().to_msg(),

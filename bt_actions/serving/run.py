@@ -17,6 +17,7 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import Event, NodeChanged
 from bt_actions.messages.conversion import to_plain
+from bt_actions.ros.naming import server_name
 from bt_actions.running.report import Report
 from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
@@ -45,7 +46,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: where goals are sent from; somebody spins it.
-        begins: called with the names of the actions that it uses, before it sends a goal.
+        begins: called with the full names of the servers that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
     """
 
@@ -64,7 +65,8 @@ class Run:
         self._begins, self._ended = begins, ended
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
-        self._paused = False
+        self.paused = False
+        """No new goal is begun."""
         self.ending: Ending | None = None
         self.leaves_ended = 0
         self._running: dict[Behaviour, None] = {}
@@ -97,7 +99,8 @@ class Run:
 
     def _pause(self, wanted: bool) -> None:
         with self._lock:
-            self._paused = wanted
+            self.paused = wanted
+            self.changes += 1
             if self._runner is not None:
                 (self._runner.pause if wanted else self._runner.resume)()
 
@@ -129,9 +132,8 @@ class Run:
 
     def _to_end(self) -> RunOutcome:
         root = self.tree.build(self._inputs)
-        self._begins(
-            {each.action_name for each in root.iterate() if isinstance(each, ActionBehaviour)}
-        )
+        leaves = [each for each in root.iterate() if isinstance(each, ActionBehaviour)]
+        self._begins({server_name(self._node, each.action_name) for each in leaves})
         report = Report(root)
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node)
@@ -142,7 +144,7 @@ class Run:
                 self._runner = runner
                 if self.ending is not None:
                     runner.interrupt()
-                if self._paused:
+                if self.paused:
                     runner.pause()
             status = runner.run()
         except BaseException as raised:  # noqa: BLE001 - a behaviour's, or nobody spins the node

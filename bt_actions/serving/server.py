@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
@@ -20,12 +20,14 @@ from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
 
 from bt_actions.document import Tree
 from bt_actions.document.reading.find import tree_folder
-from bt_actions.ros.log import log
-from bt_actions.ros.rosout import Rosout
+from bt_actions.ros.rosout import Level
 from bt_actions.ros.serving.action_server import DeferredActionServer
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.ros.serving.lifecycle import Lifecycle
+from bt_actions.ros.serving.precedence import Precedence
+from bt_actions.ros.serving.telling import Telling
 from bt_actions.serving.catalog import Catalog
+from bt_actions.serving.control import Control
 from bt_actions.serving.diagnostics import Diagnostics, Standing
 from bt_actions.serving.goal import FASTEST, Goal
 from bt_actions.serving.messages import finding, info, result
@@ -33,6 +35,7 @@ from bt_actions.serving.outcome import Code, Ending, RunOutcome
 from bt_actions.serving.rejections import ECHO, Rejections
 from bt_actions.serving.requests import Refused
 from bt_actions.serving.run import Run
+from bt_actions.serving.story import begins, ends, warnings_of
 from bt_actions.serving.turns import Policy, Turns
 from bt_actions.serving.underway import Underway
 from bt_actions.utilities.plain_text import clean, in_words
@@ -51,6 +54,7 @@ class _Admitted(NamedTuple):
     """What a goal runs that its client has not been told of yet."""
 
     name: str
+    file: str
     tree: Tree
     inputs: Mapping[str, object]
 
@@ -61,8 +65,8 @@ class TreeServer:
     Args:
         node: where all of it is, and from where the trees' goals are sent. Somebody spins it, on
             another thread than the one that makes or closes this; any executor will do.
-        trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Nothing
-            outside of them is read.
+        trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Of
+            other files, those are read that are linked there.
         policy: what to do with a goal while another runs: "reject", "queue", "replace", "parallel".
         most: how many goals may wait (queue), or run (parallel).
         python: the packages whose classes the trees' ``python:`` nodes may name.
@@ -110,7 +114,9 @@ class TreeServer:
         self._underway = Underway(node.context.get_domain_id())
         self._worker = ThreadPoolExecutor(1, "bt_actions-check")
         self._endpoints = endpoints = Endpoints(node)
-        self._rejections = Rejections(endpoints)
+        self._say = Telling(node)
+        self._rejections = Rejections(endpoints, self._say)
+        self.precedence = Precedence(endpoints, "run_tree", self._say)
         self._action = DeferredActionServer(
             endpoints,
             RunTree,
@@ -119,12 +125,18 @@ class TreeServer:
             accepted=self._on_accepted,
             dropped=self._on_dropped,
             cancel=self._on_cancel,
+            yields=self.precedence.yields,
             keeps=RESULT_TIMEOUT,
         )
-        endpoints.service(ListTrees, "~/list_trees", self._on_list)
-        endpoints.service(CheckTree, "~/check_tree", self._on_check)
-        endpoints.service(ControlTree, "~/control_tree", self._on_control)
-        self._rosout = Rosout(node)
+        silent = self.precedence.is_doubled
+        endpoints.service(ListTrees, "~/list_trees", self._on_list, silent=silent)
+        endpoints.service(CheckTree, "~/check_tree", self._on_check, silent=silent)
+        control = Control(
+            lambda: dict(self._goals),
+            lambda goal: self._end(goal, Ending.HALTED),
+            self._tell_of,
+        )
+        endpoints.service(ControlTree, "~/control_tree", control.answer, silent=silent)
         self._timer = endpoints.timer(FASTEST, self._tell, autostart=False)
         Diagnostics(endpoints, self._standings, self._worker.submit)
         self.lifecycle: Lifecycle | None = None
@@ -136,7 +148,7 @@ class TreeServer:
                 "cleaningup": self._forget,
                 "shuttingdown": self._finalize,
             }
-            self.lifecycle = Lifecycle(endpoints, steps)
+            self.lifecycle = Lifecycle(endpoints, steps, self._say)
         else:
             self._configure()
             self._activate()
@@ -162,7 +174,7 @@ class TreeServer:
         """
         if not self._is_drained:
             self.drain()
-        self._rosout.close()
+        self._say.close()
         self._endpoints.close()
         self._action.destroy()
         if self.lifecycle is not None:
@@ -198,10 +210,14 @@ class TreeServer:
 
     def _configure(self) -> None:
         self.catalog = Catalog(self._folders, python=self._python)
-        self.catalog.entries()  # so that what is wrong with a file is known, and it is read once
+        for entry in self.catalog.entries():  # each file is read once, and what is wrong is known
+            for warning in warnings_of(entry):
+                self._say("warn", warning.message)
         self._refuses = "it is inactive"
 
     def _activate(self) -> None:
+        if self.lifecycle is not None:
+            self.precedence.look_first()
         self._refuses = ""
 
     def _forget(self) -> None:
@@ -221,8 +237,9 @@ class TreeServer:
                 runs = [goal.run for goal in goals if goal.tree == entry.name]
                 retrying = any(run.retrying() for run in runs)
                 last = self._last.get(entry.name)
-                found.append(Standing(entry.name, entry.state, len(runs), retrying, last))
-            return found, self._refuses
+                paused = sum(run.paused for run in runs)
+                found.append(Standing(entry.name, entry.state, len(runs), paused, retrying, last))
+            return found, self._refuses or self.precedence.why
 
     # Requests; on the executor's threads
 
@@ -236,7 +253,7 @@ class TreeServer:
         except Refused as refused:
             self._rejections.tell(goal, refused)
             return None
-        return _Admitted(entry.name, tree, values)
+        return _Admitted(entry.name, str(entry.file), tree, values)
 
     def _refuse_more(self) -> None:
         with self._lock:
@@ -245,8 +262,8 @@ class TreeServer:
                 raise Refused("BUSY", refusal)
 
     def _refuse_inactive(self) -> None:
-        if self._refuses:
-            raise Refused("INACTIVE", f"this server accepts no goals: {self._refuses}")
+        if why := self._refuses or self.precedence.why:
+            raise Refused("INACTIVE", f"this server accepts no goals: {why}")
 
     def _on_accepted(self, client: Any, admitted: _Admitted) -> None:
         run = Run(
@@ -254,11 +271,11 @@ class TreeServer:
             admitted.inputs,
             self.node,
             ended=lambda outcome: self._ended(goal, outcome),
-            begins=lambda actions: self._underway.begins(
-                goal.id, {self.node.resolve_topic_name(each, only_expand=True) for each in actions}
-            ),
+            begins=lambda servers: self._underway.begins(goal.id, servers),
         )
-        goal = Goal(client, run, admitted.name)
+        called = clean(client.request.goal_name)[:ECHO]
+        begin = begins(admitted.file, admitted.tree, admitted.inputs, called)
+        goal = Goal(client, run, admitted.name, begin)
         with self._answered:
             self._goals[goal.id] = goal
             begun, halted = self._turns.come(goal)
@@ -293,7 +310,10 @@ class TreeServer:
         with self._lock:
             goals = list(self._goals.values())
         response.trees = [
-            info(entry, [goal.client.goal_id for goal in goals if goal.tree == entry.name])
+            info(
+                entry,
+                [(each.client.goal_id, each.run) for each in goals if each.tree == entry.name],
+            )
             for entry in entries
         ]
         return response
@@ -310,27 +330,6 @@ class TreeServer:
         response.accepted = not response.findings
         return response
 
-    def _on_control(
-        self, request: ControlTree.Request, response: ControlTree.Response
-    ) -> ControlTree.Response:
-        with self._lock:
-            goal = self._goals.get(bytes(request.goal_id.uuid))
-        commands: dict[int, Callable[[Goal], None]] = {
-            ControlTree.Request.PAUSE: lambda goal: goal.run.pause(),
-            ControlTree.Request.RESUME: lambda goal: goal.run.resume(),
-            ControlTree.Request.HALT: lambda goal: self._end(goal, Ending.HALTED),
-        }
-        if goal is None:
-            response.message = "no such goal runs here"
-        elif request.command not in commands:
-            response.message = f"{request.command} is no command"
-        else:
-            asks = clean(request.requested_by)[:ECHO] or "somebody"
-            log.info(f"{goal.tree}: {asks} asks for command {request.command}")
-            commands[request.command](goal)
-            response.accepted = True
-        return response
-
     async def _off(self, work: Callable[..., Any], *arguments: Any) -> Any:
         """Do something that takes its time on a thread that is not the executor's."""
         return await self._endpoints.off(self._worker.submit, lambda: work(*arguments))
@@ -340,10 +339,10 @@ class TreeServer:
     def _begin(self, goals: Iterable[Goal]) -> None:
         for goal in goals:
             with self._lock:  # the timer's callback stops it where nothing has begun
-                goal.begun = True
+                goal.begun_at = time.monotonic()
                 self._timer.reset()
             self._action.begin(goal.client)
-            self._tell_all("info", f"{goal.tree}: begins")
+            self._tell_of(goal, goal.begins)
             goal.run.start()
 
     def _end(self, goal: Goal, ending: Ending) -> None:
@@ -360,15 +359,15 @@ class TreeServer:
 
     def _ended(self, goal: Goal, outcome: RunOutcome) -> None:
         """A run is over: have its goal answered, and let the next one begin."""
-        said = f": {outcome.message}" if outcome.message else ""
-        self._tell_all("info" if outcome.as_wanted else "error", f"{goal.tree}: ends{said}")
+        seconds = None if goal.begun_at is None else time.monotonic() - goal.begun_at
+        self._tell_of(goal, ends(outcome, seconds), "info" if outcome.as_wanted else "error")
         self._last[goal.tree] = outcome
         if outcome.settled:
             self._underway.ends(goal.id)
         try:
             self._answer(goal, outcome)
         except Exception as error:  # noqa: BLE001 - the context was shut down before; by version
-            log.warning(f"{goal.tree}: its client could not be answered: {in_words(error)}")
+            self._tell_of(goal, f"its client could not be answered: {in_words(error)}", "warn")
         with self._answered:
             self.unaccounted += outcome.unaccounted
             self._goals.pop(goal.id, None)
@@ -376,10 +375,8 @@ class TreeServer:
             begun = self._turns.leave(goal)
         self._begin(begun)
 
-    def _tell_all(self, level: Literal["info", "error"], text: str) -> None:
-        """Log it, and say it on /rosout, where the log's lines do not come."""
-        getattr(log, level)(text)
-        self._rosout.say(level, text)
+    def _tell_of(self, goal: Goal, text: str, level: Level = "info") -> None:
+        self._say(level, f"{goal.label} {text}")
 
     def _answer(self, goal: Goal, outcome: RunOutcome) -> None:
         status = GoalStatus.STATUS_ABORTED

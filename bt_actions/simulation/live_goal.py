@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from bt_actions.goals.terms import STATUS_ABORTED, STATUS_CANCELED, STATUS_SUCCEEDED
+from bt_actions.messages.interfaces import short_name
 from bt_actions.simulation.execution import CancelAnswer, Execution, Finish, Happened
 from bt_actions.simulation.goal_meaning import GoalMeaning
 from bt_actions.simulation.journal import Event
@@ -20,6 +21,9 @@ class Owner(Protocol):
 
     def record(self, goal_id: str, event: Event, **more: object) -> None:
         """Write a line into the journal."""
+
+    def broken(self, goal_id: str, reason: str) -> None:
+        """What a goal means has raised: a line into the log."""
 
     def ended(self, goal: LiveGoal, result: Any) -> None:
         """The goal has reached its terminal state."""
@@ -60,7 +64,7 @@ class LiveGoal:
         try:
             happened = self.run.step(now, self._step_period)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its motion does
-            happened = self.run.give_up(f"it could not go on: {raised(error)}")
+            happened = self.run.give_up(self._broken(f"it could not go on: {raised(error)}"))
         self._owner.record(self.goal_id, Event.STEP, **self._meaning.state(self.run.motion))
         self._carry_out(happened)
         return self.run.moving
@@ -101,13 +105,17 @@ class LiveGoal:
         elif happened.die:
             self._owner.die("fault: die")
 
+    def _broken(self, reason: str) -> str:
+        self._owner.broken(self.goal_id, reason)
+        return reason
+
     def _send_feedback(self, times: int) -> None:
         try:
             message = self._meaning.feedback(self.run.motion)
             for _ in range(times):
                 self._wire.feedback(self.goal_id, message)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
-            self.give_up(f"it has no feedback: {raised(error)}")
+            self.give_up(self._broken(f"it has no feedback: {raised(error)}"))
 
     def _finish(self, finish: Finish, reason: str) -> None:
         motion = self.run.motion
@@ -118,9 +126,9 @@ class LiveGoal:
                 self._meaning.halt(motion)
             result = self._meaning.result(motion, finish, reason)
             if not isinstance(result, self._meaning.action_type.Result):
-                raise TypeError(f"{result!r} is no {self._meaning.action_type.Result.__name__}")
+                raise TypeError(f"{result!r} is no {short_name(self._meaning.action_type.Result)}")
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
-            finish, reason = Finish.FAULT, f"it has no result: {raised(error)}"
+            finish, reason = Finish.FAULT, self._broken(f"it has no result: {raised(error)}")
             result = self._meaning.action_type.Result()
         status = self._wire.end(self.goal_id, _STATUSES.get(finish, STATUS_ABORTED))
         event = _EVENTS.get(status, Event.ABORTED)

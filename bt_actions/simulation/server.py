@@ -167,6 +167,10 @@ class SimulatedServer(GoalMeaning):
         """Write a line into the journal."""
         self.journal.write(self.name, goal_id, event, **more)
 
+    def broken(self, goal_id: str, reason: str) -> None:
+        """Write into the log why a goal is aborted for which its script, or subclass, raised."""
+        self._log.warning(f"{self.name}: goal {goal_id[:8]} aborted: {reason}")
+
     def ended(self, goal: LiveGoal, result: Any) -> None:
         """Send the result of a goal that has reached its terminal state."""
         self.stepper.stop(goal)
@@ -254,6 +258,7 @@ class SimulatedServer(GoalMeaning):
             self._results.expect(goal_id, request.faults)
             wire.start(goal_id)
             if problem:
+                self.broken(goal_id, problem)
                 live.give_up(problem)
             else:
                 self.stepper.start(live)

@@ -17,6 +17,7 @@ from bt_actions.goals.terms import (
     STATUS_EXECUTING,
     STATUS_SUCCEEDED,
 )
+from bt_actions.messages.interfaces import short_name
 from bt_actions.simulation.platform import Request, Server
 from bt_actions.testing.medium import Medium, VirtualRequest
 
@@ -80,7 +81,7 @@ class VirtualActionServer:
     def feedback(self, goal_id: str, message: Any) -> None:
         """Publish feedback."""
         if not isinstance(message, self.action_type.Feedback):
-            raise TypeError(f"{message!r} is no {self.action_type.Feedback.__name__}")
+            raise TypeError(f"{message!r} is no {short_name(self.action_type.Feedback)}")
         self._medium.publish_feedback(self, bytes.fromhex(goal_id), message)
 
     def end(self, goal_id: str, status: int) -> int:

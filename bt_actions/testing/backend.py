@@ -5,15 +5,19 @@ Topics and services are those of the network; nothing on it is ever undiscovered
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+from bt_actions.messages.interfaces import interface_name, short_name
 from bt_actions.testing.host import VirtualHost
-from bt_actions.testing.network import VirtualNetwork
+from bt_actions.testing.network import VirtualNetwork, VirtualPublisher, told
 from bt_actions.testing.transport import VirtualParticipant
+from bt_actions.traffic.backend import ARRIVES
 from bt_actions.traffic.handle import waker
 from bt_actions.traffic.traffic import Traffic
+from bt_actions.utilities.suggest import elsewhere, listing
 
 
 class VirtualBackend:
@@ -50,7 +54,7 @@ class VirtualBackend:
 
     def publisher(self, message_type: type, topic: str, qos: str) -> VirtualSpeaker:
         """Become a publisher on a topic."""
-        return VirtualSpeaker(self.network, topic, qos)
+        return VirtualSpeaker(self.network, message_type, topic, qos)
 
     def log(self, level: str, text: str) -> None:
         """Write a line of the tree's to the network's log."""
@@ -60,28 +64,36 @@ class VirtualBackend:
 class _Connection:
     """What all have in common: whoever is there was discovered long ago."""
 
-    def __init__(self, network: VirtualNetwork, name: str) -> None:
+    _theirs = "what is there"
+    _nobody = ": nobody offers it"
+
+    def __init__(self, network: VirtualNetwork, its_type: type, name: str) -> None:
         self.name = network.expand(name)
         self._network = network
+        self._type = its_type
 
     def may_come(self) -> float:
         """Say that nobody else may."""
         return 0.0
 
     def why_nobody(self) -> str:
-        """Say nothing more."""
-        return ""
+        """Say what is there instead, as ros/connections.py does."""
+        kind, there = interface_name(self._type), self._there()
+        known = {name: sorted(map(interface_name, types)) for name, types in there.items() if types}
+        types = known.get(self.name, [])
+        if kind in types:
+            return ""
+        if types:
+            return f": {self._theirs} is {listing(types)}, not {kind}"
+        return self._nobody + elsewhere(self.name, kind, known)
 
-    def close(self) -> None:
-        """Have nothing to let go of."""
+    def _there(self) -> dict[str, set[type]]:
+        """Return the types of what may be at the other end, by its full name."""
+        raise NotImplementedError
 
 
 class VirtualService(_Connection):
     """A client of one service."""
-
-    def __init__(self, network: VirtualNetwork, service_type: type, name: str) -> None:
-        super().__init__(network, name)
-        self._type = service_type
 
     @property
     def ready(self) -> bool:
@@ -89,13 +101,20 @@ class VirtualService(_Connection):
         return self._network.service(self._type, self.name) is not None
 
     def call(self, request: Any) -> Future[Any]:
-        """Begin a call."""
+        """Begin a call. What answers it raises TypeError where it returns no response."""
         call, wake = Future[Any](), waker()
         if served := self._network.service(self._type, self.name):
             answer, takes = served
 
             def reply() -> None:
                 response = answer(request)
+                expected: Any = self._type
+                if not isinstance(response, expected.Response):
+                    raise TypeError(
+                        f"the service {self.name} was answered with {told(response)}: what plays "
+                        f"it has to return an instance of {short_name(expected.Response)}"
+                    )
+                response = copy.deepcopy(response)  # whoever answers may change it for the next one
                 self._network.timeline.call_in(takes, lambda: self._network.soon(arrive, response))
 
             def arrive(response: Any) -> None:
@@ -106,9 +125,18 @@ class VirtualService(_Connection):
             self._network.soon(reply)
         return call
 
+    def close(self) -> None:
+        """Have nothing to let go of."""
+
+    def _there(self) -> dict[str, set[type]]:
+        return {name: {its_type} for name, (its_type, *_) in self._network.services.items()}
+
 
 class VirtualSubscription(_Connection):
     """One topic, listened to."""
+
+    _theirs = "what is published there"
+    _nobody = ": nobody publishes on it"
 
     def __init__(
         self,
@@ -118,30 +146,42 @@ class VirtualSubscription(_Connection):
         qos: str,
         take: Callable[[Any], None],
     ) -> None:
-        super().__init__(network, topic)
+        super().__init__(network, message_type, topic)
         self._topic = network.topic(topic)
-        self._mine = network.subscribe(message_type, topic, take)
-        if qos == "latched" and isinstance(self._topic.latched, message_type):
-            network.soon(self._topic.bring, self._mine, self._topic.latched)
+        self._given_until = network.now() + ARRIVES
+        self._mine = network.subscribe(message_type, topic, take, latched=qos == "latched")
+
+    def may_come(self) -> float:
+        """Seconds for which the first message of who publishes may be on its way."""
+        left = self._given_until - self._network.now()
+        return max(0.0, left) if self._type in self._topic.published else 0.0
 
     def close(self) -> None:
         """Unsubscribe."""
         if self._mine in self._topic.subscriptions:
             self._topic.subscriptions.remove(self._mine)
 
+    def _there(self) -> dict[str, set[type]]:
+        return {name: topic.published for name, topic in self._network.topics.items()}
+
 
 class VirtualSpeaker(_Connection):
     """One topic, spoken on by a leaf."""
 
-    def __init__(self, network: VirtualNetwork, topic: str, qos: str) -> None:
-        super().__init__(network, topic)
-        self._latched = qos == "latched"
+    _theirs = "what is asked for there"
+    _nobody = ""
+
+    def __init__(self, network: VirtualNetwork, message_type: type, topic: str, qos: str) -> None:
+        super().__init__(network, message_type, topic)
+        latched = qos == "latched"
+        self._publisher = VirtualPublisher(network, message_type, topic, latched=latched)
+        self.publish = self._publisher.publish
+        self.close = self._publisher.destroy
 
     @property
     def listeners(self) -> int:
-        """How many subscriptions there are."""
-        return len(self._network.topic(self.name).subscriptions)
+        """How many subscriptions get what is published."""
+        return self._publisher.listeners
 
-    def publish(self, message: Any) -> None:
-        """Publish."""
-        self._network.publish(self.name, message, latched=self._latched)
+    def _there(self) -> dict[str, set[type]]:
+        return {name: topic.listened for name, topic in self._network.topics.items()}

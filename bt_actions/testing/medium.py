@@ -69,12 +69,20 @@ class Medium:
     def __init__(self, timeline: Timeline) -> None:
         self.timeline = timeline
         self._gids = 0
+        self._arrived_at = 0.0
         self._servers: list[Served] = []
         self._clients: list[Client] = []
 
     def soon(self, work: Callable[..., object], *arguments: Any) -> None:
         """Have `work` called when a message sent now arrives."""
-        self.timeline.call_in(LATENCY, partial(work, *arguments))
+        self._arrived_at = self.timeline.now + LATENCY
+        self.timeline.call_at(self._arrived_at, partial(work, *arguments))
+
+    def arrive(self) -> None:
+        """Let time pass until all has arrived that was sent by now, and not what answers that."""
+        until = self._arrived_at
+        while self.timeline.advance(until):
+            pass
 
     def new_gid(self) -> bytes:
         """Return what sets a server apart."""

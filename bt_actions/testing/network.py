@@ -5,10 +5,13 @@ The Platform of simulation/platform.py, with topics and services. It decides not
 
 from __future__ import annotations
 
+import copy
 import itertools
+import reprlib
 from collections.abc import Callable
 from typing import Any
 
+from bt_actions.messages.interfaces import interface, interface_name, short_name
 from bt_actions.simulation.platform import Server
 from bt_actions.testing.action_server import VirtualActionServer
 from bt_actions.testing.medium import Medium
@@ -55,8 +58,12 @@ class VirtualNetwork(Medium):
         self.numbers = itertools.count()
         """Those of its participants."""
         self.namespace = f"/{namespace.strip('/')}"
-        self._topics: dict[str, _Topic] = {}
-        self._services: dict[str, tuple[type, Callable[[Any], Any], float]] = {}
+        self.topics: dict[str, Topic] = {}
+        """What is known of each, by its full name."""
+        self._publishers: dict[tuple[str, type, bool], VirtualPublisher] = {}
+        """Those behind `publish`."""
+        self.services: dict[str, tuple[type, Callable[[Any], Any], float]] = {}
+        """By its full name, each service's type, how it answers, and how long that takes."""
 
     def __repr__(self) -> str:
         return f"<VirtualNetwork {', '.join(self.actions) or 'without servers'}, {self.timeline!r}>"
@@ -81,53 +88,85 @@ class VirtualNetwork(Medium):
         """Serve an action."""
         return VirtualActionServer(self, self.expand(name), action_type, server, result_timeout)
 
-    def publisher(self, message_type: Any, topic: str) -> VirtualPublisher:
-        """Make a publisher on a topic."""
-        return VirtualPublisher(self, message_type, self.expand(topic))
+    def publisher(
+        self, message_type: Any, topic: str, *, latched: bool = False
+    ) -> VirtualPublisher:
+        """Make a publisher on a topic, which stamps headers with the virtual time."""
+        return VirtualPublisher(self, message_type, topic, latched=latched, stamps=True)
 
     # Topics
 
-    def topic(self, name: str) -> _Topic:
+    def topic(self, name: str) -> Topic:
         """Return what is known of a topic."""
-        return self._topics.setdefault(self.expand(name), _Topic())
+        return self.topics.setdefault(self.expand(name), Topic())
 
     def subscribe(
-        self, message_type: type, topic: str, take: Callable[[Any], None]
+        self,
+        message_type: type | str,
+        topic: str,
+        take: Callable[[Any], None],
+        *,
+        latched: bool = False,
     ) -> Subscription:
-        """Have `take` called with each message of this type."""
-        subscription = (message_type, take)
-        self.topic(topic).subscriptions.append(subscription)
+        """Have `take` called with each message of this type.
+
+        With `latched` also with the latest one that each latched publisher has published before.
+        """
+        message_type = interface(message_type, "msg")
+        subscription, its = (message_type, take), self.topic(topic)
+        its.subscriptions.append(subscription)
+        for publisher in its.publishers:
+            if latched and publisher.message_type is message_type and publisher.kept is not None:
+                self.soon(its.bring, subscription, publisher.kept)
         return subscription
 
     def publish(self, topic: str, message: Any, *, latched: bool = False) -> None:
-        """Bring a message to all subscriptions of its type; `latched` ones to later ones, too."""
-        each = self.topic(topic)
-        if latched:
-            each.latched = message
-        for subscription in each.subscriptions:
-            if isinstance(message, subscription[0]):
-                self.soon(each.bring, subscription, message)
+        """Publish a message, by a publisher of its type that stays; it sets no stamp.
+
+        `latched` messages are brought to later subscriptions that are latched, too.
+        """
+        key = self.expand(topic), type(message), latched
+        if not _is_message(message):
+            raise TypeError(f"{key[0]} was given {told(message)}, and that is no message")
+        if key not in self._publishers:
+            self._publishers[key] = VirtualPublisher(self, key[1], topic, latched=latched)
+        self._publishers[key].publish(message)
 
     # Services
 
     def provide(
-        self, service_type: type, name: str, answer: Callable[[Any], Any], *, takes: float = 0.0
+        self,
+        service_type: type | str,
+        name: str,
+        answer: Callable[[Any], Any],
+        *,
+        takes: float = 0.0,
     ) -> None:
         """Serve a service: `answer` makes the response of a request, which takes so long (s)."""
-        self._services[self.expand(name)] = (service_type, answer, takes)
+        self.services[self.expand(name)] = (interface(service_type, "srv"), answer, takes)
 
     def service(self, service_type: type, name: str) -> tuple[Callable[[Any], Any], float] | None:
         """Return how a service answers, and how long that takes; None where there is none."""
-        found = self._services.get(self.expand(name))
+        found = self.services.get(self.expand(name))
         return found[1:] if found is not None and found[0] is service_type else None
 
 
-class _Topic:
-    """Who listens to a topic, and what later listeners are told."""
+class Topic:
+    """Who publishes on a topic, and who listens to it."""
 
     def __init__(self) -> None:
+        self.publishers: list[VirtualPublisher] = []
         self.subscriptions: list[Subscription] = []
-        self.latched: Any = None
+
+    @property
+    def published(self) -> set[type]:
+        """The types of what is published."""
+        return {each.message_type for each in self.publishers}
+
+    @property
+    def listened(self) -> set[type]:
+        """The types of what is listened to."""
+        return {each for each, _ in self.subscriptions}
 
     def bring(self, subscription: Subscription, message: Any) -> None:
         """Give a message that arrives to who still listens."""
@@ -136,22 +175,54 @@ class _Topic:
 
 
 class VirtualPublisher:
-    """That of a simulated server, or of a test."""
+    """Publishes messages of one type on a topic, from when it was made."""
 
-    def __init__(self, network: VirtualNetwork, message_type: Any, topic: str) -> None:
+    def __init__(
+        self,
+        network: VirtualNetwork,
+        message_type: Any,
+        topic: str,
+        *,
+        latched: bool,
+        stamps: bool = False,
+    ) -> None:
+        """Be there; `stamps`: the headers of messages get the virtual time."""
+        self.message_type: Any = interface(message_type, "msg")
+        self.topic = network.expand(topic)
+        self.kept: Any = None
+        """The latest message, where it is `latched`: later subscriptions are given that."""
         self._network = network
-        self._type = message_type
-        self.topic = topic
+        self._latched = latched
+        self._stamps = stamps
+        network.topic(topic).publishers.append(self)
+
+    @property
+    def listeners(self) -> int:
+        """How many subscriptions get what is published."""
+        subscriptions = self._network.topic(self.topic).subscriptions
+        return sum(each is self.message_type for each, _ in subscriptions)
 
     def publish(self, message: Any) -> None:
-        """Publish, with the virtual time in the header."""
-        if hasattr(message, "header"):
+        """Publish. Raises TypeError for a message of another type."""
+        if not isinstance(message, self.message_type):
+            kind = interface_name(self.message_type)
+            raise TypeError(f"{self.topic} was given {told(message)}, and is a topic of {kind}")
+        message = copy.deepcopy(message)  # whoever publishes may change it before it arrives
+        if self._stamps and hasattr(message, "header"):
             nanoseconds = int(self._network.now() * 1e9)
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
-        self._network.publish(self.topic, message)
+        if self._latched:
+            self.kept = message
+        its = self._network.topic(self.topic)
+        for subscription in its.subscriptions:
+            if subscription[0] is self.message_type:
+                self._network.soon(its.bring, subscription, message)
 
     def destroy(self) -> None:
-        """Have nothing to let go of."""
+        """Publish no more."""
+        its = self._network.topic(self.topic)
+        if self in its.publishers:
+            its.publishers.remove(self)
 
 
 class VirtualTimer:
@@ -182,3 +253,14 @@ class VirtualTimer:
     def _rings(self) -> None:
         self._alarm = None
         self._ring()
+
+
+def _is_message(value: object) -> bool:
+    return hasattr(value, "get_fields_and_field_types") and not isinstance(value, type)
+
+
+def told(value: object) -> str:
+    """Return what was given in place of a message, for an error."""
+    if isinstance(value, type):
+        return f"the class {short_name(value)}"
+    return f"a {short_name(type(value))}" if _is_message(value) else reprlib.repr(value)

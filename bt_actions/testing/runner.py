@@ -15,7 +15,7 @@ from bt_actions.events import GoalChanged
 from bt_actions.running.loop import TickLoop
 from bt_actions.testing.backend import VirtualBackend
 from bt_actions.testing.network import VirtualNetwork
-from bt_actions.utilities.stepping import Done
+from bt_actions.utilities.stepping import Done, Sleep
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, Observer
@@ -89,7 +89,7 @@ class VirtualRunner:
         Raises RuntimeError while a run goes on, as its goals have to end yet.
         """
         if self._goes_on:
-            raise RuntimeError("the run goes on: let it end first, with run(), or interrupt()")
+            raise RuntimeError("the run goes on: let it end first, with advance() or run()")
         return self._loop.goals.unaccounted
 
     def observe(self, callback: Observer) -> None:
@@ -99,16 +99,20 @@ class VirtualRunner:
     def run(self, timeout: float = LONGEST) -> Status:
         """Run the tree to its end, and drain its goals; return its status.
 
+        What it has sent has arrived then. A run that `start` began goes on, with its own timeout.
         Raises TimeoutError when it has not ended after so many virtual seconds, and TreeError when
         a behaviour raised.
         """
-        self.start(timeout)
+        if not self._goes_on:
+            self.start(timeout)
         status = self.advance(float("inf"))
         assert status is not None
         return status
 
     def start(self, timeout: float = LONGEST) -> None:
-        """Begin a run, for `advance` to go on with."""
+        """Begin a run, for `advance` to go on with. Raises RuntimeError while another goes on."""
+        if self._goes_on:
+            raise RuntimeError("this tree is running already: let it end, with advance() or run()")
         self._loop.begin(self.now, timeout)
         self._woken = self._goes_on = True
         self._status, self._next = Status.INVALID, self.now
@@ -116,8 +120,9 @@ class VirtualRunner:
     def advance(self, seconds: float) -> Status | None:
         """Let so much time pass; return the tree's status if it has ended by then.
 
-        It returns when the tree ends; after that, time passes without it. INVALID means that it
-        was interrupted. Raises what `run` raises, and RuntimeError before the first `start`.
+        It returns when the tree has ended and what that has sent has arrived; after that, time
+        passes without it. INVALID means that it was interrupted. Raises what `run` raises, and
+        RuntimeError before the first `start`.
         """
         if self._status is None:
             raise RuntimeError("no run was begun: call start() before advance()")
@@ -128,7 +133,7 @@ class VirtualRunner:
             if not self._woken and self.now < self._next:
                 return None
             self._woken = self._goes_on = False
-            step = self._loop.step(self.now)
+            step = self._step()
             if isinstance(step, Done):
                 self._status = step.result
                 return self._status
@@ -137,13 +142,24 @@ class VirtualRunner:
             pass
         return self._status
 
+    def _step(self) -> Sleep | Done[Status]:
+        """Let the loop do what is due; at the end of the run, let arrive what it has sent."""
+        step: Sleep | Done[Status] | None = None
+        try:
+            step = self._loop.step(self.now)
+        finally:
+            if not isinstance(step, Sleep):
+                self.network.arrive()
+        return step
+
     def interrupt(self) -> None:
-        """Have the run end at the next step: its goals are canceled and drained."""
+        """Have `advance` or `run` end the run, whose goals are canceled and drained."""
         self._loop.interrupt(self.now)
 
     def shutdown(self) -> None:
         """Shut the leaves down, and see to what they left, as a program that ends does."""
         self._loop.shutdown()
+        self.network.arrive()
         self.backend.traffic.destroy()
         self._loop.goals.close(self.now)
 

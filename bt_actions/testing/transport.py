@@ -16,7 +16,7 @@ from bt_actions.servers.presence import GID
 from bt_actions.servers.reachability import Reachability
 from bt_actions.testing.medium import Medium, Served, VirtualRequest
 from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, Seeker
-from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean, elsewhere, listing
 
 LONG_AGO = float("-inf")
 
@@ -170,6 +170,10 @@ class VirtualParticipant:
         """Be gone, as a node that was destroyed."""
         self._alive = False
 
+    def shut_down(self) -> bool:
+        """It never is."""
+        return False
+
     def full_name(self, action: str) -> str:
         """Return the full name of an action."""
         if action.startswith("/"):
@@ -183,12 +187,21 @@ class VirtualParticipant:
 
     def instead(self, action_type: Any, name: str) -> str:
         """Say what is there where the action is not."""
-        served = self.medium.actions
+        served = {each: interface_name(kind) for each, kind in self.medium.actions.items()}
+        ours = interface_name(action_type)
         if name in served:
-            return f"; there is one of another type, {interface_name(served[name])}"
+            return f"; there is one of another type, {served[name]}"
         if not served:
             return "; no action server at all is on this network"
+        if found := elsewhere(name, ours, {each: (kind,) for each, kind in served.items()}):
+            return found
+        if of_its_type := sorted(each for each in served if served[each] == ours):
+            return f"; of its type there is {listing(of_its_type)}"
         return did_you_mean(name, served)
+
+    def unheard(self) -> str:
+        """Nothing: here nobody is another user."""
+        return ""
 
     def seek(self, seeker: Seeker) -> None:
         """Look for nothing: a second participant would see the same."""

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 """What lines of a log may be called, and Python's numbers for it."""
 
+ARRIVES = 1.0
+"""Seconds that a message is given to arrive: the first one, once its publisher is in sight, and
+what we have published, before the process ends."""
+
 
 class Call(Protocol):
     """A call of a service, as futures are."""
@@ -95,7 +99,7 @@ class Backend(Protocol):
         """The node's own clock in nanoseconds, as the headers of messages have it."""
 
     def service(self, service_type: type, name: str) -> Service:
-        """Become a client of a service."""
+        """Become a client of a service. Raises TwoTypes, as the next two do."""
 
     def subscription(
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]

@@ -19,6 +19,8 @@ from bt_actions.traffic.handle import Effect, Endpoint, GoalHandle, Standing, wa
 from bt_actions.traffic.host import Entry, Host
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
 
+_UNANSWERED = (Outcome.ACCEPT_TIMEOUT, None)
+
 
 class Driver:
     """Drives the goals of one endpoint."""
@@ -116,6 +118,8 @@ class Driver:
         host.trace.told(handle, event, detail, commands)
         if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
             goal.reason += why_not(handle)
+        elif event is Event.ACCEPT_DUE and (goal.planned, goal.outcome) == _UNANSWERED:
+            goal.reason += self._endpoint.participant.unheard()
         if (due := goal.due_in(now)) is not None:
             host.scheduler.wake_by(now.steady + due)
         self._endpoint.domain.effects.run(handle, self._what_follows(handle, commands))
@@ -144,7 +148,7 @@ class Driver:
 
     def _send(self, handle: GoalHandle) -> None:
         """Count who gets it, have it on record, and send the request."""
-        endpoint, message, handle.message = self._endpoint, handle.message, None
+        endpoint, message = self._endpoint, handle.goal.message
         try:
             handle.replies.sent(endpoint.watch)
             self._put_on_record(handle)

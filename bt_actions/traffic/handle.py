@@ -118,8 +118,6 @@ class GoalHandle:
     keeps_feedback: bool = False
     begun_at: Now = _LONG_AGO
     """When it was wished for; long ago where nobody knows."""
-    message: Any = None
-    """What is to be sent, until it is."""
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     replies: Replies = field(init=False)
     told: End | None = None

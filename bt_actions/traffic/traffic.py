@@ -18,6 +18,7 @@ from typing import Any
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, Timeouts
 from bt_actions.goals.terms import Event, Now, State
+from bt_actions.messages.interfaces import TwoTypes, interface_name
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import admission, handover
 from bt_actions.traffic.drain import drain
@@ -42,7 +43,7 @@ class Traffic:
         """Return the shared endpoint to an action, and count its user.
 
         A remapping rule for the action's name has no effect, and is warned of. Raises ValueError
-        for a name that ROS refuses, and TypeError when it is in use with another type.
+        for a name that ROS refuses, and TwoTypes when it is in use with another type.
         """
         name = self.participant.full_name(action_name)
         with self.host.lock:
@@ -50,8 +51,7 @@ class Traffic:
             if endpoint is None:
                 endpoint = self._open_to((action_type, name))
             elif endpoint.action[0] is not action_type:
-                types = f"{endpoint.action[0]} and {action_type}"
-                raise TypeError(f"{name} is used with two types: {types}")
+                raise TwoTypes(name, action_type, [interface_name(endpoint.action[0])])
             endpoint.users += 1
             endpoint.watcher.look_early(self.host.steady())
             return endpoint
@@ -157,7 +157,7 @@ class Traffic:
                 return
             with self.host.lock:
                 if at_once or (endpoint.participant.alive() and self._may_send(handle)):
-                    handle.message = message
+                    handle.goal.message = message
                     endpoint.tell(handle, Event.SERVER_READY)
 
     def _is_due(self, handle: GoalHandle) -> bool:

@@ -169,11 +169,18 @@ class Participant(Opener, Protocol):
     def alive(self) -> bool:
         """Whether it is there, and can send and hear."""
 
+    def shut_down(self) -> bool:
+        """Whether all of ROS was shut down here, as by Ctrl-C; else one that is not alive has gone
+        from under its goals."""
+
     def full_name(self, action: str) -> str:
         """Return the full name of an action; raises ValueError for one that ROS refuses."""
 
     def instead(self, action_type: Any, name: str) -> str:
         """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
+
+    def unheard(self) -> str:
+        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
 
     def seek(self, seeker: Seeker) -> None:
         """Have another participant look for what is missed, soon.

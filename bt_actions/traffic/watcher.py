@@ -203,7 +203,12 @@ class Watcher:
             endpoint.orphaned, endpoint.heard_at = True, now
             self._looked_like = Server.ABSENT
             if any(not handle.accounted_for for handle in endpoint.handles):
-                self._host.log.warning(f"{endpoint.name}: the node is gone; canceling what it left")
+                if endpoint.participant.shut_down():
+                    self._host.log.info(f"{endpoint.name}: ROS is shut down; canceling its goals")
+                else:
+                    self._host.log.warning(
+                        f"{endpoint.name}: the node is gone; canceling what it left"
+                    )
         for handle in endpoint.handles:  # also one that was begun since
             handle.goal.deadlines.disarm(Event.LOOK_OUT_DUE)  # from here nobody sees it come back
             if handle.goal.outcome is None:

@@ -1,10 +1,18 @@
-"""Plain data, numpy's among it: numbers, texts, lists and mappings. No ROS."""
+"""Plain data, numpy's among it: numbers, texts, lists and mappings. No ROS.
+
+A float32 is read as the shortest number that stands for it: Python has float64 alone, in which the
+float32 that is next to 0.7 is 0.699999988079071. Written to a float32 again, both are the same.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import struct
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 _NUMBERS = frozenset({bool, int, float})
+_GREATEST = 3.402823466e38
+"""Of the finite float32s."""
 
 
 def numbers_only(items: Iterable[object]) -> bool:
@@ -18,7 +26,8 @@ def scalar(value: object) -> object:
     if isinstance(value, bytes) and len(value) == 1:
         return value[0]
     if type(value).__module__ == "numpy" and not getattr(value, "shape", ()):
-        return value.item()  # type: ignore[attr-defined]
+        number = value.item()  # type: ignore[attr-defined]
+        return shortest(number) if _of_float32(value) else number
     return value
 
 
@@ -32,5 +41,38 @@ def plain(value: object) -> object:
     to_list = getattr(value, "tolist", None)  # array.array and numpy alike
     if to_list is not None and type(value).__module__ in ("array", "numpy"):
         items: object = to_list()
-        return items
+        return shortest(items) if _of_float32(value) else items
     return value
+
+
+def item_of(items: Any, at: int) -> object:
+    """An item of a list, whatever holds it."""
+    item = scalar(items[at])
+    return shortest(item) if _of_float32(items) else item
+
+
+def field_of(message: object, name: str, types: Mapping[str, str]) -> object:
+    """The value of a message's field; `types` are those of its fields, as rosidl names them."""
+    value = getattr(message, name)
+    return shortest(value) if types.get(name) == "float" else scalar(value)
+
+
+def shortest(value: Any) -> Any:
+    """A number that came as a float32 by the fewest digits that give it; a list of them."""
+    if isinstance(value, list):
+        return [shortest(item) for item in value]
+    if not isinstance(value, float):
+        return value
+    try:
+        kept = struct.pack("f", value)
+    except OverflowError:  # no float32 in fact
+        return value
+    for digits in range(6, 9):  # nine always do
+        short = float(f"{value:.{digits}g}")
+        if abs(short) <= _GREATEST and struct.pack("f", short) == kept:
+            return short
+    return float(f"{value:.9g}") if abs(value) < _GREATEST else value
+
+
+def _of_float32(value: Any) -> bool:
+    return getattr(value, "typecode", None) == "f" or str(getattr(value, "dtype", "")) == "float32"

@@ -14,6 +14,8 @@ __all__ = ["as_json", "clean", "clean_lines", "in_words", "raised"]
 _NONE = "\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
 """Controls, those that turn the direction of what follows, and characters that are none."""
 _STRANGE = re.compile(f"[\x00-\x08\x0b-\x1f{_NONE}]")
+_SEPARATORS = {ord(char): f"\\u{ord(char):04x}" for char in "\x85\u2028\u2029"}
+"""What some readers take for the end of a line, as JSON may write it."""
 _BROKEN = re.compile(f"[\x00-\x1f{_NONE}]+")
 
 
@@ -44,11 +46,13 @@ def raised(error: BaseException) -> str:
 
 
 def as_json(data: object, *, ascii_only: bool = False) -> str:
-    """Return plain data as one line of JSON; null for what JSON has no number for."""
+    """Return plain data as one line of JSON, however lines are counted; null for what JSON has no
+    number for."""
     try:
-        return json.dumps(data, ensure_ascii=ascii_only, allow_nan=False)
+        text = json.dumps(data, ensure_ascii=ascii_only, allow_nan=False)
     except ValueError:
-        return json.dumps(_finite(data), ensure_ascii=ascii_only)
+        text = json.dumps(_finite(data), ensure_ascii=ascii_only)
+    return text if text.isascii() else text.translate(_SEPARATORS)
 
 
 def _finite(data: object) -> object:

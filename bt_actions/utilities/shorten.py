@@ -6,9 +6,10 @@ No ROS here: a message is recognised by what it can do. Nothing is made a text a
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import islice
 
-__all__ = ["shorten", "shorten_fields"]
+from bt_actions.utilities.plain_data import field_of, item_of, scalar
+
+__all__ = ["given_fields", "shorten", "shorten_fields"]
 
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
@@ -55,8 +56,9 @@ def shorten_fields(message: object, limit: int = 80) -> str:
     A field's own value is cut at half of the limit; a number has six digits.
     """
     text = ""
-    for name in getattr(message, "get_fields_and_field_types", dict[str, str])():
-        value = getattr(message, name)
+    types = getattr(message, "get_fields_and_field_types", dict[str, str])()
+    for name in types:
+        value = field_of(message, name, types)
         plain = value[:limit] if isinstance(value, str) else ""
         number = f"{value:g}" if isinstance(value, float) else ""
         text += f"{', ' if text else ''}{name} {plain or number or shorten(value, limit // 2)}"
@@ -65,11 +67,32 @@ def shorten_fields(message: object, limit: int = 80) -> str:
     return text
 
 
+def given_fields(message: object) -> dict[str, object]:
+    """Return the fields of a ROS message, by their names, that a new one of its type has not."""
+    fields = getattr(message, "get_fields_and_field_types", dict[str, str])()
+    plain = type(message)() if fields else None
+    given: dict[str, object] = {}
+    for name in fields:
+        value = getattr(message, name)
+        if hasattr(value, "get_fields_and_field_types"):
+            if inner := given_fields(value):
+                given[name] = inner
+        elif not _equal(value, getattr(plain, name)):
+            given[name] = value
+    return given
+
+
+def _equal(value: object, other: object) -> bool:
+    equal = value == other
+    return bool(equal.all() if hasattr(equal, "all") else equal)  # numpy: one for each item
+
+
 def _parts(value: object) -> Iterator[Part] | None:
     """What a value with others in it is made of; None for one that holds no others."""
     fields = getattr(type(value), "get_fields_and_field_types", None)
     if fields is not None:
-        return _braced((f"{name}: ", getattr(value, name)) for name in fields())
+        types = fields()
+        return _braced((f"{name}: ", field_of(value, name, types)) for name in types)
     if isinstance(value, Mapping):
         return _braced((f"{key if isinstance(key, str) else _scalar(key, 40)}: ", item)
                        for key, item in value.items())  # fmt: skip
@@ -91,8 +114,8 @@ def _listed(items: list[object]) -> Iterator[Part]:
     size = len(items)
     shown = size if size <= _ALL else _FIRST
     yield "[", _NOTHING
-    for at, item in enumerate(islice(items, shown)):
-        yield ", " if at else "", item
+    for at in range(shown):
+        yield ", " if at else "", item_of(items, at)
     yield f", … {size} items]" if shown < size else "]", _NOTHING
 
 
@@ -106,7 +129,6 @@ def _scalar(value: object, limit: int) -> str:
             return repr(value[: limit + 1])
         if isinstance(value, bytes):
             return str(value[0])
-        to_python = getattr(value, "tolist", None)  # a scalar of numpy
-        return repr(value if to_python is None else to_python())
+        return repr(scalar(value))
     except Exception:  # noqa: BLE001 - as above
         return f"<{type(value).__name__}>"

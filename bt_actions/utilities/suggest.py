@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 
-__all__ = ["closest", "did_you_mean", "folded", "listing", "what_it_has"]
+__all__ = ["closest", "did_you_mean", "elsewhere", "folded", "listing", "what_it_has"]
 
 _LONGEST = 60
 _MOST = 60
 _BEGINNING = 4
 """So many letters are meant as the beginning of a longer word rather than as another one."""
+_NAMED = 3
+"""Names of one type in other namespaces that are told, at most."""
+_ALIKE = 0.75
+"""How alike two full names must be: they share their namespaces."""
 
 
 def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
@@ -58,3 +62,16 @@ def what_it_has(word: str, known: Iterable[str], nothing: str = "") -> str:
     """``"; did you mean 'distance'?"``, or ``"; it has x, y"``, or, of what has none, `nothing`."""
     known = list(known)
     return did_you_mean(word, known) or (f"; it has {listing(known)}" if known else nothing)
+
+
+def elsewhere(name: str, kind: str, known: Mapping[str, Collection[str]]) -> str:
+    """Name those of a type that end as `name` does, in other namespaces; or what looks like it.
+
+    `known` has the types of each full name.
+    """
+    of_kind = [each for each, kinds in known.items() if kind in kinds and each != name]
+    base = name.rpartition("/")[2]
+    found = sorted(each for each in of_kind if each.rpartition("/")[2] == base)
+    if found:
+        return f"; there is {listing(found, _NAMED)} of that type"
+    return did_you_mean(name, of_kind, cutoff=_ALIKE)

@@ -7,7 +7,7 @@ import re
 
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["DURATION_UNITS", "parse_angle", "parse_duration"]
+__all__ = ["DURATION_UNITS", "parse_angle", "parse_duration", "parse_seconds", "spoken_duration"]
 
 DURATION_UNITS = {
     "ns": 1e-9,
@@ -28,10 +28,24 @@ def parse_duration(value: object) -> float:
 
     Raises ValueError with a text for the person who wrote it.
     """
-    seconds = _parse(value, DURATION_UNITS, "a duration", "5 s")
+    seconds = parse_seconds(value)
     if seconds < 0:
         raise ValueError(f"a duration is not negative: {value}")
     return seconds
+
+
+def parse_seconds(value: object) -> float:
+    """Seconds as `parse_duration` reads them, with either sign."""
+    return _parse(value, DURATION_UNITS, "a duration", "5 s")
+
+
+def spoken_duration(seconds: float) -> str:
+    """Seconds as people say them: ``8 min 20 s``."""
+    minutes, rest = divmod(abs(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    parts = [(hours, "h"), (minutes, "min"), (rest, "s")]
+    said = " ".join(f"{number:.12g} {unit}" for number, unit in parts if number)
+    return f"-{said}" if seconds < 0 else said or "0 s"
 
 
 def parse_angle(value: object) -> float:

@@ -30,6 +30,29 @@ def test_an_unexpected_result_says_what_was_expected_and_what_came(world: World)
 
 
 @pytest.mark.parametrize(
+    ("fault", "settings", "reason"),
+    [
+        ("reject", {}, "/move_robot refused the goal {distance: 2.5}"),
+        ("abort", {}, "aborted by /move_robot; goal {distance: 2.5}; its result is: {"),
+        ("stall", {"timeout": 4.0}, "not finished within 4 s; goal {distance: 2.5}"),
+        (
+            "stall",
+            {"timeout": Timeouts(feedback=2.0)},
+            "no feedback for 2 s; goal {distance: 2.5}",
+        ),
+        ("", {"expect": "result.final_pose < 0.0"}, "; goal {distance: 2.5}"),
+    ],
+)
+def test_a_reason_that_blames_a_goal_tells_its_fields(
+    world: World, fault: str, settings: dict[str, Any], reason: str
+) -> None:
+    world.serve(*([f"*:{fault}"] if fault else []))
+    leaf = world.run(MoveRobot("m", 2.5, **settings))
+    assert reason in leaf.reason
+    assert leaf.history[0].goal.message is None, "it is not kept"
+
+
+@pytest.mark.parametrize(
     ("settings", "message"),
     [
         ({"goal": {"distanse": 1.0}}, "goal: distanse: MoveRobot.Goal has no field 'distanse'; "),

@@ -9,7 +9,10 @@ from typing import Any
 
 import pytest
 
+from bt_actions.cli.arguments.ros_arguments import as_inputs, parameters
+from bt_actions.document import tree_inputs
 from tests.cli.conftest import Start
+from tests.support.parameter_dump import dumped
 from tests.support.processes import Host
 from tests.support.waiting import until
 
@@ -138,6 +141,19 @@ def test_a_run_that_is_ended_by_a_signal_says_so_last_of_all(
     assert run.wait() == 143, run
 
 
+def given_back(dump: str, tree: Path) -> dict[str, Any]:
+    """Return the inputs that a run of a tree takes from the dump of another."""
+    file = tree.with_name("dump.yaml")
+    file.write_text(dump)
+    node = dump.partition(":")[0]
+    namespace, _, name = node.rpartition("/")
+    given = parameters(["--params-file", str(file)], name, namespace)
+    inputs = as_inputs(given, tree_inputs(tree), "inputs")
+    inputs["at"] = [inputs["at"].x, inputs["at"].y, inputs["at"].z]
+    inputs["area"] = [point.x for point in inputs["area"].points]
+    return inputs
+
+
 def test_inputs_are_parameters_that_nobody_can_change(
     start: Start, watcher: Watcher, namespace: str, tmp_path: Path
 ) -> None:
@@ -177,6 +193,12 @@ def test_inputs_are_parameters_that_nobody_can_change(
     far, times = answer(node.describe_parameters(["distance", "times"])).descriptors
     assert (far.description, far.read_only, far.type) == ("How far (m)", True, 3)
     assert [(each.from_value, each.to_value) for each in times.integer_range] == [(0, 255)]
+    (names,) = answer(node.describe_parameters(["names"])).descriptors
+    assert (names.type, values[listed.index("names")].type) == (9, 9), "an array of texts"
+    assert given_back(dumped(f"{namespace}/bt_actions_inputs", listed, values), path) == {
+        "distance": 2.0, "times": 4, "most": 2**64 - 1, "names": [], "at": [1.5, 3.0, 0.0],
+        "area": [2.0],
+    }  # fmt: skip
     (refused,) = answer(node.set_parameters([Parameter("distance", value=9.0)])).results
     assert not refused.successful
     assert refused.reason == "Trying to set a read-only parameter: distance."

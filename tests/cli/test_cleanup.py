@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -148,6 +149,22 @@ def test_a_signal_while_a_goal_runs_that_was_found(
     cleanup.send(signal.SIGTERM)
     assert cleanup.wait() == 3, cleanup
     assert cleanup.lines == [f"{name}  {goal}  UNKNOWN"]
+
+
+def test_what_was_left_is_looked_for_at_the_server_that_rules_lead_to(
+    start: Start, serve: Callable[..., Journal], name: str, tree: Callable[..., Path]
+) -> None:
+    serve()
+    used = f"{name}/nobody_is_here"
+    rules = [f"{used}/_action/{part}:={name}/_action/{part}" for part in
+             ("send_goal", "cancel_goal", "get_result", "feedback", "status")]  # fmt: skip
+    words = ("--ros-args", *(word for rule in rules for word in ("-r", rule)))
+    run = start("run", str(tree(server=used, distance=0.1)), "--cleanup-first", *words)
+    assert run.wait() == 0, run
+    assert any(f"executing on {name}" in line for line in run.lines)
+    assert not any(used in line for line in [*run.lines, *run.errors])
+    cleanup = start("cleanup", used, "--look", "1", *words)
+    assert cleanup.wait() == 0, cleanup
 
 
 @pytest.mark.parametrize(("leaves_a_goal", "code"), [(False, 130), (True, 3)])

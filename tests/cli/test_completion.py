@@ -40,6 +40,7 @@ def test_bash_completes_commands_options_and_choices(script: str) -> None:
     assert bash_completes(script, "bt-actions", "completion", "z") == ["zsh"]
     assert "show" in bash_completes(script, "bt-actions", "interfaces", "sh")
     assert bash_completes(script, "bt-actions", "interfaces", "build", "--no") == ["--no-network"]
+    assert bash_completes(script, "bt-actions", "control", "/run_tree", "p") == ["pause"]
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")

@@ -65,19 +65,62 @@ def test_help_without_a_standard_output_is_no_error() -> None:
     assert call(">&-", "--help").returncode == 0
 
 
-def test_without_a_home_a_run_works_all_the_same(domain: int) -> None:
+def bare(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
+    """Call `bt-actions` with hardly a variable but `more`."""
     kept = ("PATH", "ROS_DOMAIN_ID")
-    bare = {name: os.environ[name] for name in kept if name in os.environ}
-    done = subprocess.run(
-        [sys.executable, "-m", "bt_actions.cli", *DEMO],
+    environment = {name: os.environ[name] for name in kept if name in os.environ}
+    return subprocess.run(
+        [sys.executable, "-m", "bt_actions.cli", *arguments],
         capture_output=True,
         text=True,
+        errors="surrogateescape",
         cwd=ROOT,
-        env={**bare, "PYTHONPATH": str(ROOT)},
+        env={**environment, "PYTHONPATH": str(ROOT), **more},
         check=False,
     )
+
+
+@pytest.mark.parametrize(
+    "variables",
+    [{}, {"HOME": "/proc/1/nowhere"}, {"ROS_HOME": "/dev/null/x"}, {"PYTHONOPTIMIZE": "2"}],
+    ids=["no home", "a home that is not there", "a home that is none", "no docstrings"],
+)
+def test_a_run_works_all_the_same(domain: int, variables: dict[str, str]) -> None:
+    done = bare(*DEMO, **variables)
     assert (done.returncode, done.stderr) == (0, "")
     assert "SUCCESS after" in done.stdout.splitlines()[-1]
+
+
+def test_a_folder_for_logs_that_cannot_be_is_named_with_the_remedy(domain: int) -> None:
+    done = bare(*DEMO, ROS_LOG_DIR="/proc/1/nowhere")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "bt-actions: ROS 2 cannot start: the log cannot be written; "
+        "set ROS_LOG_DIR to a folder that can be written\n"
+    )
+
+
+def test_a_name_of_a_file_that_is_no_utf_8_is_one_like_others(tmp_path: Path, domain: int) -> None:
+    odd = os.fsdecode(bytes(tmp_path / "says") + b"\xff")
+    Path(f"{odd}.yaml").write_text("tree: says\nroot: {log: hello}\n")
+    done = bare("run", f"{odd}.yaml", "--sim", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout.splitlines()[1])["place"] == f"{odd}.yaml:2:8"
+    for form in ("svg", "html", "txt"):
+        assert bare("render", f"{odd}.yaml", "-o", f"{odd}.{form}").returncode == 0
+        assert Path(f"{odd}.{form}").stat().st_size
+
+
+def test_a_folder_of_trees_whose_name_no_message_carries_is_refused_in_one_line(
+    tmp_path: Path, domain: int
+) -> None:
+    odd = os.fsdecode(bytes(tmp_path / "trees") + b"\xff")
+    Path(odd).mkdir()
+    done = bare("serve", "--trees", odd)
+    assert done.returncode == 2
+    assert done.stderr == (
+        f"bt-actions: --trees: {tmp_path}/trees\\udcff is no UTF-8, as ROS wants it\n"
+    )
 
 
 TALKER = """\

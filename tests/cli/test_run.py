@@ -37,6 +37,15 @@ root:
     - {grip: Close, goal: {position: 0.0}}
 """
 
+TWO_TYPES = """\
+tree: two
+root:
+  sequence: S
+  children:
+    - {action: Go, type: robot_control_interfaces/action/MoveRobot, server: door, timeout: 1 s}
+    - {action: Grip, type: robot_control_interfaces/action/Gripper, server: /door, timeout: 1 s}
+"""
+"""A check takes `door` and `/door` for two names, which they are in a namespace."""
 SPEAKS = "tree: new\nroot: {publish: lamp, type: std_msgs/msg/Bool, message: {data: true}}\n"
 HEARS = """\
 tree: new
@@ -148,7 +157,7 @@ class TestExitCode1:
         )
         assert run.wait() == 1, run
         assert run.lines[-5].endswith(", status: 3, message: 'fault: abort'}"), "its result"
-        assert [line.partition("; its result is: ")[0] for line in run.lines[-6:]] == [
+        assert [line.partition("; goal {distance: ")[0] for line in run.lines[-6:]] == [
             "Deliver the part / Pick and place / To the part",
             "  ABORTED after 3 attempts: aborted by /move_robot",
             "  trees/pick_and_place.yaml:22:11",
@@ -226,6 +235,17 @@ class TestExitCode2:
         [line] = program.errors
         assert line.startswith("bt-actions: ")
         assert f"SECURITY ERROR: directory '{tmp_path}/enclaves' does not exist" in line
+
+    def test_a_server_that_is_used_with_two_types_is_told_in_one_line(
+        self, start: Start, tmp_path: Path
+    ) -> None:
+        (tmp_path / "two.yaml").write_text(TWO_TYPES)
+        run = start("run", str(tmp_path / "two.yaml"))
+        assert run.wait() == 2, run
+        assert clean(run)
+        [line] = [line for line in run.lines if "/door" in line]
+        kinds = "robot_control_interfaces/action/{}, and also as robot_control_interfaces/action/{}"
+        assert line.endswith(f"/door is used as {kinds.format('Gripper', 'MoveRobot')}"), run
 
     def refused(self, capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         assert main(["run", *arguments]) == 2

@@ -16,6 +16,7 @@ import pyte
 import pytest
 
 from bt_actions.cli.driving.signals import SAME_WISH
+from bt_actions.cli.views.live import SCROLLS
 from tests.cli.conftest import marked
 from tests.support.processes import PATIENCE, ROOT
 
@@ -111,7 +112,7 @@ def test_the_tree_is_drawn_live_and_leaves_the_report(
     demo.until(" s left for feedback, current_pose")
     drawn = [line for line in demo.screen.display if line.strip()]
     start = next(n for n, line in enumerate(drawn) if "Ctrl-C cancels" in line)
-    assert len(drawn) - start <= ROWS / 3
+    assert len(drawn) - start <= ROWS - 1 - SCROLLS
     assert demo.wait() == 0
     lines = [line for line in demo.lines if line]
     assert sum(line.startswith("✓ To the part") for line in lines) == 1

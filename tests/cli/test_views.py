@@ -22,7 +22,7 @@ from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LineView
-from bt_actions.cli.views.live import LiveView, suits
+from bt_actions.cli.views.live import SCROLLS, LiveView, suits
 from bt_actions.cli.views.view import View
 from bt_actions.cli.views.words import Closing, fields_text, last_words, result_lines
 from bt_actions.document import load_tree
@@ -307,7 +307,7 @@ class Screen:
 
 
 @pytest.mark.parametrize("height", [1, 3, 6, 12, 24, 50])
-def test_the_live_part_stays_under_a_third_of_the_screen(
+def test_the_live_part_leaves_lines_for_what_scrolls_by(
     height: int, root: Behaviour, leaves: list[FakeAction], story: Story
 ) -> None:
     screen = Screen(height)
@@ -318,7 +318,7 @@ def test_the_live_part_stays_under_a_third_of_the_screen(
     feed(report, view, story.node(leaves[4], Status.RUNNING), story.goal(leaves[4], "EXECUTING"))
     view.frame()
     drawn = screen.lines()
-    assert 1 <= len(drawn) <= max(1, height / 3)
+    assert 1 <= len(drawn) <= max(1, height / 3, height - 1 - SCROLLS)
     if height >= 12:
         assert any("Step 4" in line for line in drawn), "what runs is shown first"
     view.close()
@@ -401,15 +401,15 @@ def test_no_line_is_wider_than_the_terminal(leaves: list[FakeAction], story: Sto
     view = LiveView(report, screen.console)
     feed(report, view, story.start(), story.node(root, Status.RUNNING))
     view.frame()
-    assert len(screen.lines()) <= 10
+    assert len(screen.lines()) == 1 + 11
     view.close()
 
 
 @pytest.mark.parametrize("running", [0, 4, 9])
-def test_the_room_up_to_a_third_of_the_screen_is_used(
+def test_the_room_that_there_is_is_used(
     running: int, root: Behaviour, leaves: list[FakeAction], story: Story
 ) -> None:
-    screen = Screen(30)
+    screen = Screen(9 + 1 + SCROLLS)
     report = Report(root)
     view = LiveView(report, screen.console)
     feed(report, view, story.start())
@@ -420,20 +420,49 @@ def test_the_room_up_to_a_third_of_the_screen_is_used(
     view.close()
 
 
-def test_a_tree_that_fits_into_a_third_of_the_screen_is_shown_whole(
-    root: Behaviour, leaves: list[FakeAction], story: Story
-) -> None:
-    screen = Screen(46)
-    view = LiveView(Report(root), screen.console)
+@pytest.mark.parametrize("height", [24, 50, 80])
+def test_a_tree_that_fits_into_the_screen_is_shown_whole(height: int) -> None:
+    most = height - 1 - SCROLLS
+    for steps, lines in ((most - 2, most), (most - 1, most)):
+        screen = Screen(height)
+        root = Sequence("Work", memory=True, children=[FakeAction(f"S{n}") for n in range(steps)])
+        view = LiveView(Report(root), screen.console)
+        view.frame()
+        assert len(screen.lines()) == lines
+        assert (screen.lines()[-1] == f"  · S{steps - 1}") is (steps == most - 2), "or a remark"
+        view.close()
+
+
+def two_arms() -> tuple[Behaviour, list[FakeAction]]:
+    """Two subtrees alike, one deeper than the other, and leaves of other names."""
+    leaves = [FakeAction(name) for name in ("Close", "Close", "Open", "Close")]
+    arms = [Sequence(name, memory=True) for name in ("Left", "Right", "Right")]
+    arms[0].add_children([Sequence("Grip", memory=True, children=[leaves[0]]), leaves[2]])
+    arms[1].add_child(Sequence("Grip", memory=True, children=[leaves[1]]))
+    arms[2].add_child(leaves[3])
+    return Sequence("Both", memory=True, children=arms), leaves
+
+
+def test_leaves_of_one_name_are_told_apart_by_the_shortest_path_that_does(story: Story) -> None:
+    root, leaves = two_arms()
+    report, screen = Report(root), Screen(40)
+    view = LiveView(report, screen.console)
+    feed(report, view, story.start(), story.node(root, Status.RUNNING))
+    for leaf in leaves:
+        ended = {"outcome": Outcome.SUCCEEDED, "end": End.SUCCEEDED}
+        feed(report, view, story.goal(leaf, "DONE", **ended), story.node(leaf, Status.SUCCESS))
     view.frame()
-    assert len(screen.lines()) == 1 + 13
+    names = ["Left / Grip / Close", "Right / Grip / Close", "Open", "Right / Close"]
+    scrolled = [line for line in screen.lines() if line.startswith("✓")]
+    assert [line[2:].partition("  ")[0] for line in scrolled] == names
+    assert [line.partition("  ")[0] for line in last_words(report, Closing(Exit.SUCCESS))[2:6]] == (
+        names
+    )
     view.close()
 
 
-@pytest.mark.parametrize("height", [12, 18, 24, 40])
-def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(
-    height: int, story: Story
-) -> None:
+@pytest.mark.parametrize("lines", [3, 5, 7, 13])
+def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(lines: int, story: Story) -> None:
     sides, moves = [], []
     for side in ("left", "right"):
         move = FakeAction("To the part that lies far away")
@@ -443,7 +472,7 @@ def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(
         sides.append(Sequence(f"The {side} robot", memory=True, children=[deliver]))
         moves.append(move)
     root = Sequence("Both robots deliver", memory=True, children=list(sides))
-    screen = Screen(height, width=40)
+    screen = Screen(lines + 1 + SCROLLS, width=40)
     report = Report(root)
     view = LiveView(report, screen.console)
     feed(report, view, story.start())
@@ -455,15 +484,15 @@ def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(
         feed(report, view, story.goal(move, "EXECUTING"))
     view.frame()
     drawn = screen.lines()
-    assert len(drawn) <= height / 3
+    assert len(drawn) == lines
     assert max(map(len, drawn)) < 40
     assert " s  Ctrl-C cancels" in drawn[0]
-    if height >= 18:
+    if lines >= 5:
         left, right = (next(n for n, d in enumerate(drawn) if s in d) for s in ("left", "right"))
         first, second = [n for n, line in enumerate(drawn) if "To the" in line]
         assert left <= first < right <= second, drawn
         assert drawn[first].endswith("…")
-        if height >= 24:
+        if lines >= 7:
             assert "12 s left" in drawn[first]
     view.close()
 

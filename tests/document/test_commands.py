@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from bt_actions.cli import main
-from bt_actions.document import check_source, source_of
+from bt_actions.document import check_file, check_source, source_of
 from bt_actions.document.findings.reports import as_github, as_json, as_sarif, as_text
 
 WRONG = """\
@@ -46,6 +46,17 @@ def findings() -> list[Any]:
 def test_the_text_reads_like_a_compiler_s() -> None:
     assert as_text(findings()) == TEXT
     assert as_text([]) == ""
+
+
+def test_people_are_told_errors_first_and_tools_by_place() -> None:
+    text = (
+        "tree: t\ndescription: “x”\nroot:\n  sequence: S\n  children:\n"
+        "    - {wait: 500}\n    - {log: $b}\n    - {log: $c}\n"
+    )
+    found = check_source(source_of(text.encode(), "t.yaml"))
+    told = re.findall(r"t\.yaml:(\d+):\d+: (\w+)", as_text(found))
+    assert told == [("7", "error"), ("8", "error"), ("2", "warning"), ("6", "warning")]
+    assert [each["line"] for each in json.loads(as_json(found))] == [2, 6, 7, 8]
 
 
 def test_json_is_a_list_of_objects() -> None:
@@ -293,3 +304,60 @@ def test_the_place_of_what_is_no_file_stands_there_once(
     path = tmp_path if name == "a folder" else Path("/dev/null")
     assert main(["run", str(path)]) == 2
     assert capsys.readouterr().err.count(f"{path}:1:1: error[BT100]: ") == 1
+
+
+@pytest.mark.parametrize("command", ["check", "run", "render"])
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("bases.yaml", "; did you mean 'base.yaml'?"),
+        ("bases", "; did you mean 'base.yaml'?"),
+        ("base.yml", "; did you mean 'base.yaml'?"),
+        ("{folder}/bases.yaml", "; did you mean 'base.yaml'?"),
+        ("nowhere/base.yaml", ": there is no folder 'nowhere'"),
+        ("lost", ": lost.yaml is a link to {folder}/gone.yaml, which is not there"),
+        ("lost.yaml", ": lost.yaml is a link to {folder}/gone.yaml, which is not there"),
+        ("far/a.yaml", ": far is a link to {folder}/gone, which is not there"),
+        ("package://own/trees/a.yaml", "/a.yaml is a link to {folder}/gone, which is not there"),
+    ],
+)
+def test_a_tree_that_is_not_there_is_told_with_what_is_beside_it(
+    command: str,
+    name: str,
+    told: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("base.yaml").write_text("tree: base\nroot: {success: }\n")
+    Path("lost.yaml").symlink_to("gone.yaml")
+    Path("far").symlink_to("gone")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    Path("share/own/trees").mkdir(parents=True)
+    Path("share/own/trees/a.yaml").symlink_to("../../../gone")
+    assert main([command, name.replace("{folder}", str(tmp_path))]) == 2
+    out, err = capsys.readouterr()
+    assert (out + err).splitlines()[0].endswith(told.replace("{folder}", str(tmp_path)))
+
+
+def test_a_subtree_that_is_not_there_is_told_with_the_folders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own").mkdir()
+    monkeypatch.setenv("BT_ACTIONS_TREE_PATH", f"{tmp_path}/own:{tmp_path}/gone")
+    (tmp_path / "homing_arm.yaml").write_text("tree: base\nroot: {success: }\n")
+    (tmp_path / "t.yaml").write_text("tree: t\nroot: {subtree: homing}\n")
+    (finding,) = check_file(tmp_path / "t.yaml")
+    assert finding.message.endswith("installed; did you mean 'homing_arm.yaml'?")
+    assert f"{finding.hint}, ".startswith(f"looked in {tmp_path}, {tmp_path}/own, ")
+
+
+def test_data_in_a_link_to_nowhere_is_told(tmp_path: Path) -> None:
+    (tmp_path / "points.yaml").symlink_to("gone.yaml")
+    (tmp_path / "t.yaml").write_text(
+        'tree: t\noutputs: {x: string}\nroot: {set: {x: "@points.yaml"}}\n'
+    )
+    (first,) = check_file(tmp_path / "t.yaml")
+    gone = tmp_path / "gone.yaml"
+    assert first.message == f"points.yaml:1:1: this is a link to {gone}, which is not there"

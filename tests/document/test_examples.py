@@ -79,13 +79,8 @@ class Surroundings:
         return self.robots.world(robot).robot.current_pose
 
     def run(self, root: Behaviour, timeout: float = 60.0) -> Status:
-        """Run a tree, and let arrive what it has sent."""
-        runner = VirtualRunner(root, self.network)
-        status = runner.run(timeout)
-        until = runner.now + 0.1
-        while self.network.timeline.advance(until):
-            pass
-        return status
+        """Run a tree."""
+        return VirtualRunner(root, self.network).run(timeout)
 
 
 @pytest.fixture

@@ -110,3 +110,42 @@ def test_a_whole_tree_may_be_imported_for_its_words(tmp_path: Path) -> None:
     )
     assert check_file(tmp_path / "a.yaml") == []
     assert check_file(tmp_path / "t.yaml") == []
+
+
+SAYS = "{{publish: door, type: std_msgs/msg/{}}}"
+OUTER = """\
+tree: outer
+topics: {{door: {{topic: r1/door, type: std_msgs/msg/Bool}}}}
+root:
+  sequence: S
+  children:
+    - check: $door.data
+    - {}
+    - {{subtree: main, namespace: r1}}
+    - {{subtree: main, namespace: r2}}
+"""
+
+
+def test_a_name_that_a_subtree_uses_with_another_type_is_told_where_it_is_included(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "main.yaml").write_text(f"tree: main\nroot: {SAYS.format('String')}\n")
+    (tmp_path / "outer.yaml").write_text(OUTER.format(SAYS.format("Int32")))
+    (one,) = check_file(tmp_path / "outer.yaml")
+    inner = tmp_path / "main.yaml"
+    assert (one.line, one.code) == (8, "BT217")
+    assert one.message == (
+        f"the topic 'r1/door' is std_msgs/msg/String in {inner}:2, and std_msgs/msg/Bool elsewhere"
+    )
+    assert one.related is not None
+    assert one.related.place.line == 2
+
+
+def test_imported_actions_of_one_server_with_two_types_are_told_where_the_second_is_used(
+    tmp_path: Path,
+) -> None:
+    library = MOVE.format("").replace("server: m", "server: g")
+    told = found(tmp_path, f"actions:\n  move: {library}\n")
+    move, gripper = (f"robot_control_interfaces/action/{each}" for each in ("MoveRobot", "Gripper"))
+    text = f"the action server 'g' is {move} in {tmp_path}/lib.yaml:2, and {gripper} elsewhere"
+    assert told == [f"main.yaml:11 BT217 {text}"]

@@ -113,7 +113,10 @@ def test_a_large_value_is_no_text(load: Load, text: str) -> None:
         f"""
         tree: t
         inputs: {{many: "int32[]", image: sensor_msgs/msg/Image}}
-        root: {{log: {text}}}
+        outputs: {{text: string}}
+        root:
+          sequence: S
+          children: [{{log: {text}}}, {{set: {{text: {text}}}}}]
         """,
         {"many": [1], "image": {"data": [1]}},
     )
@@ -123,4 +126,7 @@ def test_a_large_value_is_no_text(load: Load, text: str) -> None:
     scope.write("image", Image(data=array.array("B", bytes(4_000_000))))
     with at_once():
         assert tick(root) is Status.FAILURE
-    assert root.feedback_message == "the text would be longer than 10,000 characters"
+    log, values = root.children
+    assert log.status is Status.SUCCESS
+    assert log.feedback_message == text.partition("$")[0] + "…"
+    assert values.feedback_message == "the text would be longer than 10,000 characters"

@@ -152,8 +152,6 @@ def test_a_message_is_published_when_so_many_listen(load: Load, network: Virtual
         assert runner.advance(1.0) is None
         network.subscribe(Bool, "lamp", lambda message: heard.append(message.data))
     assert runner.advance(1.0) is Status.SUCCESS
-    while network.timeline.advance(network.now() + 0.1):
-        pass
     assert heard == [True, True]
 
 

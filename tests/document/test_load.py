@@ -26,6 +26,7 @@ from bt_actions.document import (
 )
 from bt_actions.document.building.build import BUILDERS
 from bt_actions.document.language.kinds import KINDS
+from bt_actions.document.reading.find import TreeNotFoundError, installed_trees
 from bt_actions.goals.policy import Retry, Timeouts
 from tests.document.conftest import tick
 
@@ -183,8 +184,7 @@ def test_inputs_are_converted_to_their_types_and_outputs_are_read_after_the_run(
 @pytest.mark.parametrize(
     ("inputs", "text"),
     [
-        ({}, ("the tree 't' needs the input 'names' (string[]): give it a value, such as"
-             " --set names=...")),
+        ({}, "the tree 't' needs the input 'names' (string[]): give it a value"),
         ({"names": [], "sped": 1}, "the tree 't' has no input 'sped'; did you mean 'speed'?"),
         ({"names": [], "other": 1}, ("the tree 't' has no input 'other'; its inputs are speed,"
                                     " names")),
@@ -461,6 +461,20 @@ def test_anchors_and_merge_keys_work(load: Load) -> None:
 def test_finding_a_tree_takes_a_path_or_the_name_of_an_installed_one() -> None:
     assert find_tree(TREES / "recover.yaml") == TREES / "recover.yaml"
     assert find_tree("recover").name == "recover.yaml"
+
+
+def test_files_that_begin_with_a_dot_are_no_installed_trees(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in (".#dock.yaml", ".dock.yaml", "dock.yaml"):
+        (tmp_path / name).write_text("tree: dock\nroot: {success: }\n")
+    monkeypatch.setenv("BT_ACTIONS_TREE_PATH", str(tmp_path))
+    assert [name for name in installed_trees() if "dock" in name] == ["dock"]
+    assert find_tree("dock") == tmp_path / "dock.yaml"
+    assert find_tree(tmp_path / ".dock.yaml") == tmp_path / ".dock.yaml", "a path is a path"
+    for name in (".dock", ".dock.yaml"):
+        with pytest.raises(TreeNotFoundError):
+            find_tree(name)
 
 
 @pytest.mark.parametrize("statement", [

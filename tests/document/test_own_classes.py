@@ -7,6 +7,7 @@ import json
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from py_trees.common import Status
@@ -101,6 +102,61 @@ def test_an_argument_that_fits_or_of_which_that_cannot_be_told_is_taken(
     tree = own(code, f"{{n: {value}}}")
     assert checked(tree) == []
     assert load_tree(tree).name == "A"
+
+
+ENUMS = """
+from enum import Enum, IntEnum
+from typing import TYPE_CHECKING, Optional
+from py_trees.common import Status
+if TYPE_CHECKING:
+    from nowhere import Nothing
+class Mode(Enum):
+    FAST = "quick"
+    SLOW = "slow"
+class Level(IntEnum):
+    LOW = 1
+class A(Base):
+    def __init__(self, name, {parameter}, node: Nothing = None):
+        super().__init__(name)
+        self.n = repr(n)
+"""
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "member"),
+    [
+        ("n: Status", "SUCCESS", "<Status.SUCCESS: 'SUCCESS'>"),
+        ("n: py_trees.common.Status", "FAILURE", "<Status.FAILURE: 'FAILURE'>"),
+        ("n=Status.SUCCESS", "RUNNING", "<Status.RUNNING: 'RUNNING'>"),
+        ("n: Mode | None", "FAST", "<Mode.FAST: 'quick'>"),
+        ("n: Mode | None", "null", "None"),
+        ("n: Optional[Mode] = None", "SLOW", "<Mode.SLOW: 'slow'>"),
+        ("n: list[Mode]", "[FAST]", "[<Mode.FAST: 'quick'>]"),
+        ("n: dict[str, Mode]", "{a: FAST}", "{'a': <Mode.FAST: 'quick'>}"),
+        ("n: Level", "LOW", "<Level.LOW: 1>"),
+        ("n: Level", "1", "<Level.LOW: 1>"),
+        ("n: str | Mode", "FAST", "'FAST'"),
+    ],
+)
+def test_a_text_stands_for_the_member_of_an_enum(
+    own: Own, parameter: str, value: str, member: str
+) -> None:
+    tree = own(ENUMS.format(parameter=parameter), f"{{n: {value}}}")
+    assert checked(tree) == []
+    made: Any = load_tree(tree)
+    assert made.n == member
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [("n: Mode", "FASR"), ("n: Mode", "quick"), ("n: Mode | None", "3"), ("n: list[Mode]", "[X]")],
+)
+def test_a_name_that_no_member_has_is_told_with_those_there_are(
+    own: Own, parameter: str, value: str
+) -> None:
+    (found,) = checked(own(ENUMS.format(parameter=parameter), f"{{n: {value}}}"))
+    assert found.startswith("4:18 BT215 A takes a 'n' of type ")
+    assert found.endswith(": one of FAST, SLOW")
 
 
 @pytest.mark.parametrize(

@@ -89,61 +89,6 @@ def test_a_message_that_is_published_is_read_as_a_variable(
     assert (root.status, tree_outputs(root)) == (Status.SUCCESS, {"seen": True})
 
 
-def test_a_topic_on_which_nothing_came_fails_a_check(load: Load, run: Run, name: str) -> None:
-    root = run(load(TOPICS.format(topic=f"{name}/door", more="", root="check: $door.data")))
-    assert root.status is Status.FAILURE
-    assert (
-        root.feedback_message
-        == f"nothing has come on {name}/door yet ($door): nobody publishes on it"
-    )
-
-
-READS = {
-    "action": """action: A
-  type: robot_control_interfaces/action/MoveRobot
-  server: {name}
-  goal: {{distance: = $flag.data * 0.01}}""",
-    "check": "check: $flag.data == 1",
-    "for_each": "for_each: F\n  in: = [$flag.data]\n  child: {{success: S}}",
-    "log": "log: It is $(flag.data)",
-    "publish": "publish: {name}/x\n  type: std_msgs/msg/Int32\n  message: {{data: $flag.data}}",
-    "repeat": "repeat: R\n  times: $flag.data\n  child: {{success: S}}",
-    "retry": "retry: R\n  attempts: $flag.data\n  child: {{success: S}}",
-    "service": """service: S
-  type: std_srvs/srv/SetBool
-  server: {name}/switch
-  request: {{data: = $flag.data == 1}}""",
-    "set": "set: {{seen: $flag.data}}",
-    "subtree": "subtree: inner.yaml\n  with: {{n: $flag.data}}",
-    "timeout": "timeout: T\n  after: $flag.data\n  child: {{success: S}}",
-    "wait": "wait: = $flag.data * 0.01",
-    "while": "while: $flag.data == 1\n  child: {{success: S}}",
-}
-
-
-@pytest.mark.usefixtures("switch")
-@pytest.mark.parametrize("kind", READS)
-def test_who_reads_a_latched_topic_at_once_is_given_its_message(
-    load: Load, run: Run, serve: Any, node: Any, name: str, kind: str
-) -> None:
-    from std_msgs.msg import Int32
-
-    from bt_actions.ros.connections import qos_profile
-
-    if kind == "action":
-        serve()
-    publisher = node.create_publisher(Int32, f"{name}/flag", qos_profile("latched"))
-    publisher.publish(Int32(data=1))
-    text = f"""tree: t
-topics: {{flag: {{topic: {name}/flag, type: std_msgs/msg/Int32, qos: latched}}}}
-root:
-  {READS[kind].format(name=name)}
-"""
-    root = run(load(text, inner="tree: inner\ninputs: {n: int32}\nroot: {success: S}"))
-    node.destroy_publisher(publisher)
-    assert root.status is Status.SUCCESS, root.feedback_message
-
-
 @pytest.fixture
 def paced(context: Any, no_leaks: None) -> Iterator[tuple[SimulatedTime, Any]]:
     """Simulated time, and a node that goes by it as soon as somebody spins it."""

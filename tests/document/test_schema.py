@@ -13,8 +13,10 @@ import pytest
 from bt_actions.cli import main
 from bt_actions.document import check_file
 from bt_actions.document.findings.pages import PAGES
+from bt_actions.document.language.keys import ALIAS, INPUT, OUTPUT, TOP_KEYS, TOPIC
 from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.schema import json_schema
+from bt_actions.document.language.shapes import required_in
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
@@ -41,6 +43,16 @@ def complaints(text: str) -> list[str]:
 
 def test_the_schema_is_one() -> None:
     jsonschema.Draft202012Validator.check_schema(json_schema())
+
+
+def test_each_key_that_must_be_there_has_an_example_of_its_form() -> None:
+    tables = [TOP_KEYS, *(kind.keys for kind in KINDS.values())]
+    tables += [record.keys for record in (ALIAS, INPUT, OUTPUT, TOPIC)]
+    definitions = {"$defs": json_schema()["$defs"]}
+    for key in (key for table in tables for key in required_in(table)):
+        example = data(compose(Source("example", key.example)))
+        schema = definitions | key.shape.schema()
+        assert [*jsonschema.Draft202012Validator(schema).iter_errors(example)] == [], key.name
 
 
 @pytest.mark.parametrize("path", sorted(ROOT.glob("trees/*.yaml")), ids=lambda path: path.stem)

@@ -7,6 +7,7 @@ one, write the document and run this file as a script: it writes what is missing
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,7 +46,7 @@ def said(finding: Finding) -> list[str]:
         where += f"{finding.end_line}:"
     lines = [f">> {where}{finding.end_column} {finding.severity}[{finding.code}] {finding.message}"]
     if finding.hint:
-        lines.append(f"?? {finding.hint}")
+        lines.append(f"?? {re.sub('looked in .*', 'looked in ...', finding.hint)}")
     if finding.related:
         place = finding.related.place
         lines.append(f"?? {place.line}:{place.column} {finding.related.message}")

@@ -140,6 +140,9 @@ class ModelParticipant:
     def alive(self) -> bool:
         return True
 
+    def shut_down(self) -> bool:
+        return False
+
     def full_name(self, action: str) -> str:
         return action
 
@@ -147,6 +150,9 @@ class ModelParticipant:
         return ModelTransport(self._caller, int(self.name), name, listener)
 
     def instead(self, action_type: Any, name: str) -> str:
+        return ""
+
+    def unheard(self) -> str:
         return ""
 
     def seek(self, seeker: Any) -> None:

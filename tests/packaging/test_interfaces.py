@@ -73,6 +73,7 @@ def test_run_tree_reports_three_leaves_at_most() -> None:
     assert RunTree.Feedback.get_fields_and_field_types() == {
         "running": "sequence<bt_actions_interfaces/RunningLeaf, 3>",
         "leaves_ended": "uint32",
+        "paused": "boolean",
     }
 
 

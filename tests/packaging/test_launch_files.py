@@ -30,6 +30,18 @@ def test_each_launch_argument_has_a_default_and_says_what_it_is(name: str) -> No
         assert argument.description, argument.name
 
 
+def test_show_args_lists_the_arguments_of_the_page() -> None:
+    page = (ROOT / "docs" / "launch.md").read_text()
+    rows = re.findall(r"^\| (`.*?`) \|", page, re.MULTILINE)
+    told = {name for row in rows for name in re.findall(r"`(.*?)`", row)}
+    listed = {name: {each.name for each in expand(LAUNCH / name).declared} for name in FILES}
+    assert listed == {
+        "serve.launch.py": told - {"speed"},
+        "simulation.launch.py": told,
+        "fleet.launch.py": told - {"speed", "namespace"} | {"robots"},
+    }
+
+
 def test_one_robot_is_served_in_its_namespace() -> None:
     (command,) = expand(LAUNCH / "serve.launch.py", namespace="r1").commands
     assert command.words == [

@@ -47,6 +47,26 @@ def test_the_package_is_registered_with_ament(wheel: ZipFile) -> None:
     assert f"{DATA}/share/ament_index/resource_index/packages/bt_actions" in wheel.namelist()
 
 
+def test_ros2_run_finds_the_command_in_the_prefix(wheel: ZipFile, tmp_path: Path) -> None:
+    """pip, too, keeps the mode that the wheel gives a file."""
+    (name,) = (each for each in wheel.namelist() if each.endswith("/lib/bt_actions/bt-actions"))
+    assert name.startswith(DATA)
+    mode = wheel.getinfo(name).external_attr >> 16
+    assert mode & 0o111 == 0o111
+    for path, text in (
+        (tmp_path / "lib" / "bt_actions" / "bt-actions", wheel.read(name).decode()),
+        (tmp_path / "bin" / "bt-actions", '#!/bin/sh\necho "$0: $*"\n'),
+    ):
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+        path.chmod(mode)
+    done = subprocess.run(
+        [tmp_path / "lib" / "bt_actions" / "bt-actions", "run", "a b"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.endswith("/bin/bt-actions: run a b\n")
+
+
 def test_the_command_is_installed(wheel: ZipFile) -> None:
     entry_points = wheel.read("bt_actions-0.1.0.dist-info/entry_points.txt").decode()
     assert "bt-actions = bt_actions.cli:main" in entry_points

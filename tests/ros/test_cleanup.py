@@ -11,12 +11,14 @@ import pytest
 
 from bt_actions import MoveRobot
 from bt_actions.goals.policy import End
+from bt_actions.recovery import roll_call
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.roll_call import LeftBehind
 from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros import onlooker as sight
+from bt_actions.ros.naming import server_names
 from bt_actions.ros.onlooker import CannotStart
-from tests.support.processes import HostFactory, Journal, Process
+from tests.support.processes import Host, HostFactory, Journal, Process
 
 SEND = (
     "import sys, rclpy;"
@@ -115,6 +117,18 @@ def test_it_ends_when_it_is_told_to_and_tells_what_it_has_found(
     assert [goal.goal_id.hex() for goal in swept.left] == [left]
 
 
+def test_a_server_that_tells_its_goals_is_not_waited_for_and_no_other_is_asked(
+    left: str, name: str, host: Host, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(roll_call, "SETTLE", math.inf)
+    other = host.open(f"{name}/other")
+    swept = sweep([name], look=5.0)
+    host.close_server(f"{name}/other")
+    assert (swept.known, swept.missing, swept.unknown) == ([name], [], {})
+    assert [(goal.goal_id.hex(), goal.end) for goal in swept.left] == [(left, End.CANCELED)]
+    assert other.events() == []
+
+
 def test_a_domain_that_is_none_is_refused(
     domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -123,14 +137,43 @@ def test_a_domain_that_is_none_is_refused(
         Cleanup().run()
 
 
-def test_cleanup_means_the_servers_that_a_run_with_the_same_words_for_ros_would(
+@pytest.mark.usefixtures("domain", "no_leaks")
+def test_a_server_is_the_one_that_a_node_with_the_same_words_for_ros_would_ask(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What `ros2 launch` gives a node as its namespace, and as rules, is in force."""
+    rules = [
+        f"{one}/_action/send_goal:={other}/_action/send_goal"
+        for one, other in (("left", "/r1/right"), ("right", "/r1/left"), ("base", "/base"))
+    ]
+    rules += ["__ns:=/r1", "move:=/no/effect", "other:far/_action/send_goal:=/no/effect"]
+    words = [word for rule in rules for word in ("-r", rule)]
+    monkeypatch.setattr("sys.argv", ["", "--ros-args", *words])
+    asked = {name: server_names([name], "deliver") for name in
+             ("left", "/r1/right", "base", "move", "far", "/r2/move")}  # fmt: skip
+    assert asked == {
+        "left": ["/r1/right"], "/r1/right": ["/r1/left"], "base": ["/base"],
+        "move": ["/r1/move"], "far": ["/r1/far"], "/r2/move": ["/r2/move"],
+    }  # fmt: skip
+
+
+def test_no_rule_leads_a_cleanup_away_from_the_server_that_it_is_given(
+    left: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two names that a run has exchanged, say."""
+    rules = [f"{name}/_action/{part}:={name}/nobody/_action/{part}"
+             for part in ("cancel_goal", "status", "send_goal")]  # fmt: skip
+    words = [word for rule in rules for word in ("-r", rule)]
+    monkeypatch.setattr("sys.argv", ["", "--ros-args", *words])
+    assert [(each.goal_id.hex(), each.end) for each in sweep([name]).left] == [(left, End.CANCELED)]
+
+
+def test_cleanup_looks_at_the_servers_whose_names_it_is_given(
     domain: int, no_leaks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What `ros2 launch` gives a node as its namespace is in force for relative names, too."""
     monkeypatch.setattr(module, "LOOK_LONGEST", 0.2)
     told = list[list[str]]()
-    monkeypatch.setattr("sys.argv", ["", "--ros-args", "-r", "__ns:=/r1"])
-    swept = sweep({"move", "/r2/move"}, look=0.1, patience=0.1, waits=told.append)
+    swept = sweep({"/r1/move", "/r2/move"}, look=0.1, patience=0.1, waits=told.append)
     assert told == [swept.missing] == [["/r1/move", "/r2/move"]]
     assert swept.domain == domain, "the one in force"
 
@@ -151,7 +194,8 @@ def test_cleanup_does_not_take_silence_for_nothing(
 
     swept = look(wanted=[])
     assert swept.missing == told == [], "who wants no action is in no server's way"
-    assert name in swept.unknown, "and it is named all the same"
+    assert name not in swept.known
+    assert name not in swept.unknown, "it was not asked"
     assert name in look(wanted=None).missing
     assert [name in actions for actions in told] == [True]
 

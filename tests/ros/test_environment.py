@@ -1,6 +1,7 @@
 """Settings of the middleware: ours where the user has none."""
 
 import ast
+import mmap
 import os
 import subprocess
 import sys
@@ -10,7 +11,14 @@ import pytest
 
 from bt_actions import cli
 from bt_actions.cli.program import COMMANDS
-from bt_actions.ros.environment import SHORT_LEASE, Reach, prepare, sees_nobody_else
+from bt_actions.ros import environment
+from bt_actions.ros.environment import (
+    SHORT_LEASE,
+    Reach,
+    of_other_users,
+    prepare,
+    sees_nobody_else,
+)
 from tests.support.middleware import on_loopback
 
 
@@ -168,3 +176,21 @@ def test_a_private_simulation_is_private_whatever_was_chosen(
         "ROS_STATIC_PEERS": "",
     }
     assert _get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF"
+
+
+@pytest.mark.parametrize(
+    ("uses_memory", "anothers", "hint"),
+    [(True, True, True), (True, False, False), (False, True, False)],
+)
+def test_memory_of_another_user_is_a_hint_to_who_shares_memory(
+    uses_memory: bool, anothers: bool, hint: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    segment = tmp_path / "fastrtps_port7000"
+    segment.write_bytes(b"x")
+    monkeypatch.setattr(environment, "SHARED", str(tmp_path))
+    if anothers:
+        monkeypatch.setattr(os, "getuid", lambda: segment.stat().st_uid + 1)
+    with segment.open("rb") as file:
+        mapped = mmap.mmap(file.fileno() if uses_memory else -1, 1, access=mmap.ACCESS_READ)
+        assert ("another user's" in of_other_users()) is hint
+        mapped.close()

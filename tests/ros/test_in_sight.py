@@ -1,12 +1,22 @@
-"""Why a topic or a service finds nobody, from what the graph shows: without a graph."""
+"""Why a topic, a service or an action finds nobody, from what the graph shows."""
 
 from __future__ import annotations
 
-import pytest
-from rclpy.topic_endpoint_info import TopicEndpointInfo as Ends
+from typing import Any
 
-from bt_actions.ros.connections import qos_profile
-from bt_actions.ros.in_sight import elsewhere, mismatch
+import pytest
+from rclpy.action import ActionServer
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo as Ends
+from robot_control_interfaces.action import MoveRobot
+from std_srvs.srv import SetBool
+
+from bt_actions.ros.connections import Service, qos_profile
+from bt_actions.ros.in_sight import mismatch
+from bt_actions.ros.node_participant import NodeParticipant
+from bt_actions.utilities.suggest import elsewhere
+from tests.support.waiting import until
 
 BOOL = "std_msgs/msg/Bool"
 OURS = Ends(topic_type=BOOL, qos_profile=qos_profile("default"))
@@ -65,3 +75,54 @@ def test_one_of_the_same_type_in_another_namespace_is_named(
     known: dict[str, list[str]], said: str
 ) -> None:
     assert elsewhere("/door", BOOL, known) == said
+
+
+LESS = {"best effort": QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+        "volatile": QoSProfile(depth=1),
+        "latched": QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)}  # fmt: skip
+IN_SIGHT = ": it is in sight, but "
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"feedback_pub": "best effort"}, "its feedback is best effort, and reliable is asked for"),
+        ({"status_pub": "volatile"}, "its status is volatile, and transient local is asked for"),
+        (
+            {"goal_service": "best effort", "cancel_service": "best effort"},
+            "its send_goal service, cancel_goal service is best effort, and reliable is asked for",
+        ),
+        (
+            {"result_service": "latched"},
+            "its get_result service asks for transient local, and gets volatile",
+        ),
+        ({"feedback_pub": "latched"}, "was not ready, or has requests enough to answer"),
+    ],
+    ids=str,
+)
+def test_of_an_action_server_in_sight_the_policy_that_does_not_match_is_named(
+    node: Any, name: str, settings: dict[str, str], said: str
+) -> None:
+    theirs = Node("theirs", context=node.context)
+    profiles: Any = {f"{part}_qos_profile": LESS[qos] for part, qos in settings.items()}
+    server = ActionServer(theirs, MoveRobot, name, lambda goal: goal, **profiles)
+    participant = NodeParticipant.of(node)
+    told: list[str] = []
+    until(
+        lambda: told[-1] == IN_SIGHT + said,
+        meanwhile=lambda: told.append(participant.instead(MoveRobot, name)),
+    )
+    server.destroy()
+    theirs.destroy_node()
+
+
+def test_of_a_service_in_sight_the_policy_that_does_not_match_is_named(
+    node: Any, name: str
+) -> None:
+    theirs = Node("theirs", context=node.context)
+    theirs.create_service(SetBool, name, lambda _, answer: answer, qos_profile=LESS["best effort"])
+    service = Service(node, SetBool, name)
+    said = f"{IN_SIGHT}it is best effort, and reliable is asked for"
+    until(lambda: service.why_nobody() == said)
+    service.close()
+    theirs.destroy_node()

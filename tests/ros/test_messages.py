@@ -108,6 +108,8 @@ def test_times_and_durations_are_written_as_people_say_them() -> None:
     assert fill(Duration, "500 ms") == Duration(sec=0, nanosec=500_000_000)
     assert fill(Duration, 1.5) == Duration(sec=1, nanosec=500_000_000)
     assert fill(Duration, {"sec": 2}) == Duration(sec=2)
+    assert fill(Duration, "-1 s") == fill(Duration, -1) == Duration(sec=-1)
+    assert fill(Duration, "-500 ms") == Duration(sec=-1, nanosec=500_000_000)
     assert fill(Time, -0.5) == Time(sec=-1, nanosec=500_000_000)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -28,10 +29,13 @@ def test_a_tree_of_any_name_gives_a_node_a_valid_one(tree: str, name: str) -> No
 
 
 def test_a_name_that_is_seen_already_gets_a_number_and_a_warning(
-    context: Any, monkeypatch: pytest.MonkeyPatch
+    context: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     from rclpy.node import Node
 
+    file = tmp_path / "parameters.yaml"
+    file.write_text("/taken/deliver:\n  ros__parameters: {use_sim_time: true}\n")
+    monkeypatch.setattr("sys.argv", ["", "--ros-args", "--params-file", str(file)])
     said: list[str] = []
     monkeypatch.setattr(naming.log, "warning", said.append)
     others = [Node(name, context=context, namespace="/taken") for name in ("deliver", "deliver_2")]
@@ -40,6 +44,7 @@ def test_a_name_that_is_seen_already_gets_a_number_and_a_warning(
           <= set(outlook._node.get_node_names_and_namespaces()), 10.0)  # fmt: skip
     node = named_node("deliver", outlook.context, "/taken")
     assert node.get_name() == "deliver_3"
+    assert node.get_parameter("use_sim_time").value is True, "parameters are of the name asked for"
     free = named_node("deliver", outlook.context, "/free")
     assert free.get_name() == "deliver"
     assert said == [

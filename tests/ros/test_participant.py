@@ -15,8 +15,9 @@ from test_msgs.action import Fibonacci
 
 from bt_actions import TreeRunner
 from bt_actions.recovery.sweep import Cleanup
+from bt_actions.ros.arguments import given_by
+from bt_actions.ros.naming import server_names
 from bt_actions.ros.node_participant import traffic_of
-from bt_actions.ros.parameters import parameters_in
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.ros.workarounds import participant
 from tests.support.trees import Gate
@@ -80,9 +81,10 @@ def of_a_rediscovery(domain: int) -> None:
         (of_a_runner, "bt_actions_"),
         (of_a_rediscovery, "bt_actions_rediscovery_"),
         (lambda _: Cleanup(look=0.1, patience=0.1, wanted=[]).run(), "bt_actions_cleanup"),
-        (lambda _: parameters_in(["-p", "a:=1"]), "bt_actions_"),
+        (lambda _: given_by(["-p", "a:=1"], "bt_actions_a"), "bt_actions_"),
+        (lambda _: server_names(["a"], "bt_actions_a"), "bt_actions_a"),
     ],
-    ids=["runner", "rediscovery", "cleanup", "parameters"],
+    ids=["runner", "rediscovery", "cleanup", "parameters", "names"],
 )
 def test_participants_of_our_own_fall_silent_before_they_go(
     monkeypatch: pytest.MonkeyPatch, domain: int, come_and_go: Callable[[int], object], name: str

@@ -16,13 +16,13 @@ from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros import node_participant, rediscovery
 from bt_actions.ros.graph import enclave
 from bt_actions.ros.host import host as process
-from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.route import Route
 from tests.support.trees import in_turn, started
 from tests.support.waiting import until
 
+PARTS = ["send_goal", "cancel_goal", "get_result", "feedback", "status"]
 Blind = Callable[[MoveRobot], None]
 now = time.monotonic
 
@@ -161,28 +161,29 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     context.shutdown()
 
 
-def test_where_names_are_remapped_nobody_looks(
-    name: str, domain: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("parts", [PARTS[:1], PARTS], ids=["one", "all"])
+def test_where_a_part_of_the_names_is_remapped_nobody_looks(
+    parts: list[str], name: str, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A participant without the rules would find another robot."""
     from rclpy.context import Context
     from rclpy.node import Node
 
     context = Context()
-    rule = f"{name}/_action/send_goal:=/other/move/_action/send_goal"
-    context.init(args=["--ros-args", "-r", rule], domain_id=domain)
+    rules = [f"{name}/_action/{part}:={name}/base/_action/{part}" for part in parts]
+    words = [word for rule in rules for word in ("-r", rule)]
+    context.init(args=["--ros-args", *words], domain_id=domain)
     remapped = Node("remapped", context=context)
     leaf = MoveRobot("m", 0.1, action_name=name)
     leaf.setup(node=remapped)
     looked_for = list[Any]()
-    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name))
-    monkeypatch.setattr(node_participant, "look_for", lambda *to: looked_for.append(to))
+    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, f"{name}/base"))
+    monkeypatch.setattr(
+        node_participant, "look_for", lambda seeker, *_: looked_for.append(seeker.name)
+    )
     with process.lock:
         leaf._own.watcher._route.seek()
-        assert not looked_for
-        monkeypatch.setattr(NodeParticipant, "_is_remapped", lambda *_: False)
-        leaf._own.watcher._route.seek()
-        assert looked_for
+    assert looked_for == ([f"{name}/base"] if parts == PARTS else [])
     leaf.shutdown()
     remapped.destroy_node()
     context.shutdown()

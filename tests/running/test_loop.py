@@ -109,6 +109,22 @@ class TestInterrupt:
         with pytest.raises(SystemExit):
             stepped.loop.fail(SystemExit())
 
+    def test_what_ends_the_drain_as_well_is_raised_once(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """A second Ctrl-C in `run()`: `shutdown()` has none of its own to tell of."""
+        drain = Mock()
+        drain.step.return_value = Sleep(0.01)
+        monkeypatch.setattr(module, "Drain", lambda *_: drain)
+        stepped = Stepped(Gate())
+        stepped.begin()
+        stepped.step()
+        stepped.loop.fail(SystemExit("first"))  # a KeyboardInterrupt would end these tests
+        stepped.step()
+        with pytest.raises(SystemExit, match="second"):
+            stepped.loop.fail(SystemExit("second"))
+        stepped.loop.raise_what_ended_it()
+
 
 class WithoutStatus(Behaviour):
     def __init__(self, status: Any = None) -> None:

@@ -11,28 +11,41 @@ from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport
 
-from tests.serving.conftest import MAIN, Serve
+from tests.serving.conftest import MAIN, MOVE, Serve
 from tests.support.processes import HostFactory, Journal, Process
 from tests.support.tree_client import TreeClient
 
+PARTS = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
 LONG = "{distance: 20.0}"
 
 
+@pytest.mark.parametrize("remapped", [False, True])
 def test_after_a_crash_what_was_left_is_canceled_before_goals_are_accepted(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+    remapped: bool,
+    serve: Callable[..., Journal],
+    serve_trees: Serve,
+    client: TreeClient,
+    folder: Path,
+    name: str,
 ) -> None:
+    words = list[str]()
+    if remapped:
+        used = f"{name}/nobody_is_here"
+        (folder / "move.yaml").write_text(MOVE.format(server=used, cancel="5 s"))
+        rules = [f"{used}/_action/{part}:={name}/_action/{part}" for part in PARTS]
+        words = ["--ros-args", *(word for rule in rules for word in ("-r", rule))]
     journal = serve()
-    killed = serve_trees()
+    killed = serve_trees(*words)
     client.send("move", LONG)
     journal.wait_for("accepted")
     killed.send(signal.SIGKILL)
     killed.wait()
     assert not journal.ends()[0], "it runs on"
-    again = serve_trees()
+    again = serve_trees(*words)
     assert journal.ends() == ["canceled"]
     again.send(signal.SIGINT)
     assert again.wait() == 0
-    third = serve_trees()
+    third = serve_trees(*words)
     assert not any("cleaning up" in line for line in third.errors), "nothing is left"
 
 

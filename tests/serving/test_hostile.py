@@ -51,6 +51,9 @@ NAMES = {
     "home": "~",
     "format": "{0}%s",
     "long": "x" * 1_000_000,
+    "through a link": "linked/secret",
+    "a link": "linked",
+    "hidden": ".secret",
 }
 DEEP = 10_000
 BOMB = "x: &x [1,1,1,1,1,1,1,1]\n" + "".join(
@@ -97,8 +100,13 @@ INPUTS = {
 
 @pytest.fixture
 def catalog(tmp_path: Path) -> Catalog:
-    (tmp_path / "go.yaml").write_text(TREE)
-    return Catalog([tmp_path])
+    for folder in (tmp_path / "trees", tmp_path / "outside"):
+        folder.mkdir()
+        (folder / "secret.yaml").write_text(TREE)
+    (tmp_path / "trees" / "secret.yaml").rename(tmp_path / "trees" / ".secret.yaml")
+    (tmp_path / "trees" / "go.yaml").write_text(TREE)
+    (tmp_path / "trees" / "linked").symlink_to(tmp_path / "outside")
+    return Catalog([tmp_path / "trees"])
 
 
 def is_refused_in_a_line(catalog: Catalog, name: str, inputs: str) -> str:
@@ -121,6 +129,12 @@ def test_a_hostile_name_is_looked_up_and_refused_in_a_line(catalog: Catalog, nam
 @pytest.mark.parametrize("inputs", INPUTS.values(), ids=INPUTS)
 def test_hostile_inputs_are_refused_in_a_line(catalog: Catalog, inputs: str) -> None:
     is_refused_in_a_line(catalog, "go", inputs)
+
+
+@pytest.mark.parametrize("text", ["@go.yaml", "@linked/secret.yaml", "@../outside/secret.yaml"])
+def test_inputs_name_no_file_not_even_one_that_is_linked(catalog: Catalog, text: str) -> None:
+    assert catalog.check("go", f"s: '{text}'")[2] == {"s": text}
+    assert is_refused_in_a_line(catalog, "go", f"pose: '{text}'") == "INPUTS"
 
 
 def test_a_file_whose_name_no_message_can_carry_is_no_tree(tmp_path: Path) -> None:
@@ -167,6 +181,6 @@ def test_what_a_server_says_of_strangers_is_one_clean_line_each(
             assert clean(text) == text
             assert len(text) <= LONGEST + 20
     assert sum("\ufffd" in told.tree for told in client.rejections) == 1
-    assert sum("asks for command" in line for line in server.errors) == 4
+    assert sum("asked for by" in line for line in server.errors) == 4
     assert not any(line.startswith(spoofed) for line in server.errors)
     assert [line for line in server.errors if clean(line) != line or len(line) > LONGEST] == []

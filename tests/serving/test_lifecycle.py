@@ -11,7 +11,7 @@ from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.srv import CheckTree, ListTrees
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
 from tests.serving.conftest import Serve
@@ -19,6 +19,18 @@ from tests.support.processes import Journal
 from tests.support.tree_client import TreeClient
 
 LONG = "{distance: 20.0}"
+SERVICE_TIMEOUT = 5.0
+"""Seconds that Nav2's manager waits for an answer, at its defaults."""
+UP = [
+    (Transition.TRANSITION_CONFIGURE, State.PRIMARY_STATE_INACTIVE),
+    (Transition.TRANSITION_ACTIVATE, State.PRIMARY_STATE_ACTIVE),
+]
+DOWN = [
+    (Transition.TRANSITION_DEACTIVATE, State.PRIMARY_STATE_INACTIVE),
+    (Transition.TRANSITION_CLEANUP, State.PRIMARY_STATE_UNCONFIGURED),
+    (Transition.TRANSITION_UNCONFIGURED_SHUTDOWN, State.PRIMARY_STATE_FINALIZED),
+]
+"""What Nav2's manager asks for, one after the other, and the state that it then wants to see."""
 NODE = "bt_actions_serve"
 CYCLES = 20
 
@@ -54,6 +66,14 @@ class Manager:
     def state(self) -> str:
         return str(self._ask(self._state, GetState.Request()).current_state.label)
 
+    def go(self, steps: list[tuple[int, int]]) -> None:
+        """Make transitions as Nav2's manager does with `bond_timeout: 0.0`."""
+        for transition, state in steps:
+            future = self.begin(transition)
+            self._client.until(future.done, "the change is answered", SERVICE_TIMEOUT)
+            assert future.result().success
+            assert self._ask(self._state, GetState.Request()).current_state.id == state
+
     def graph(self) -> list[Any]:
         answer = self._ask(self._graph, GetAvailableTransitions.Request())
         return list(answer.available_transitions)
@@ -85,6 +105,17 @@ def test_a_managed_server_goes_through_its_life_again_and_again_and_refuses_what
     assert manager.state() == "finalized"
     assert not manager.change("configure")
     assert not client.send("empty").accepted
+
+
+def test_navs_lifecycle_manager_without_a_bond_brings_it_up_pauses_it_and_takes_it_down(
+    start_managed: Callable[..., Any], client: TreeClient, manager: Manager
+) -> None:
+    start_managed()
+    manager.go(UP)
+    assert client.result(client.send("empty"))[0] == GoalStatus.STATUS_SUCCEEDED
+    manager.go([DOWN[0], UP[1], *DOWN[:2], *UP])  # its pause, resume, reset and startup
+    assert client.result(client.send("empty"))[0] == GoalStatus.STATUS_SUCCEEDED
+    manager.go(DOWN)
 
 
 @pytest.mark.chaos

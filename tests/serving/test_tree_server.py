@@ -14,7 +14,7 @@ import pytest
 from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport, TreeInfo
-from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
+from bt_actions_interfaces.srv import CheckTree, ListTrees
 from rclpy.action.server import RCLError
 
 from bt_actions.serving import TreeServer
@@ -202,32 +202,6 @@ def test_trees_are_listed_with_their_inputs_and_with_what_runs(
     assert trees["broken"].findings[0].code == "BT201"
     client.cancel(sent)
     client.result(sent)
-
-
-def test_a_run_is_paused_resumed_and_halted_by_its_goals_id(
-    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
-) -> None:
-    journal = serve()
-    serve_trees()
-    sent = client.send("move", "{distance: 0.5}")
-    ours = sent.handle.goal_id
-    journal.wait_for("accepted")
-
-    def control(command: int, **more: object) -> ControlTree.Response:
-        return client.call(ControlTree, command=command, **more)
-
-    assert control(ControlTree.Request.PAUSE, goal_id=ours, requested_by="test").accepted
-    journal.wait_for("succeeded")
-    assert not sent.result_future.done(), "its next leaf is not ticked"
-    assert control(ControlTree.Request.RESUME, goal_id=ours).accepted
-    assert client.result(sent)[0] == GoalStatus.STATUS_SUCCEEDED
-
-    sent = client.send("move", LONG)
-    assert not control(ControlTree.Request.HALT).accepted, "of nobody"
-    assert not control(0, goal_id=sent.handle.goal_id).accepted, "nothing"
-    assert control(ControlTree.Request.HALT, goal_id=sent.handle.goal_id).accepted
-    status, result = client.result(sent)
-    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, R.HALTED)
 
 
 def test_a_signal_drains_all_goals_and_answers_before_the_process_ends(

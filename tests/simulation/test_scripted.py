@@ -83,6 +83,7 @@ def test_it_refuses_and_aborts_with_the_reasons_of_the_script(serve: Any, bench:
         (Script(duration=0.1, feedback=wrong), "no feedback"),
         (Script(duration=0.1, feedback=lambda goal, done: "text"), "no feedback"),
         (Script(duration=0.1, result=wrong), "no result"),
+        (Script(duration=0.1, result=lambda goal: None), "None is no Fibonacci.Result"),
         (Script(duration=0.1, aborts=wrong), "no result"),
     ],
 )
@@ -91,7 +92,11 @@ def test_a_wrong_script_aborts_the_goal(
 ) -> None:
     goal = serve(script).send().until_ended()
     assert goal.status == GoalStatus.STATUS_ABORTED
-    assert says in bench.entries()[-1].reason
+    reason = bench.entries()[-1].reason
+    assert says in reason
+    name = bench.entries()[-1].server
+    told = ("warning", f"{name}: goal {goal.goal_id[:8]} aborted: {reason}")
+    assert bench.node.log.lines == [told], "a test that watches no journal is told"
 
 
 def test_a_result_of_the_wrong_type_does_not_end_the_server(serve: Any, bench: Bench) -> None:

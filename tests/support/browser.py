@@ -53,9 +53,13 @@ class Browser:
 
     def open(self, path: Path, width: int = 1200, height: int = 800) -> None:
         """Show a file, in a window of so many pixels inside."""
+        self.resize(width, height)
+        _call(f"{self._session}/url", url=path.as_uri())
+
+    def resize(self, width: int, height: int) -> None:
+        """Give the window so many pixels inside."""
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.cdp("Emulation.setDeviceMetricsOverride", **metrics)
-        _call(f"{self._session}/url", url=path.as_uri())
 
     def scheme(self, name: str) -> None:
         """Prefer "light" or "dark", as the reader's system does."""

@@ -96,7 +96,9 @@ class OpaqueFunction:
         self._call = lambda context: function(context, *args, **(kwargs or {}))
 
     def visit(self, context: LaunchContext) -> None:
+        known = len(context.declared)
         LaunchDescription(self._call(context) or ()).visit(context)
+        del context.declared[known:]  # launch does not look here for what --show-args lists
 
 
 class PythonLaunchDescriptionSource:

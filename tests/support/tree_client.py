@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from action_msgs.srv import CancelGoal
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import Rejection
 from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
@@ -25,6 +26,7 @@ class TreeClient:
         self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
         self._actions = ActionClient(self.node, RunTree, "run_tree")
+        self._cancels = self.node.create_client(CancelGoal, "run_tree/_action/cancel_goal")
         self._services = {
             kind: self.node.create_client(kind, f"{server}/{name}")
             for kind, name in (
@@ -90,6 +92,12 @@ class TreeClient:
         future = sent.handle.cancel_goal_async()
         self.until(future.done, "the cancel is answered")
         return len(future.result().goals_canceling)
+
+    def begin_cancel(self, goal_id: bytes) -> Any:
+        """Ask to cancel a goal by its id, without waiting for the answer."""
+        request = CancelGoal.Request()
+        request.goal_info.goal_id.uuid = list(goal_id)
+        return self._cancels.call_async(request)
 
     def call(self, kind: type, **fields: Any) -> Any:
         """Call a service."""

@@ -25,13 +25,22 @@ def test_it_stands_still_between_two_steps_and_drains_what_is_interrupted() -> N
     assert runner.advance(10.0) is None
     assert runner.now == 10.0
     assert len(server.live_goals) == 1
+    with pytest.raises(RuntimeError, match="is running already"):
+        runner.start()
     with pytest.raises(RuntimeError, match="the run goes on"):
         print(runner.unaccounted)
     runner.interrupt()
+    with pytest.raises(RuntimeError, match=r"let it end first, with advance\(\)"):
+        print(runner.unaccounted)
     assert runner.advance(1.0) is Status.INVALID
+    assert runner.unaccounted == []
     assert server.live_goals == []
     assert runner.outcomes == [("To the shelf", Outcome.CANCELED)]
     assert runner.run() is Status.SUCCESS, "it may run again"
+    runner.start()
+    runner.advance(10.0)
+    runner.interrupt()
+    assert runner.run() is Status.INVALID, "it ends the run that was begun"
     runner.shutdown()
 
 

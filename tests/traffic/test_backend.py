@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import pytest
-from std_msgs.msg import Int32
-from std_srvs.srv import SetBool
+from std_msgs.msg import Bool, Float32, Int32
+from std_srvs.srv import SetBool, Trigger
 
+from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.handle import Run, begun_in
@@ -17,6 +18,8 @@ from bt_actions.wiring import backend_of
 from tests.support.waiting import until
 
 NUMBERS = itertools.count(1)
+QOS = ("default", "latched")
+RAISES = ValueError("a mistake of whoever answers")
 
 
 class World(Protocol):
@@ -28,6 +31,12 @@ class World(Protocol):
 
     def serve(self, service_type: type, name: str, answer: Callable[[Any], Any]) -> None:
         """Offer a service; `answer` gives the response to a request."""
+
+    def listen(self, message_type: type, topic: str, take: Callable[[Any], None]) -> None:
+        """Have `take` called with each message, as any other node may."""
+
+    def speaker(self, message_type: type, topic: str) -> Any:
+        """Make a publisher, as any other node may."""
 
     def until(self, condition: Callable[[], Any]) -> None:
         """Let messages travel until something is so."""
@@ -43,6 +52,8 @@ class Ros:
         self.namespace = node.get_namespace().rstrip("/")
         self._node = node
         self._services: list[Any] = []
+        self._subscriptions: list[Any] = []
+        self._publishers: list[Any] = []
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
 
@@ -52,6 +63,15 @@ class Ros:
             self._node.create_service(service_type, name, lambda request, _: answer(request))
         )
 
+    def listen(self, message_type: type, topic: str, take: Callable[[Any], None]) -> None:
+        """Listen on the same node."""
+        self._subscriptions.append(self._node.create_subscription(message_type, topic, take, 10))
+
+    def speaker(self, message_type: type, topic: str) -> Any:
+        """Make one on the same node."""
+        self._publishers.append(self._node.create_publisher(message_type, topic, 10))
+        return self._publishers[-1]
+
     def until(self, condition: Callable[[], Any]) -> None:
         """Spin until something is so."""
         until(condition, meanwhile=lambda: self._executor.spin_once(timeout_sec=0.01))
@@ -60,6 +80,10 @@ class Ros:
         """Leave the node as it was."""
         for service in self._services:
             self._node.destroy_service(service)
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        for publisher in self._publishers:
+            self._node.destroy_publisher(publisher)
         self._executor.shutdown()
         self._node.executor = None
 
@@ -76,6 +100,14 @@ class Virtual:
     def serve(self, service_type: type, name: str, answer: Callable[[Any], Any]) -> None:
         """Offer a service."""
         self._network.provide(service_type, name, answer)
+
+    def listen(self, message_type: type, topic: str, take: Callable[[Any], None]) -> None:
+        """Listen."""
+        self._network.subscribe(message_type, topic, take)
+
+    def speaker(self, message_type: type, topic: str) -> Any:
+        """Make one."""
+        return self._network.publisher(message_type, topic)
 
     def until(self, condition: Callable[[], Any]) -> None:
         """Let time pass until something is so."""
@@ -182,6 +214,167 @@ def test_some_time_after_it_began_nobody_may_be_on_the_way_any_more(
     spoken.close()
 
 
+@pytest.mark.parametrize("qos", ["default", "latched", "sensor"])
+def test_a_first_message_has_its_time_where_its_publisher_is_there(
+    world: World, name: str, qos: str
+) -> None:
+    alone = world.backend.subscription(Int32, f"{name}_alone", qos, lambda _: None)
+    world.until(lambda: alone.may_come() == 0.0)  # and the node is new no more
+    spoken = world.backend.publisher(Int32, name, "latched" if qos == "latched" else "default")
+    heard = world.backend.subscription(Int32, name, qos, lambda _: None)
+    world.until(lambda: heard.may_come() > 0.0)
+    assert alone.may_come() == 0.0
+    world.until(lambda: heard.may_come() == 0.0)
+    for each in (alone, heard, spoken):
+        each.close()
+
+
+def test_what_was_published_before_comes_to_nobody_unless_it_is_latched(
+    world: World, name: str
+) -> None:
+    came: dict[tuple[str, str], list[int]] = {}
+    heard = []
+    spoken = {qos: world.backend.publisher(Int32, f"{name}_{qos}", qos) for qos in QOS}
+    for each in spoken.values():
+        each.publish(Int32(data=1))
+    for qos, asked in (("default", "default"), ("latched", "default"), ("latched", "latched")):
+        came[qos, asked] = []
+        take = came[qos, asked].append
+        topic = f"{name}_{qos}"
+        heard.append(
+            world.backend.subscription(Int32, topic, asked, lambda it, take=take: take(it.data))
+        )
+    world.until(lambda: [each.listeners for each in spoken.values()] == [1, 2])
+    world.until(lambda: came["latched", "latched"])
+    for each in spoken.values():
+        each.publish(Int32(data=2))
+    world.until(lambda: all(2 in each for each in came.values()))
+    assert list(came.values()) == [[2], [2], [1, 2]]
+    for end in (*heard, *spoken.values()):
+        end.close()
+
+
+def test_what_a_latched_publisher_said_goes_with_it(world: World, name: str) -> None:
+    came: list[int] = []
+    first, second = (world.backend.publisher(Int32, name, "latched") for _ in range(2))
+    first.publish(Int32(data=1))
+    second.publish(Int32(data=2))
+    first.close()
+    heard = world.backend.subscription(Int32, name, "latched", lambda each: came.append(each.data))
+    world.until(lambda: came)
+    assert came == [2]
+    heard.close()
+    second.close()
+
+
+def test_a_message_arrives_as_it_was_when_it_was_published(world: World, name: str) -> None:
+    came: list[int] = []
+    world.listen(Int32, name, lambda each: came.append(each.data))
+    spoken = world.backend.publisher(Int32, name, "default")
+    world.until(lambda: spoken.listeners == 1)
+    message = Int32()
+    for message.data in range(3):
+        spoken.publish(message)
+    spoken.close()
+    world.until(lambda: len(came) == 3)
+    assert came == [0, 1, 2], "all of it, though the publisher is gone"
+
+
+def test_who_is_told_may_publish_in_turn(world: World, name: str) -> None:
+    came: list[int] = []
+    echo = world.speaker(Int32, f"{name}_echo")
+    world.listen(Int32, name, echo.publish)
+    for _ in range(2):
+        world.listen(Int32, f"{name}_echo", lambda each: came.append(each.data))
+    spoken = world.backend.publisher(Int32, name, "default")
+    world.until(lambda: spoken.listeners == 1)
+    spoken.publish(Int32(data=7))
+    world.until(lambda: len(came) == 2)
+    assert came == [7, 7]
+    spoken.close()
+
+
+def test_a_listener_that_raises_raises_where_messages_travel(world: World, name: str) -> None:
+    def take(_message: Any) -> None:
+        raise RuntimeError("a mistake of the listener's")
+
+    heard = world.backend.subscription(Int32, name, "default", take)
+    spoken = world.backend.publisher(Int32, name, "default")
+    world.until(lambda: spoken.listeners == 1)
+    spoken.publish(Int32(data=1))
+    with pytest.raises(RuntimeError, match="a mistake of the listener's"):
+        world.until(lambda: False)
+    heard.close()
+    spoken.close()
+
+
+@pytest.mark.parametrize("given", [None, True, Int32, Float32(data=1.0)])
+def test_a_topic_takes_messages_of_its_type_alone(world: World, name: str, given: Any) -> None:
+    spoken = world.backend.publisher(Int32, name, "default")
+    for each in (spoken, world.speaker(Int32, name)):
+        with pytest.raises(TypeError):
+            each.publish(given)
+    spoken.close()
+
+
+def test_why_nothing_comes_is_told_of_what_is_published(world: World, name: str) -> None:
+    heard = world.backend.subscription(Int32, name, "default", lambda _: None)
+    assert heard.why_nobody() == ": nobody publishes on it"
+    world.speaker(Int32, f"/elsewhere/{name}")
+    there = f": nobody publishes on it; there is /elsewhere/{name} of that type"
+    world.until(lambda: heard.why_nobody() == there)
+    world.speaker(Int32, name)
+    world.until(lambda: not heard.why_nobody())
+    heard.close()
+
+
+def test_why_no_service_is_there_is_told_of_those_that_are(world: World, name: str) -> None:
+    service = world.backend.service(SetBool, name)
+    assert service.why_nobody() == ": nobody offers it"
+    world.serve(SetBool, f"/elsewhere/{name}", switched)
+    there = f": nobody offers it; there is /elsewhere/{name} of that type"
+    world.until(lambda: service.why_nobody() == there)
+    assert not service.ready
+    service.close()
+
+
+@pytest.mark.parametrize("given", [None, True, SetBool.Response, Trigger.Response(), RAISES])
+def test_what_a_service_is_to_return_is_its_response_alone(
+    world: World, name: str, given: Any
+) -> None:
+    def answer(_: Any) -> Any:
+        if given is RAISES:
+            raise RAISES
+        return given
+
+    service = world.backend.service(SetBool, name)
+    world.serve(SetBool, name, answer)
+    world.until(lambda: service.ready)
+    call = service.call(SetBool.Request())
+    with pytest.raises(type(given) if given is RAISES else TypeError):
+        world.until(call.done)
+    assert not call.done()
+    service.close()
+
+
+def test_an_answer_is_as_it_was_when_it_was_given(world: World, name: str) -> None:
+    answer = SetBool.Response()
+
+    def count(_: Any) -> SetBool.Response:
+        answer.message += "."
+        return answer
+
+    service = world.backend.service(SetBool, name)
+    world.serve(SetBool, name, count)
+    world.until(lambda: service.ready)
+    calls = []
+    for _ in range(2):
+        calls.append(service.call(SetBool.Request()))
+        world.until(calls[-1].done)
+    assert [call.result().message for call in calls] == [".", ".."]
+    service.close()
+
+
 def test_a_service_answers_and_wakes_who_runs_the_tree(
     world: World, name: str, told: list[Any]
 ) -> None:
@@ -200,6 +393,20 @@ def test_a_service_answers_and_wakes_who_runs_the_tree(
         assert told == [None]
         assert call.result() == SetBool.Response(success=data, message="switched")
     service.close()
+
+
+@pytest.mark.ros
+def test_a_name_that_is_in_use_with_another_type_is_told_with_both(ros: World, name: str) -> None:
+    full, backend = f"{ros.namespace}/{name}", ros.backend
+    made = [backend.publisher(Int32, name, "default"), backend.service(SetBool, name)]
+    with pytest.raises(TwoTypes, match=f"^{full} is used as std_msgs/msg/Bool, and also as"):
+        backend.subscription(Bool, name, "default", lambda _: None)
+    with pytest.raises(TwoTypes, match=r"/msg/Bool, and also as .*std_msgs/msg/Int32"):
+        backend.publisher(Bool, name, "default")
+    with pytest.raises(TwoTypes, match=r"/srv/Trigger, and also as .*std_srvs/srv/SetBool"):
+        backend.service(Trigger, name)
+    for each in made:
+        each.close()
 
 
 def test_an_answer_to_a_call_that_was_dropped_is_no_answer_to_the_next(

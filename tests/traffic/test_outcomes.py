@@ -19,6 +19,7 @@ from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Retry, Timeouts
 from bt_actions.behaviours.variables import read
 from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
+from bt_actions.testing.transport import VirtualParticipant
 from bt_actions.traffic import handover
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
@@ -338,7 +339,10 @@ class TestFeedback:
 
 
 class TestDeadlines:
-    def test_a_request_that_is_never_answered(self, world: World) -> None:
+    def test_a_request_that_is_never_answered(
+        self, world: World, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(VirtualParticipant, "unheard", lambda _: "; as a guess")
         journal = world.serve("1:drop_goal")
         timeouts = Timeouts(accept=0.5, cancel=1.0)
         leaf = MoveRobot("m", 0.1, timeout=timeouts)
@@ -348,6 +352,7 @@ class TestDeadlines:
             runner.run(timeout=9.0)
             assert [report.goal_id for report in runner.unaccounted] == [leaf.history[0].goal_id]
         assert stood(leaf) == (Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
+        assert leaf.reason == "no answer to the goal request within 0.5 s; as a guess"
         assert End.NEVER_STARTED in ends, "the server denied it, so that the tree could go on"
         assert journal.count("accepted") == 0
 

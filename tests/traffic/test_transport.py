@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import pytest
-from test_msgs.action import Fibonacci
+from test_msgs.action import Fibonacci, NestedMessage
 
 from bt_actions.goals.terms import (
     CANCEL_ACCEPTED,
@@ -171,6 +171,15 @@ def test_who_is_there_is_in_sight_until_it_goes(side: Side) -> None:
     first.close()
     side.world.until(lambda: side.transport.count() == len(side.transport.servers()) == 1)
     assert gid not in side.transport.servers()
+
+
+def test_what_is_in_sight_in_its_place_is_told(side: Side, world: World) -> None:
+    instead = world.participant.instead
+    there = f"/elsewhere{side.name}"
+    side.servers.append(ScriptedServer(world.node, Fibonacci, there))
+    world.until(lambda: instead(Fibonacci, side.name) == f"; there is {there} of that type")
+    other = "; there is one of another type"
+    world.until(lambda: instead(NestedMessage, there).startswith(other))
 
 
 def test_a_goal_is_answered_shown_and_ends(side: Side) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.ros_arguments import as_inputs
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
     from bt_actions.document import DocumentError
+    from bt_actions.ros.arguments import Given
 
 
 def load(
@@ -24,12 +24,13 @@ def load(
     settings: Iterable[str],
     *,
     python: bool = True,
-    parameters: Mapping[str, object] = MappingProxyType({}),
+    parameters: Callable[[str], Given | None] | None = None,
 ) -> Behaviour:
     """Load a tree by path or by the name of an installed one, with `--set` words for its inputs.
 
-    Where they say nothing, ROS parameters by the names of inputs do. With `python=False` a tree
-    with a `python:` node is refused, and nothing it names is imported.
+    Where they say nothing, ROS parameters by the names of inputs do: `parameters` gives them, for
+    the name of the tree. With `python=False` a tree with a `python:` node is refused, and nothing
+    it names is imported.
 
     Raises BadInput with all findings, or about the first input that does not fit.
     """
@@ -40,8 +41,8 @@ def load(
         find_tree,
         load_tree,
         parse_input,
-        tree_inputs,
     )
+    from bt_actions.document.load import tree_head
 
     texts: dict[str, str] = {}
     for word in settings:
@@ -53,8 +54,8 @@ def load(
         found = find_tree(tree)
         if Path(tree).suffix and found != Path(tree) and "://" not in tree:
             note(f"bt-actions: there is no {tree} in this folder; taking the installed {found}")
-        declared = tree_inputs(tree) if texts or parameters else {}
-        inputs = as_inputs(parameters, declared, tree)
+        name, declared = tree_head(tree) if texts or parameters else ("", {})
+        inputs = as_inputs(parameters(name), declared, name) if parameters else {}
         for name, text in texts.items():
             kind = declared[name].type if name in declared else "string"
             try:
@@ -64,7 +65,10 @@ def load(
         return load_tree(tree, inputs, python=python)
     except DocumentError as error:
         raise BadInput(findings_text(error), prefixed=False) from error
-    except (InputError, TreeNotFoundError) as error:
+    except InputError as error:
+        remedy = f", such as --set {error.missing}=..." if error.missing else ""
+        raise BadInput(f"{error}{remedy}") from error
+    except TreeNotFoundError as error:
         raise BadInput(str(error)) from error
 
 

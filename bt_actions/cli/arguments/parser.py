@@ -48,13 +48,19 @@ class Parser(argparse.ArgumentParser):
                 if isinstance(parser, Parser) and word in parser.commands:
                     parser = parser.commands[word]
             assert isinstance(parser, Parser)
-            parser.refuse(unknown)
+            parser.refuse(unknown, getattr(args, "set", ()))
         return args
 
-    def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Report arguments that nothing takes."""
+    def refuse(self, unknown: Sequence[str], settings: Sequence[str] = ()) -> NoReturn:
+        """Report arguments that nothing takes; `settings` are the words of --set."""
         word = unknown[0]
         options = [name for action in self._actions for name in action.option_strings]
+        is_value = not word.startswith("-") or word[1:2].isdigit()
+        if "--set" in options and is_value:
+            name = next((each for each in settings if "=" not in each), "")
+            meant = f"{name}={word.strip('=') or 'VALUE'}" if name else word
+            if "=" in meant:
+                self.error(f"unexpected argument {word!r}; write --set {meant}")
         if word.startswith("-"):
             name = word.split("=", 1)[0]
             self.error(f"no option {name}{_suggestion(name, options)}")

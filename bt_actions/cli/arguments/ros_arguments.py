@@ -1,20 +1,26 @@
 """`--ros-args` of a command, as launch appends them; of a run, the parameters that are its inputs.
 
-The node of the command is told of all of them by rclpy, which reads `sys.argv` itself.
+The node of the command is told of all of them by rclpy, which reads `sys.argv` itself. What is
+given and used nowhere is told: an error where it is meant for this node alone, else a warning.
 """
 
 from __future__ import annotations
 
 import argparse
-import copy
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bt_actions.cli.arguments.values import nested
 from bt_actions.cli.exits import BadInput, importing_ros
-from bt_actions.utilities.suggest import listing
+from bt_actions.cli.streams.writing import note
+from bt_actions.utilities.suggest import did_you_mean, listing
 
 if TYPE_CHECKING:
     from bt_actions.document import TreeInput
+    from bt_actions.messages.fields import FieldType
+    from bt_actions.ros.arguments import Given
 
 
 def add_ros_args(parser: argparse.ArgumentParser, help_more: str = "") -> None:
@@ -28,88 +34,172 @@ def add_ros_args(parser: argparse.ArgumentParser, help_more: str = "") -> None:
     )
 
 
-def parameters(words: Sequence[str], namespace: str = "", name: str = "") -> dict[str, object]:
+def parameters(words: Sequence[str], name: str, namespace: str = "") -> Given | None:
     """Return the parameters that `words` give to the command's node, without rclpy's own.
 
-    `name` is the node's, for files of parameters that name it.
+    `name` and `namespace` are the node's, before remapping. What gives it nothing is told.
     Raises BadInput for what rcl does not understand.
     """
     if not words:
-        return {}
+        return None
     if "--" in words:
         raise BadInput("--ros-args: all that follows is for ROS; give --ros-args last, without --")
     with importing_ros():
-        from bt_actions.ros.parameters import parameters_in
+        from bt_actions.ros.arguments import FILE, given_by
 
     try:
-        return parameters_in(words, namespace, name)
+        given = given_by(words, name, namespace)
     except ValueError as error:
         raise BadInput(f"--ros-args: {error}") from error
+    for option, word in given.unused:
+        instead = f"without the name it does: {option} {word.partition(':')[2]}"
+        if option == FILE:
+            instead = f"it is for {listing(_nodes_in(Path(word))) or 'nobody'}"
+        note(f"bt-actions: {option} {word} gives nothing to this node, {given.node}; {instead}")
+    return given
 
 
-def as_inputs(
-    given: Mapping[str, object], declared: Mapping[str, TreeInput], tree: str
+def no_parameters(words: Sequence[str], command: str, name: str, namespace: str = "") -> None:
+    """Check the words of a command whose node has no parameters but those of every node."""
+    taken(parameters(words, name, namespace), (), f"parameter of bt-actions {command}")
+
+
+def taken(
+    given: Given | None,
+    known: Collection[str],
+    what: str,
+    *,
+    with_fields: Collection[str] = (),
+    other_users: bool = False,
 ) -> dict[str, object]:
+    """Return those parameters that are `known`, or fields of one `with_fields`.
+
+    Raises BadInput for another one that is meant for this node, unless the node has `other_users`
+    of parameters and the name is like no known one. Tells of all others: a file gives some to
+    other nodes, too. `what` is the noun for a known one.
+    """
+    if given is None:
+        return {}
+    others = dict[str, str]()
+    for name in given.values:
+        first, _, field = name.partition(".")
+        if name not in known and not (field and first in with_fields):
+            others[name] = did_you_mean(first, known)
+    for name, near in others.items():
+        if name not in given.shared and (near or not other_users):
+            there = near or (f"; there is {listing(known)}" if known else "")
+            raise BadInput(f"--ros-args: the parameter {name!r} is no {what}{there}")
+    if others:
+        told = listing(f"{name}{near and f' ({near[2:]})'}" for name, near in others.items())
+        note(f"bt-actions: --ros-args: no {what}, and not used: {told}")
+    return {name: value for name, value in given.values.items() if name not in others}
+
+
+def as_inputs(given: Given | None, declared: Mapping[str, TreeInput], tree: str) -> dict[str, Any]:
     """Return parameters as the inputs that `declared` says `tree` has.
 
     A text for an input that is a message is read as YAML; ``at.x`` is a field of the input ``at``,
     whose other fields are those of its default. Raises BadInput about the first
     parameter that is no input, or does not fit.
     """
-    from bt_actions.document import parse_input
-    from bt_actions.document.reading.inputs import convert
+    from bt_actions.document.language.types import parse_type
+    from bt_actions.messages.conversion import MessageError, fill_value
+    from bt_actions.messages.fields import Message
 
     inputs: dict[str, object] = {}
-    for name, value in _with_fields(given, declared).items():
-        if name not in declared:
-            there = f"its inputs are {listing(declared)}" if declared else "it has no inputs"
-            text = f"the parameter {name!r} is no input of the tree {tree!r}; {there}"
-            raise BadInput(f"--ros-args: {text}")
-        kind = declared[name].type
+    kinds = {name: parse_type(each.type) for name, each in declared.items()}
+    messages = [name for name, kind in kinds.items() if isinstance(kind, Message)]
+    values = taken(given, declared, f"input of the tree {tree!r}", with_fields=messages)
+    for name in dict.fromkeys(each.partition(".")[0] for each in values):
+        path, kind = name, kinds[name]
+        fields = {each: one for each, one in values.items() if each.startswith(f"{name}.")}
         try:
-            is_yaml = isinstance(value, str) and "/" in kind
-            inputs[name] = (
-                parse_input(str(value), kind) if is_yaml else convert(_read(value, kind), kind)
-            )
+            value = _read(values[name], kind) if name in values else declared[name].default
+            if fields:
+                value = _over(value, _read(nested(fields)[name], kind), kind)
+            inputs[name] = value if kind is None else fill_value(kind, value)
         except ValueError as error:
-            text = f"the parameter {name!r} is {value!r}, and the input is {kind}: {error}"
-            raise BadInput(f"--ros-args: {text}") from error
+            why = str(error)
+            if isinstance(error, MessageError):
+                why = error.problems[0].text
+                path = ".".join([name, *map(str, error.problems[0].path)])
+            raise BadInput(_no_fit(given, path, declared[name].type, values, why)) from error
     return inputs
 
 
-def _with_fields(
-    given: Mapping[str, object], declared: Mapping[str, TreeInput]
-) -> dict[str, object]:
-    """Put the parameters that are fields of inputs back together."""
-    values = {name: value for name, value in given.items() if "." not in name}
-    for name, value in given.items():
-        first, *fields = name.split(".")
-        if not fields:
-            continue
-        if first not in declared or isinstance(values.get(first), str):
-            values[name] = value  # which is no input
-            continue
-        default = declared[first].default
-        inner: Any = values.setdefault(first, copy.deepcopy(default) or {})
-        for field in fields[:-1]:
-            inner = inner.setdefault(field, {}) if isinstance(inner, dict) else {}
-        if isinstance(inner, dict):
-            inner[fields[-1]] = value
-    return values
+def _no_fit(
+    given: Given | None, name: str, kind: str, values: Mapping[str, object], why: str
+) -> str:
+    """Say that a parameter is no value of the input that it is, or is a field of."""
+    from bt_actions.messages.conversion import show
+
+    assert given is not None
+    whole = name.partition(".")[0]
+    name = next((each for each in values if each.startswith(f"{name}.")), name)
+    while name not in values and "." in name:  # the item of a list, a field of a text
+        name, _, below = name.rpartition(".")
+        why = f"{below}: {why}"
+    value = f" is {show(values[name])}, and" if name in values else ":"
+    of = "" if name == whole else f" {whole!r}"
+    text = f"--ros-args: the parameter {name!r}{value} the input{of} is {kind}: {why}"
+    if "a text is needed" not in why:
+        return text
+    given_value = values.get(name)
+    written = f"'{given.written.get(name, str(given_value).lower())}'"
+    if isinstance(given_value, list):
+        written = str([str(each).lower() for each in given_value])
+    return f'{text}; quotes make it one: -p "{name}:={written}"'
 
 
-def _read(value: object, kind: str) -> object:
-    """Read the texts within a message that stand for arrays of messages, as `run` shows them."""
-    from bt_actions.document.language.types import parse_type
+def _over(value: Any, fields: Any, kind: FieldType | None) -> Any:
+    """Return a value with some fields of it replaced, whatever way it is written."""
+    from bt_actions.messages.conveniences import ANGLES
+    from bt_actions.messages.conversion import fill_value, to_plain
+    from bt_actions.messages.fields import Message, describe
+
+    if not isinstance(fields, dict) or not isinstance(kind, Message):
+        return fields
+    angles = isinstance(value, Mapping) and not value.keys().isdisjoint(ANGLES)
+    if value is None:
+        value = {}
+    elif not isinstance(value, Mapping) or (angles and fields.keys().isdisjoint(ANGLES)):
+        value = to_plain(fill_value(kind, value))
+    kinds = describe(kind.cls)
+    return {
+        **value,
+        **{name: _over(value.get(name), each, kinds.get(name)) for name, each in fields.items()},
+    }
+
+
+def _read(value: Any, kind: FieldType | None) -> Any:
+    """Read the texts that stand for what is no parameter: a message, a list of them, a uint64."""
+    from bt_actions.document.language.values import names_file, read_data
     from bt_actions.document.reading.inputs import parse_text
-    from bt_actions.messages.fields import Listing, Message, describe
+    from bt_actions.messages.fields import Listing, Message, Scalar, describe
 
-    def read(inner: object, field: object) -> object:
-        if isinstance(inner, dict) and isinstance(field, Message):
-            kinds = describe(field.cls)
-            return {name: read(item, kinds.get(name)) for name, item in inner.items()}
-        if isinstance(inner, str) and isinstance(field, Listing):
-            return parse_text(inner)
-        return inner
+    if isinstance(value, dict) and isinstance(kind, Message):
+        kinds = describe(kind.cls)
+        return {name: _read(each, kinds.get(name)) for name, each in value.items()}
+    is_yaml = isinstance(kind, Message | Listing) or kind == Scalar("uint64")
+    if not isinstance(value, str) or not is_yaml:
+        return value
+    data = read_data(Path(value[1:]), pipes=True) if names_file(value) else parse_text(value)
+    return {} if data is None else data
 
-    return read(value, parse_type(kind)) if isinstance(value, dict) else value
+
+def _nodes_in(path: Path) -> Iterator[str]:
+    """Return the nodes, and patterns of them, that a file of parameters has sections for."""
+    from bt_actions.document.language.values import read_data
+
+    with contextlib.suppress(ValueError, OSError):
+        waiting: list[tuple[str, object]] = [("", read_data(path))]
+        while waiting:
+            name, section = waiting.pop(0)
+            if isinstance(section, Mapping):
+                if "ros__parameters" in section:
+                    yield name
+                waiting += [
+                    (f"{name}/{str(each).strip('/')}", inner)
+                    for each, inner in section.items()
+                    if each != "ros__parameters"
+                ]

@@ -7,6 +7,7 @@ tree. What the server tells at the end is shown as if the tree had run here.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import uuid
 from typing import TYPE_CHECKING
@@ -61,7 +62,9 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         keep_results_apart()
     goal_name = f"bt-actions call {uuid.uuid4().hex[:12]}"
-    inputs = nested(parameters(args.ros_args, args.namespace)) | goal_fields(args.set, "--set")
+    name = f"bt_actions_{os.getpid()}_call"
+    given = parameters(args.ros_args, name, args.namespace)
+    inputs = nested(dict(given.values) if given else {}) | goal_fields(args.set, "--set")
     leaf = _leaf(args.tree, args.server, inputs, goal_name)
 
     from bt_actions.cli.driving.session import Session
@@ -69,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from bt_actions.cli.views.served_run import CallJsonView, CallView, Rejected
 
     rejection = Rejected(leaf, goal_name)
-    with Session(leaf, namespace=args.namespace) as session:
+    with Session(leaf, namespace=args.namespace, name=name) as session:
         view: View = CallView(session.report, leaf, sys.stdout, feedback=True)
         if args.json:
             view = as_json = session.json_view(CallJsonView)

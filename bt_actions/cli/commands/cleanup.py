@@ -6,9 +6,9 @@ import argparse
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.options import seconds
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.driving.sweep import sweep
-from bt_actions.cli.exits import BadInput
+from bt_actions.cli.exits import BadInput, importing_ros, starting_ros
 
 if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
@@ -35,7 +35,7 @@ in a launch file:
 exit codes:
   0 no server in sight has a goal that was left (should none take longer to accept one: --accept)
   3 the end of a goal is unknown, or no action server is in sight, or one is silent; with an ACTION,
-  where its server is (of others it is told)
+  where its server is (others are not asked)
   129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
 """
 
@@ -81,5 +81,10 @@ def run(args: argparse.Namespace) -> int:
     for name in args.actions:
         if why := why_not(name):
             raise BadInput(f"{name!r} cannot be the name of an action server: {why}")
-    parameters(args.ros_args)
-    return sweep(args.look, args.patience, args.actions or None, accept=args.accept)
+    with importing_ros():
+        from bt_actions.ros.naming import server_names
+        from bt_actions.ros.onlooker import NODE
+    no_parameters(args.ros_args, "cleanup", NODE)
+    with starting_ros():
+        wanted = server_names(args.actions, NODE) if args.actions else None
+    return sweep(args.look, args.patience, wanted, accept=args.accept)

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import add_option
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.exits import Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart, results
 from bt_actions.cli.streams.writing import note
@@ -21,8 +21,8 @@ examples:
   bt-actions list --namespace /r1
   bt-actions list --json
 
-`bt-actions call TREE` has one run. Exit codes: 0, or 1 where no server is in sight within 5 s, or
-one does not answer.
+`bt-actions call TREE` has one run, and `bt-actions control` pauses, resumes or halts a run.
+Exit codes: 0, or 1 where no server is in sight within 5 s, or one does not answer.
 """
 _STATES = ("OK", "KEPT_LAST_GOOD", "INVALID")
 
@@ -42,7 +42,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask all servers in sight, and print what they say."""
-    parameters(args.ros_args, args.namespace)
+    no_parameters(args.ros_args, "list", "bt_actions_asks")
     keep_results_apart()
     with importing_ros():
         from bt_actions.serving.asking import trees_in_sight
@@ -78,6 +78,7 @@ def tree_data(tree: Any) -> dict[str, Any]:
             for one in tree.findings
         ],
         "running": [bytes(each.uuid).hex() for each in tree.running],
+        "paused": [bytes(each.uuid).hex() for each in tree.paused],
         "inputs": [
             {
                 "name": clean(one.name),
@@ -99,13 +100,22 @@ def text_of(servers: dict[str, list[dict[str, Any]] | None]) -> list[str]:
         lines.append(server)
         for tree in trees or ():
             said = [tree["description"]] if tree["description"] else []
-            said += [f"({len(tree['running'])} running)"] if tree["running"] else []
             lines.append("  ".join([f"  {tree['name']}", *said]))
             for each in tree["inputs"]:
                 unit = f" [{each['unit']}]" if each["unit"] else ""
                 default = "" if each["required"] else f" = {each['default_json']}"
                 about = f"  {each['description']}" if each["description"] else ""
                 lines.append(f"    {each['name']}: {each['type']}{unit}{default}{about}")
-            wrong = tree["findings"]
-            lines += [f"    {tree['state']}: {one['message']}  {one['place']}" for one in wrong]
+            paused = tree["paused"]
+            lines += [
+                f"    {'paused' if each in paused else 'running'}: {each}"
+                for each in tree["running"]
+            ]
+            lines += [_finding_text(tree["state"], each) for each in tree["findings"]]
     return lines
+
+
+def _finding_text(state: str, finding: dict[str, str]) -> str:
+    if finding["code"] == "SAME_NAME":  # nothing is wrong with the tree; the text has both files
+        return f"    WARNING: {finding['message']}"
+    return f"    {state}: {finding['message']}  {finding['place']}"

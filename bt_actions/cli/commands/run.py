@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
     from bt_actions.cli.arguments.parser import Subparsers
+    from bt_actions.ros.arguments import Given
     from bt_actions.ros.naming import Outlook
     from bt_actions.simulation.faults import Fault
 
@@ -116,17 +117,22 @@ def run(args: argparse.Namespace) -> int:
         keep_results_apart()
     _refuse_without_sim(args)
     faults = _faults(args.fault)
-    given = parameters(args.ros_args, args.namespace)
-    root = load(args.tree, args.set, python=args.python, parameters=given)
+    root = load(
+        args.tree,
+        args.set,
+        python=args.python,
+        parameters=(lambda tree: _given(args, tree)) if args.ros_args else None,
+    )
 
+    cleans_up = args.cleanup_first and not args.sim  # which is private
+    servers = _servers(args, root) if cleans_up else []
     outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name
     try:
         from bt_actions.cli.driving.session import Session, SimulationWish
         from bt_actions.document import tree_name
-        from bt_actions.ros.naming import node_name as node_name_of
 
-        if args.cleanup_first and not args.sim:  # which is private
-            code = _clean_up(_actions(root), args.namespace)
+        if cleans_up:
+            code = _clean_up(servers)
             if code is not Exit.SUCCESS:
                 outlook.close()
                 return code
@@ -139,11 +145,24 @@ def run(args: argparse.Namespace) -> int:
         executor=args.executor,
         namespace=args.namespace,
         simulation=wish,
-        name=args.name or node_name_of(tree_name(root)),
+        name=_node_name(args, tree_name(root)),
         outlook=outlook,
     ) as session:
         view = session.view(as_json=args.json, plain=args.plain, verbose=args.verbose)
         return session.run(view, timeout=args.timeout, part_at=args.check_part)
+
+
+def _node_name(args: argparse.Namespace, tree: str) -> str:
+    """Return the name that the node of the run is to have, before remapping."""
+    from bt_actions.ros.naming import node_name as name_for
+
+    name: str = args.name or name_for(tree)
+    return name
+
+
+def _given(args: argparse.Namespace, tree: str) -> Given | None:
+    with importing_ros():
+        return parameters(args.ros_args, _node_name(args, tree), args.namespace)
 
 
 def _outlook() -> Outlook:
@@ -153,19 +172,24 @@ def _outlook() -> Outlook:
         return Outlook()
 
 
-def _actions(root: Behaviour) -> set[str]:
-    """Return the names of the actions that a tree uses, as they are given."""
+def _servers(args: argparse.Namespace, root: Behaviour) -> list[str]:
+    """Return the full names of the servers that the run will send goals to."""
     from bt_actions.behaviours.action import ActionBehaviour
+    from bt_actions.document import tree_name
 
-    return {leaf.action_name for leaf in root.iterate() if isinstance(leaf, ActionBehaviour)}
+    actions = {each.action_name for each in root.iterate() if isinstance(each, ActionBehaviour)}
+    name = _node_name(args, tree_name(root))
+    with importing_ros():
+        from bt_actions.ros.naming import server_names
+    with starting_ros():
+        return server_names(actions, name, args.namespace)
 
 
-def _clean_up(wanted: set[str], namespace: str) -> Exit:
+def _clean_up(wanted: list[str]) -> Exit:
     """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
     from bt_actions.cli.driving.sweep import sweep
 
-    instead = "run without --cleanup-first"
-    return sweep(look=5.0, patience=5.0, wanted=wanted, namespace=namespace, first=instead)
+    return sweep(look=5.0, patience=5.0, wanted=wanted, first="run without --cleanup-first")
 
 
 def _refuse_without_sim(args: argparse.Namespace) -> None:

@@ -6,11 +6,12 @@ It is a tree of one leaf, so that the goal has the same life, deadlines and end 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.options import add_option
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.arguments.values import goal_fields
 from bt_actions.cli.exits import BadInput
 
@@ -67,14 +68,15 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Send the goal that `args` describe, and see it to its end."""
     leaf = _leaf(args.server, args.type, goal_fields(args.fields))
-    parameters(args.ros_args, args.namespace)
+    name = f"bt_actions_{os.getpid()}_send"
+    no_parameters(args.ros_args, "send", name, args.namespace)
 
     from bt_actions.cli.driving.session import Session
     from bt_actions.cli.views.lines import QuietView
     from bt_actions.cli.views.one_goal import GoalView
     from bt_actions.cli.views.view import View
 
-    with Session(leaf, namespace=args.namespace) as session:
+    with Session(leaf, namespace=args.namespace, name=name) as session:
         view: View = GoalView(session.report, leaf, sys.stdout, feedback=args.feedback)
         if args.quiet:
             view = QuietView(session.report, sys.stdout)

@@ -1,7 +1,8 @@
 """`bt-actions serve`: trees in folders as one action, for other nodes to run by name, until Ctrl-C.
 
-Prints one line: `ready: ...` when goals are accepted, `unconfigured: ...` with --managed. What
-happens to goals goes to the log.
+Prints one line: `ready: ...` when goals are accepted, `unconfigured: ...` with --managed. Where
+another server of the action comes first, `waiting: ...` is printed before. What happens to goals
+goes to the log.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import MOST, add_option, count
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters, taken
 from bt_actions.cli.driving.serving import say, serve
 from bt_actions.cli.driving.signals import SAME_WISH
 from bt_actions.cli.driving.sweep import sweep
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, refuse_domain
 from bt_actions.cli.streams.writing import note
-from bt_actions.utilities.suggest import did_you_mean, listing
+from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
@@ -37,6 +38,7 @@ examples:
 
 The action is `run_tree`, of type bt_actions_interfaces/action/RunTree; a tree's name is its file's.
 A goal with an unknown tree or wrong inputs is rejected, and `~/rejections` and the log say why.
+Where another server of the action is there already, this one waits until that is gone.
 After a crash, the goals that the killed server left are canceled first; where nobody can see what
 was left, it ends with exit code 3.
 Ctrl-C and SIGTERM end it: all goals are canceled and drained first. A second Ctrl-C leaves at once
@@ -44,6 +46,9 @@ and says which goals are not accounted for (exit code 3).
 """
 
 _POLICIES = ("reject", "queue", "replace", "parallel")
+_ONE_AT_A_TIME = ("reject", "replace")
+_NAMED = 3
+"""Of several files of one name, how many are told where it is ready; the log has them all."""
 _LISTS = {"trees": "DIR", "python": "PACKAGE"}
 _HELP = {
     "trees": "a folder of trees, or package://NAME/trees; repeatable; nothing outside is read; "
@@ -84,7 +89,9 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it, or the executor dies."""
-    options = _options(args, parameters(args.ros_args, args.namespace, name=NAME))
+    given = parameters(args.ros_args, NAME, args.namespace)
+    what = "parameter of bt-actions serve"
+    options = _options(args, taken(given, _HELP, what, other_users=True))
     code = _clean_up()
     if code is not Exit.SUCCESS:
         return code
@@ -146,7 +153,8 @@ def _clean_up() -> Exit:
     if not left:
         return Exit.SUCCESS
     actions = sorted(set().union(*left.values()))
-    note(f"bt-actions serve: one was killed while a tree ran; cleaning up: {listing(actions)}")
+    before = "an earlier one ended before it knew how its goals had ended"
+    note(f"bt-actions serve: {before}; cleaning up: {listing(actions)}")
     files = listing(map(str, left))
     instead = f"remove {files} if it will not come back, and nothing moves"
     code = sweep(look=1.0, patience=5.0, wanted=actions, first=instead)
@@ -160,15 +168,12 @@ def _clean_up() -> Exit:
 
 def _options(args: argparse.Namespace, given: Mapping[str, object]) -> dict[str, Any]:
     """What is served and how: of the command line, or else of the parameters. Raises BadInput."""
-    for name in given:
-        if name not in _HELP and (near := did_you_mean(name, _HELP)):
-            raise BadInput(f"--ros-args: there is no parameter {name!r}{near}")
     options = {name: getattr(args, name) for name in _HELP}
     for name, option in options.items():
-        if option is None and given.get(name) is not None:
+        if option is None and name in given:
             options[name] = _checked(name, given[name])
     policy = options["policy"] = options["policy"] or "reject"
-    if options["max"] is not None and policy in ("reject", "replace"):
+    if options["max"] is not None and policy in _ONE_AT_A_TIME:
         raise BadInput(f"--max is for the policies queue and parallel, and this is {policy}")
     defaults = {"trees": ["trees"], "max": 10, "python": [], "managed": False}
     return {name: options[name] or defaults.get(name) for name in _HELP} | {"policy": policy}
@@ -195,15 +200,22 @@ def _server(node: Any, options: Mapping[str, Any]) -> TreeServer:
     from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 
     from bt_actions.document import TreeNotFoundError
+    from bt_actions.ros.parameters import declare, typed
     from bt_actions.serving import TreeServer
 
     for name, value in options.items():
-        descriptor = ParameterDescriptor(description=_HELP[name], read_only=True)
+        if name == "max" and options["policy"] in _ONE_AT_A_TIME:
+            continue  # or else what is shown could not be given
+        descriptor = ParameterDescriptor(description=_HELP[name])
         if name == "policy":
             descriptor.additional_constraints = listing(_POLICIES)
         elif name == "max":
             descriptor.integer_range = [IntegerRange(from_value=1, to_value=MOST, step=1)]
-        node.declare_parameter(name, value, descriptor, ignore_override=True)
+        try:
+            declare(node, typed(name, value), descriptor)
+        except UnicodeEncodeError as error:
+            words = listing([value] if isinstance(value, str) else value)
+            raise BadInput(f"--{name}: {words} is no UTF-8, as ROS wants it") from error
     try:
         return TreeServer(
             node,
@@ -221,11 +233,17 @@ def _announce(server: TreeServer, *, managed: bool) -> None:
     if managed:
         say(f"unconfigured: {server.node.get_fully_qualified_name()}")
         return
+    from bt_actions.serving.story import warnings_of
+
     assert server.lifecycle is not None
     server.lifecycle.change("configure")
     server.lifecycle.change("activate")
     entries = server.catalog.entries()
     broken = [each.name for each in entries if each.tree is None]
     more = f", {len(broken)} broken: {listing(broken)}" if broken else ""
+    if warnings := [one.message for each in entries for one in warnings_of(each)]:
+        more += f"; {listing(warnings, _NAMED)}"
     name = f"{server.node.get_namespace().rstrip('/')}/run_tree"
-    say(f"ready: {name}, {len(entries) - len(broken)} trees{more}")
+    ready = f"ready: {name}, {len(entries) - len(broken)} trees{more}"
+    server.precedence.regained = lambda: say(ready)
+    say(f"waiting: {server.precedence.why}" if server.precedence.yields() else ready)

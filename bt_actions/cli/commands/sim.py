@@ -10,7 +10,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import add_option, count, seconds, speed
-from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.driving.serving import say, serve
 from bt_actions.cli.exits import BadInput, Exit
 
@@ -91,7 +91,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it, or the executor dies."""
-    parameters(args.ros_args)
+    no_parameters(args.ros_args, "sim", "simulation")
     return serve(
         "sim",
         lambda node: _simulation(node, args),

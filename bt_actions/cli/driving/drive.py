@@ -30,6 +30,7 @@ from bt_actions.cli.streams.writing import discard_stdout, note
 from bt_actions.cli.views.lines import QuietView
 from bt_actions.cli.views.view import View
 from bt_actions.cli.views.words import Closing, waiting_text
+from bt_actions.running.loop import UnusableTree
 from bt_actions.running.report import Report
 
 if TYPE_CHECKING:
@@ -291,7 +292,8 @@ class Drive:
         ]
         if self._abandoned:
             lines += [
-                f"{row.path[-1]} on {row.server}, goal {goal_id}, {state.lower()} when left"
+                f"{self._report.called(row.behaviour)} on {row.server}, goal {goal_id}, "
+                f"{state.lower()} when left"
                 for row in self._report.live
                 for goal_id, state in row.live.items()
                 if goal_id not in goals
@@ -305,6 +307,8 @@ class Drive:
             return Exit.UNKNOWN
         if self._stop is not None:
             return self._stop.code
+        if isinstance(self._error, UnusableTree):
+            return Exit.BAD_INPUT
         if self._error is not None or self._report.status is not Status.SUCCESS:
             return Exit.FAILURE
         return Exit.SUCCESS

@@ -24,7 +24,6 @@ def sweep(
     look: float,
     patience: float,
     wanted: Collection[str] | None = None,
-    namespace: str = "",
     *,
     accept: float = 0.0,
     first: str = "",
@@ -32,11 +31,12 @@ def sweep(
     """Clean up, saying what is found and how it ended; `first`: another run is to follow,
     and this is what to do where that is not wanted.
 
-    Where not every server of one of the `wanted` actions answers, or none of any action is in
-    sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread only.
+    Where not every server of one of the `wanted` actions, which are full names, answers, or none of
+    any action is in sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread
+    only.
     """
     with _Stop() as stop:
-        swept = _sweep(stop, look, patience, accept, wanted, namespace)
+        swept = _sweep(stop, look, patience, accept, wanted)
         stop.is_told = stop.signal is not None
         if swept.elsewhere:
             goals = (f"{goal_id.hex()} on {action}" for goal_id, action in swept.elsewhere.items())
@@ -69,7 +69,6 @@ def _sweep(
     patience: float,
     accept: float,
     wanted: Collection[str] | None,
-    namespace: str,
 ) -> Swept:
     """Look, and cancel; return what was seen."""
     with importing_ros():
@@ -102,7 +101,6 @@ def _sweep(
             accept=accept,
             found=found,
             wanted=wanted,
-            namespace=namespace,
             waits=waits,
             stopped=lambda: stop.signal is not None,
         ).run()

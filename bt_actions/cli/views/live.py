@@ -1,4 +1,4 @@
-"""The tree, drawn live at the bottom of a terminal, under a third of its height.
+"""The tree, drawn live at the bottom of a terminal, in all of its height but some lines.
 
 Finished work scrolls by once above it. Drawn from the main thread, about ten times a second.
 What the C libraries write to standard error meanwhile is caught and scrolls by too, or it would
@@ -48,6 +48,8 @@ _LEFT_FOR = {
 }
 
 
+SCROLLS = 8
+"""Lines above the drawing that stay for what scrolls by; of a low terminal, two thirds."""
 NARROW = 60
 """Columns below which levels are indented by one space instead of two."""
 BAR = 20
@@ -153,7 +155,8 @@ class LiveView:
             self._console.print(Text("\n").join(lines), soft_wrap=True)
 
     def _finished(self, node: Behaviour, status: Status, message: str) -> Text:
-        text = Text.assemble((self._glyph(status), _STYLES[status]), " ", node.name)
+        text = Text.assemble((self._glyph(status), _STYLES[status]), " ")
+        text.append(clean(self._report.called(node)))
         action = render.action_of(node)
         if action is None:
             text.append(f"  {clean(message)}" if message else "", style="dim")
@@ -164,8 +167,9 @@ class LiveView:
         return text
 
     def _lines(self) -> list[Text]:
-        """The progress line, and as many nodes as a third of the screen takes."""
-        most = max(1, (self._console.height - 1) // 3)
+        """The progress line, and as many nodes as there is room for."""
+        height = self._console.height - 1
+        most = max(1, height // 3, height - SCROLLS)
         lines = [self._progress()]
         running = self._running_nodes()
         shown, hidden = choose(self._nodes, self._position, running, max(0, most - 1))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.one_goal import GoalView
+from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
 
 if TYPE_CHECKING:
@@ -60,7 +61,8 @@ class CallView(GoalView):
         message = self._leaf.progress().feedback
         if message is None:
             return ""
-        return ", ".join(_leaf_text(each) for each in message.running)
+        running = ", ".join(_leaf_text(each) for each in message.running)
+        return f"paused{': ' if running else ''}{running}" if message.paused else running
 
     def result_lines(self) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""
@@ -71,9 +73,10 @@ class CallView(GoalView):
         if result is None:
             return []
         actions = [_action(each) for each in result.actions]
+        names = told_apart(tuple(each["path"].split(" / ")) for each in actions)
         body = [
             (
-                str(each["path"]).rpartition(" / ")[2],
+                names[tuple(each["path"].split(" / "))],
                 str(each["server"]),
                 str(each["attempts"]),
                 str(each["outcome"]),

@@ -13,7 +13,13 @@ STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 def table(report: Report, width: int | None = None) -> list[str]:
     """Return the table of actions as lines; names are cut so that lines fit into `width`."""
     body = [
-        (row.path[-1], row.server, _tries(row), verdict(row), f"{row.seconds(report.now):.2f} s")
+        (
+            report.called(row.behaviour),
+            row.server,
+            _tries(row),
+            verdict(row),
+            f"{row.seconds(report.now):.2f} s",
+        )
         for row in report.rows
     ]
     return columns(body, width) if body else []

@@ -135,16 +135,16 @@ def waiting_text(report: Report) -> str:
     if rows:
         goals = sum(row.waited_for for row in rows)
         count = "1 goal" if goals == 1 else f"{goals} goals"
-        return f"waiting to know the end of {count}: {_where(rows)}"
+        return f"waiting to know the end of {count}: {_where(report, rows)}"
     rows = [row for row in report.rows if row.left_at_server]
     if rows:
         what = "looking out for a server that went away, to cancel its goal if it is back"
-        return f"{what}: {_where(rows)}"
+        return f"{what}: {_where(report, rows)}"
     return ""
 
 
-def _where(rows: list[Row]) -> str:
-    which = ", ".join(f"{row.path[-1]} on {row.server}" for row in rows[:MOST])
+def _where(report: Report, rows: list[Row]) -> str:
+    which = ", ".join(f"{report.called(row.behaviour)} on {row.server}" for row in rows[:MOST])
     return f"{which} and {len(rows) - MOST} more" if len(rows) > MOST else which
 
 

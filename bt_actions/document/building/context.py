@@ -177,6 +177,8 @@ def _numbers(
     for part in path:
         inner = fields.describe(kind.cls) if isinstance(kind, fields.Message) else {}
         kind = inner.get(part)
+    if kind == fields.Scalar("float32"):  # which is read by the fewest digits that give it
+        return None
     item = kind.item if isinstance(kind, fields.Listing) and kind.size is None else kind
     if not isinstance(item, fields.Scalar) or item.name not in _NUMBERS:
         return None

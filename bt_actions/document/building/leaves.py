@@ -17,7 +17,7 @@ from bt_actions.behaviours.service import CallService
 from bt_actions.behaviours.topics import Publish, WaitForMessage
 from bt_actions.document.building.context import Context, Root, plain_name, table_of, written_text
 from bt_actions.document.language.classes import ClassError, make_behaviour, refusal
-from bt_actions.document.language.values import Computed, computed_in
+from bt_actions.document.language.values import Computed, computed_in, spoken
 from bt_actions.document.reading.settings import server_of, settings_of, text_of
 from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.yaml.nodes import span_of
@@ -204,7 +204,8 @@ def _set(node: TreeNode, context: Context) -> Behaviour:
 def _log(node: TreeNode, context: Context) -> Behaviour:
     name = node.name or plain_name(f"log {written_text(node)}")
     level = text_of(node.values, "level") or "info"
-    return Log(name, context.value(node.values["log"]), level)
+    text = node.values["log"]
+    return Log(name, lambda: spoken(text, context.read), level)
 
 
 def _python(node: TreeNode, context: Context) -> Behaviour:

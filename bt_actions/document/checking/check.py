@@ -6,6 +6,7 @@ from bt_actions.document.checking.actions import check_actions, check_defaults, 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.declarations import check_declarations
 from bt_actions.document.checking.kinds import CHECKS
+from bt_actions.document.checking.names import check_names
 from bt_actions.document.reading.tree import TreeNode
 
 __all__ = ["check_document"]
@@ -20,6 +21,7 @@ def check_document(checker: Checker) -> None:
         checker.reader = node
         _check_node(checker, node)
     check_defaults(checker)
+    check_names(checker)
 
 
 def _check_node(checker: Checker, node: TreeNode) -> None:

@@ -12,11 +12,13 @@ from collections.abc import Mapping as MappingType
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from bt_actions.document.checking.infer import BOOL, TEXT, Wrong, infer, named
+from bt_actions.document.checking.infer import Wrong, infer
 from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
+from bt_actions.document.checking.value_types import BOOL, TEXT, named
 from bt_actions.document.checking.variables import infer_variables, items_inside, type_of
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
+from bt_actions.document.language.bare import warn_bare_angle, warn_bare_duration
 from bt_actions.document.language.types import Either, TypeNameError, fits, interface_of, misfits
 from bt_actions.document.language.values import (
     BAD,
@@ -35,8 +37,9 @@ from bt_actions.document.reading.writes import Write, writes_of
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError
-from bt_actions.messages.conversion import examine
+from bt_actions.messages.conversion import ANGLE, examine
 from bt_actions.messages.fields import FieldType, Message, describe
+from bt_actions.messages.interfaces import DURATION, interface_name
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
@@ -257,14 +260,11 @@ class Checker:
                     text = f"{named(wanted)} is needed, and this is a text"
                     self.source.report("BT204", span_of(item.node), text)
                 return True
-            if isinstance(item, (int, float)) and wanted == TEXT:
+            may_need_more = wanted == TEXT or wanted is ANGLE or isinstance(wanted, Message)
+            if may_need_more and isinstance(item, (int, float)):
                 at = locate(node, path)
                 if isinstance(at, Scalar) and at.value == item:  # else it comes from a file
-                    self.source.report(
-                        "BT204", span_of(at), f"a text is needed, not {at.text}",
-                        hint=f'put it in quotes: "{at.text}"',
-                    )  # fmt: skip
-                    return True
+                    return self._bare_number(at, item, wanted)
             return item is BAD
 
         for problem in examine(kind, value, hole):
@@ -275,6 +275,20 @@ class Checker:
                 text = f"{at.text}: {problem}"
             meant = None if problem.at_key else marked_here(at, self.source, known)
             self.source.report(code, span_of(at), text, hint=_trap(at) or meant)
+
+    def _bare_number(self, at: Scalar, number: float, wanted: FieldType) -> bool:
+        """Warn of a number that is likely to need a unit; report one in the place of a text."""
+        if wanted == TEXT:
+            self.source.report(
+                "BT204", span_of(at), f"a text is needed, not {at.text}",
+                hint=f'put it in quotes: "{at.text}"',
+            )  # fmt: skip
+            return True
+        if wanted is ANGLE:
+            warn_bare_angle(at, number, self.source)
+        elif isinstance(wanted, Message) and interface_name(wanted.cls) == DURATION:
+            warn_bare_duration(at, number, self.source)
+        return False
 
     def finite(self, value: object, node: Node) -> None:
         """Check that no number of an input's value is infinite."""
@@ -354,6 +368,10 @@ class Checker:
             known = listing(f"${known}" for known in self.variables)
             nothing = None if maybe else "this tree has no inputs and saves nothing"
             hint = f"this tree has {known}" if known else nothing
+            if computed.expression.reads_field_of(name):
+                declared = f"topics: {{{name}: {{topic: {name}, type: package/msg/Name}}}}"
+                has = f"{hint}; " if known else ""
+                hint = f"{has}the messages of a topic are declared: {declared}"
         self.source.report("BT202", span, f"there is no variable ${name}{near}", hint=hint)
 
 

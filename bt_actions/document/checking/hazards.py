@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 
 from bt_actions.document.checking.checker import Checker
+from bt_actions.document.checking.missing import find_missing
 from bt_actions.document.checking.order import find_early_reads
 from bt_actions.document.checking.verdicts import BEGUN, Verdicts
 from bt_actions.document.findings import Related, Span
@@ -55,6 +56,7 @@ class _Hazards:
         self._walk(root, bounded=False)
         self._result_timeouts()
         find_early_reads(self._checker, self._doubts, root)
+        find_missing(self._checker, self._doubts, root)
         self._unused()
 
     def _report(self, code: str, span: Span, message: str, **more: object) -> None:
@@ -229,7 +231,7 @@ class _Hazards:
             (name, read)
             for read in reads
             for name in read.expression.variables
-            if name in self._document.topics
+            if name in self._document.topics and name not in read.expression.asked
         )
         topic, first = next(of_topics, ("", None))
         if first is None or self._doubts.below(node):

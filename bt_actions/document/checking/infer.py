@@ -6,8 +6,25 @@ Says what is wrong with it through a callback; an unknown type is None and never
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
+from bt_actions.document.checking.ranges import never_held
+from bt_actions.document.checking.value_types import (
+    BOOL,
+    FLOAT,
+    INTEGER,
+    ONE_VALUE,
+    TEXT,
+    common_type,
+    comparable,
+    has_length,
+    is_number,
+    is_text,
+    joined,
+    named,
+    type_of_literal,
+    unjoinable,
+)
 from bt_actions.document.language.types import Either, Record
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.values import BINARY, LENGTHS, bounded, number, reason
@@ -25,13 +42,8 @@ from bt_actions.messages.fields import (
 from bt_actions.messages.interfaces import UnknownInterface
 from bt_actions.utilities.suggest import what_it_has
 
-__all__ = [
-    "BOOL", "FLOAT", "INTEGER", "TEXT", "Wrong", "common_type", "infer", "named",
-    "type_of_literal",
-]  # fmt: skip
+__all__ = ["Wrong", "infer"]
 
-_NUMBERS = frozenset({*INTEGERS, *FLOATS})
-BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
 Wrong = tuple[str, str, int, int]
 """A rule's code, a message, and the columns in the expression's text."""
 
@@ -51,68 +63,6 @@ def infer(
     return inference.any_type_of(expression.tree), inference.wrong
 
 
-def type_of_literal(value: object) -> FieldType | None:
-    """The type of plain data, where it has one."""
-    if isinstance(value, bool):
-        return BOOL
-    if isinstance(value, int):
-        return INTEGER
-    if isinstance(value, float):
-        return FLOAT
-    if isinstance(value, list):
-        same = common_type([type_of_literal(item) for item in value])
-        return None if same is None or isinstance(same, Either) else Listing(same, size=len(value))
-    if isinstance(value, dict):
-        return Record(tuple((str(name), type_of_literal(item)) for name, item in value.items()))
-    return TEXT if isinstance(value, str) else None
-
-
-def common_type(kinds: Sequence[FieldType | None]) -> FieldType | None:
-    """The type of an item of a list whose items have these types; None where one is not known.
-
-    Where all are records, it is one with the keys of all.
-    """
-    known = [kind for kind in dict.fromkeys(kinds) if kind is not None]
-    if not known or None in kinds:
-        return None
-    records = [kind for kind in known if isinstance(kind, Record)]
-    if len(records) == len(known):
-        return _merged(records)
-    lists = [kind for kind in known if isinstance(kind, Listing)]
-    if len(lists) == len(known):
-        item = common_type([kind.item for kind in lists])
-        sizes = {kind.size for kind in lists}
-        size = sizes.pop() if len(sizes) == 1 else None
-        return None if item is None or isinstance(item, Either) else Listing(item, size=size)
-    return known[0] if len(known) == 1 else Either(tuple(known))
-
-
-def _merged(records: Sequence[Record]) -> Record:
-    keys: dict[str, list[FieldType | None]] = {}
-    for record in records:
-        for name, kind in record.items:
-            keys.setdefault(name, []).append(kind)
-    sometimes = {name for name, found in keys.items() if len(found) < len(records)}
-    return Record(
-        tuple((name, common_type(found)) for name, found in keys.items()),
-        frozenset(sometimes.union(*(record.sometimes for record in records))),
-    )
-
-
-def named(kind: FieldType | None) -> str:
-    """A type with its article."""
-    text = str(kind)
-    return f"an {text}" if text[0] in "aeioAEIO" else f"a {text}"
-
-
-def _is_number(kind: FieldType | None) -> bool:
-    return isinstance(kind, Scalar) and kind.name in _NUMBERS
-
-
-def _is_text(kind: FieldType | None) -> bool:
-    return isinstance(kind, Scalar) and kind.name in ("string", "wstring")
-
-
 class _Inference:
     def __init__(
         self,
@@ -122,6 +72,8 @@ class _Inference:
         types: bool,
     ) -> None:
         self.wrong: list[Wrong] = []
+        self._fields: dict[ast.expr, tuple[type, str]] = {}
+        """The messages and fields that parts of the expression read."""
         self._types = types
         self._expression = expression
         self._roots = roots
@@ -148,6 +100,8 @@ class _Inference:
                 return self._constant(node, constant)
             case ast.Attribute(value=inner, attr=attr):
                 return self._field(node, self.any_type_of(inner), attr)
+            case ast.Subscript(value=inner, slice=ast.Slice(lower=start, upper=end)):
+                return self._slice(node, self.type_of(inner), [start, end])
             case ast.Subscript(value=inner, slice=index):
                 return self._item(node, self.type_of(inner), index)
             case ast.UnaryOp(op=ast.Not(), operand=inner):
@@ -204,13 +158,14 @@ class _Inference:
             return self._key(node, owner, name)
         if not isinstance(owner, Message):
             remedy = ""
-            if name in LENGTHS and isinstance(node, ast.Attribute) and _has_length(owner):
+            if name in LENGTHS and isinstance(node, ast.Attribute) and has_length(owner):
                 start, end = self._expression.span(node.value)
                 remedy = f": write len({self._expression.text[start:end]})"
             self._wrong(node, f"{named(owner)} has no field {name!r}{remedy}", "BT203")
             return None
         known = describe(owner.cls)
         if name in known:
+            self._fields[node] = owner.cls, name
             return known[name]
         if name in constants(owner.cls):
             return type_of_literal(constants(owner.cls)[name])
@@ -228,12 +183,14 @@ class _Inference:
 
     def _asks_for(self, name: str) -> bool:
         """Whether the expression asks if a key is there: ``'quick' in $item and $item.quick``."""
-        return any(
-            isinstance(part, ast.Compare)
-            and isinstance(part.left, ast.Constant)
-            and part.left.value == name
-            for part in ast.walk(self._expression.tree)
-        )
+        for part in ast.walk(self._expression.tree):
+            match part:
+                case ast.Compare(left=ast.Constant(value=asked)) if asked == name:
+                    return True
+                case ast.Call(func=ast.Name(id="known"), args=[ast.Attribute(attr=asked)]):
+                    if asked == name:
+                        return True
+        return False
 
     def _item(self, node: ast.expr, owner: FieldType | None, index: ast.expr) -> FieldType | None:
         kind = self.type_of(index)
@@ -242,21 +199,37 @@ class _Inference:
         literal = index.value if isinstance(index, ast.Constant) else None
         if isinstance(owner, Record) and isinstance(literal, str):
             return self._key(node, owner, literal)
-        if isinstance(owner, Record) and (kind is None or _is_text(kind)):
+        if isinstance(owner, Record) and (kind is None or is_text(kind)):
             return None
-        if isinstance(owner, Scalar) and _is_text(owner):
+        if isinstance(owner, Scalar) and is_text(owner):
             return TEXT
         if not isinstance(owner, Listing):
             field = isinstance(owner, Message) and isinstance(literal, str)
             remedy = f": write .{literal!s}" if field else ""
             self._wrong(node, f"{named(owner)} has no items{remedy}")
             return None
-        if kind is not None and not (isinstance(kind, Scalar) and kind.name in INTEGERS):
-            self._wrong(index, f"an index is a whole number, not {named(kind)}")
+        self._index(index, kind)
         size = owner.size
         if size is not None and isinstance(literal, int) and not -size <= literal < size:
             self._wrong(node, f"index {literal} is outside of {size} items")
         return owner.item
+
+    def _index(self, node: ast.expr, kind: FieldType | None) -> None:
+        if kind is not None and not (isinstance(kind, Scalar) and kind.name in INTEGERS):
+            self._wrong(node, f"an index is a whole number, not {named(kind)}")
+
+    def _slice(
+        self, node: ast.expr, owner: FieldType | None, bounds: list[ast.expr | None]
+    ) -> FieldType | None:
+        for bound in bounds:
+            if bound is not None:
+                self._index(bound, self.type_of(bound))
+        if owner is None or is_text(owner):
+            return owner
+        if isinstance(owner, Listing):
+            return Listing(owner.item)
+        self._wrong(node, f"{named(owner)} has no items")
+        return None
 
     def _truth(self, node: ast.expr) -> None:
         kind = self.type_of(node)
@@ -265,7 +238,7 @@ class _Inference:
 
     def _number(self, node: ast.expr) -> FieldType | None:
         kind = self.type_of(node)
-        if kind is not None and not _is_number(kind):
+        if kind is not None and not is_number(kind):
             self._wrong(node, f"a number is needed, not {named(kind)}")
             return None
         return kind
@@ -273,14 +246,8 @@ class _Inference:
     def _arithmetic(self, left: ast.expr, op: ast.operator, right: ast.expr) -> FieldType | None:
         if isinstance(op, ast.Add):
             first, second = self.type_of(left), self.type_of(right)
-            if _is_text(first) and (second is None or _is_text(second)):
-                return TEXT
-            if first is None and (second is None or _is_text(second)):
-                return TEXT if second is not None else None
-            for node, kind in ((left, first), (right, second)):
-                if kind is not None and not _is_number(kind):
-                    self._wrong(node, f"a number is needed, not {named(kind)}")
-                    return None
+            if not (is_number(first) and is_number(second)):
+                return self._joined((left, first), (right, second))
         else:
             first, second = self._number(left), self._number(right)
         if first is None or second is None:
@@ -289,6 +256,29 @@ class _Inference:
         if isinstance(op, ast.Div) or both & set(FLOATS):
             return FLOAT
         return _power(right, second) if isinstance(op, ast.Pow) else INTEGER
+
+    def _joined(self, *sides: tuple[ast.expr, FieldType | None]) -> FieldType | None:
+        """The type of a sum that is not known to be one of numbers."""
+        for (_, kind), (other, given) in (sides, sides[::-1]):
+            text = self._expression.text[slice(*self._expression.span(other))]
+            if isinstance(kind, Listing):
+                if given is not None and (said := unjoinable(kind, given)):
+                    remedy = "" if isinstance(given, Listing) else f": write [{text}]"
+                    if isinstance(other, ast.List) and is_text(kind.item):
+                        remedy = f": write [str({text[1:-1]})]" if len(other.elts) == 1 else ""
+                    self._wrong(other, f"{said}, not {named(given)}{remedy}")
+                    return None
+                return None if given is None else joined(kind, given)
+            if is_text(kind):
+                if given is not None and not is_text(given):
+                    remedy = f": write str({text})" if is_number(given) or given == BOOL else ""
+                    self._wrong(other, f"a text is joined with a text, not {named(given)}{remedy}")
+                    return None
+                return TEXT
+        for node, kind in sides:
+            if kind is not None and not is_number(kind):
+                self._wrong(node, f"a number is needed, not {named(kind)}")
+        return None
 
     def _computable(self, node: ast.BinOp) -> None:
         """Say what goes wrong whatever the variables are: `1 / 0 > $n`, `$n % 0`."""
@@ -306,33 +296,46 @@ class _Inference:
     def _compare(self, operands: list[ast.expr], ops: list[ast.cmpop]) -> None:
         kinds = [self.type_of(operand) for operand in operands]
         for at, op in enumerate(ops):
+            self._in_range(operands[at], op, operands[at + 1])
             first, second = kinds[at], kinds[at + 1]
             if first is None or second is None:
                 continue
             right = operands[at + 1]
             if isinstance(op, (ast.In, ast.NotIn)):
                 if isinstance(second, Listing):
-                    if not _comparable(first, second.item):
+                    if not comparable(first, second.item):
                         self._wrong(right, f"{named(first)} is never among {second.item}")
-                elif not (_is_text(first) and (_is_text(second) or isinstance(second, Record))):
+                elif not (is_text(first) and (is_text(second) or isinstance(second, Record))):
                     self._wrong(right, f"{named(second)} holds nothing that 'in' could look for")
-            elif not _comparable(first, second):
+            elif not comparable(first, second):
                 self._wrong(right, f"{named(first)} is never compared with {named(second)}")
             elif not isinstance(op, (ast.Eq, ast.NotEq)) and not (
-                _is_number(first) or _is_text(first)
+                is_number(first) or is_text(first)
             ):
                 self._wrong(
                     operands[at], f"{named(first)} is neither less nor greater than another"
                 )
 
+    def _in_range(self, left: ast.expr, op: ast.cmpop, right: ast.expr) -> None:
+        for field, other in ((left, right), (right, left)):
+            number = _number_of(other) if field in self._fields else None
+            if number is not None:
+                said = never_held(*self._fields[field], op, number, first=field is left)
+                if said:
+                    self._wrong(other, said, "BT321")
+
     def _call(self, name: str, args: list[ast.expr]) -> FieldType | None:
-        if name == "len":
+        if name in ONE_VALUE:
+            wanted, lacks, gives = ONE_VALUE[name]
             kind = self.type_of(args[0])
-            if not (kind is None or _has_length(kind)):
-                self._wrong(args[0], f"{named(kind)} has no length")
-            return INTEGER
-        if name == "abs":
-            return self._number(args[0])
+            if not (kind is None or wanted(kind)):
+                self._wrong(args[0], lacks.format(named(kind)))
+            return gives
+        if name in ("abs", "round"):
+            kind = self._number(args[0])
+            for digits in args[1:]:
+                self._index(digits, self.type_of(digits))
+            return INTEGER if name == "round" and len(args) == 1 else kind
         kinds = [self.type_of(arg) for arg in args]
         if len(kinds) == 1:
             only = kinds[0]
@@ -342,16 +345,12 @@ class _Inference:
         known = [(arg, kind) for arg, kind in zip(args, kinds, strict=True) if kind is not None]
         for arg, kind in known[1:]:
             first = known[0][1]
-            if not _comparable(first, kind):
+            if not comparable(first, kind):
                 self._wrong(arg, f"{named(first)} is never compared with {named(kind)}")
-        if all(_is_number(kind) for kind in kinds):
+        if all(is_number(kind) for kind in kinds):
             floats = any(isinstance(kind, Scalar) and kind.name in FLOATS for kind in kinds)
             return FLOAT if floats else INTEGER
         return kinds[0] if all(kind == kinds[0] for kind in kinds) else None
-
-
-def _has_length(kind: FieldType) -> bool:
-    return isinstance(kind, Listing | Record) or _is_text(kind)
 
 
 def _power(exponent: ast.expr, kind: FieldType) -> FieldType | None:
@@ -378,13 +377,3 @@ def _number_of(node: ast.expr) -> int | float | None:
     except (ValueError, ArithmeticError):
         pass  # told of that part itself
     return None
-
-
-def _comparable(first: FieldType, second: FieldType) -> bool:
-    if _is_number(first):
-        return _is_number(second)
-    if _is_text(first):
-        return _is_text(second)
-    if isinstance(first, Listing) and isinstance(second, Listing):
-        return _comparable(first.item, second.item)
-    return first == second

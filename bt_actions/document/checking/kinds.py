@@ -8,7 +8,7 @@ from types import MappingProxyType
 from py_trees.timers import Timer
 
 from bt_actions.document.checking.checker import Checker
-from bt_actions.document.checking.infer import FLOAT, INTEGER, named
+from bt_actions.document.checking.value_types import FLOAT, INTEGER, named
 from bt_actions.document.findings import Related
 from bt_actions.document.language.types import Record, TypeNameError, fits, misfits, parse_type
 from bt_actions.document.language.values import Computed, computed_in, constant_of, locate

@@ -128,13 +128,15 @@ class _Order:
         for read in self._checker.reads.get(id(node), ()):
             if self._known.issuperset(read.expression.variables):
                 continue
+            known = self._known | read.expression.asked
             for name, at in read.expression.variable_spans:
-                if name not in self._known and not self._may_be_written(name, own, around):
+                if name not in known and not self._may_be_written(name, own, around):
                     span = read.span(self._checker.source, *at)
                     self._report(name, span, f"nothing has written ${name} when this is read")
         for read in self._shared.get(node.alias, ()):
+            known = self._known | read.expression.asked
             for name in read.expression.variables:
-                if name not in self._known and not self._may_be_written(name, own, around):
+                if name not in known and not self._may_be_written(name, own, around):
                     text = f"nothing has written ${name} when {node.alias!r} reads it here"
                     self._report(name, span_of(node.key), text)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Container, Mapping, Sequence
 from typing import Protocol
 
-from bt_actions.document.checking.infer import Wrong, common_type, type_of_literal
+from bt_actions.document.checking.infer import Wrong
+from bt_actions.document.checking.value_types import common_type, type_of_literal
 from bt_actions.document.language.types import TypeNameError, parse_type
 from bt_actions.document.language.values import Computed, Interpolated
 from bt_actions.document.reading.tree import Declared, Document, TreeNode

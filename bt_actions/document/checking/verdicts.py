@@ -56,7 +56,9 @@ class Verdicts:
             return Can(False, False)
         if self._at_once and kind in ("log", "set", "publish", "wait_until"):
             return Can(True, False)
-        if kind in ("log", "wait"):
+        if kind == "log":
+            return Can(True, False)
+        if kind == "wait":
             return Can(True, bool(computed_in(node.values.get(kind))))
         if kind in ("set", "publish"):
             data = node.values.get("set" if kind == "set" else "message")

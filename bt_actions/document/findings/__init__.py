@@ -106,7 +106,9 @@ class DocumentError(ValueError):
 
 def _excerpt(finding: Finding, width: int) -> list[str]:
     """The source line with a caret under the exact range, cut where it is very long."""
-    text = (finding.source_line or "").replace("\t", " ")
+    text = finding.source_line or ""
+    if not text.isprintable():  # a tab, or the end of a line to some terminals
+        text = "".join(char if char.isprintable() else " " for char in text)
     gutter = " " * len(str(finding.line))
     room = max(20, width - len(gutter) - len("  | "))
     start = finding.column - 1

@@ -119,4 +119,65 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree("root: {python: py_trees.timers.Timer, arguments: {duration: 5.0}}\n"),
         tree("root: {wait: 5 s}\n"),
     ),
+    "BT317": Page(
+        "A bare number is seconds. From 500 on, milliseconds are as likely to be meant: other "
+        "tools have them. A unit says which.",
+        tree("root: {wait: 500}\n"),
+        tree("root: {wait: 500 ms}\n"),
+    ),
+    "BT318": Page(
+        "Roll, pitch and yaw are radians where they have no unit, and this is more than a full "
+        "turn. A unit says what is meant.",
+        tree("root:\n  publish: heading\n  type: geometry_msgs/msg/Quaternion\n"
+             "  message: {yaw: 90}\n"),
+        tree("root:\n  publish: heading\n  type: geometry_msgs/msg/Quaternion\n"
+             "  message: {yaw: 90 deg}\n"),
+    ),
+    "BT319": Page(
+        "The name of a node is fixed when the tree is loaded, and nothing is put into it: a "
+        "variable in it would be shown as it is written. A 'log' can show the value.",
+        tree("inputs: {part: string}\nroot:\n  sequence: Take $(part)\n"
+             "  children: [{check: $part != ''}]\n"),
+        tree("inputs: {part: string}\nroot:\n  sequence: Take the part\n"
+             "  children: [{log: Take $(part)}]\n"),
+    ),
+    "BT320": Page(
+        "A later child of a 'fallback' reads the value without which an earlier child fails: while "
+        "nothing has come on the topic, or nothing has written the variable, both fail, and what "
+        "the later one was there for is not done. 'known' asks whether there is a value and never "
+        "fails; a 'log' does not fail either. A later child that asks for itself in a 'check' is "
+        "taken for another case, and only warned of where the first child does nothing but ask and "
+        "no other child is left. Where nothing can be done without the value, say so with "
+        "'# bt: ignore[BT320]'.",
+        moving("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
+               "outputs: {level: float64}\n"
+               "root:\n  fallback: Home when it is low\n  children:\n"
+               "    - check: $battery.percentage > 0.2\n    - sequence: Home\n      children:\n"
+               "        - set: {level: $battery.percentage}\n        - move: Home\n"),
+        moving("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
+               "outputs: {level: float64}\n"
+               "root:\n  fallback: Home when it is low\n  children:\n"
+               "    - check: $battery.percentage > 0.2\n    - sequence: Home\n      children:\n"
+               "        - force_success: If it is known\n"
+               "          child: {set: {level: $battery.percentage}}\n        - move: Home\n"),
+    ),
+    "BT321": Page(
+        "The field's message fixes its range in a comment, and the number is outside: the "
+        "comparison is always true, or always false. The charge of a battery is a fraction: 20 % "
+        "are 0.2. Known are the charge, the parts of a quaternion, latitude and longitude, and "
+        "relative humidity, where the field itself is compared with a number. A driver that has a "
+        "number of its own for what it does not know, such as -1, keeps to no range: silence the "
+        "warning there.",
+        tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
+             "root: {check: $battery.percentage < 20}\n"),
+        tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
+             "root: {check: $battery.percentage < 0.2}\n"),
+    ),
+    "BT322": Page(
+        "YAML knows the quotes ' and \" alone. Those that chats and word processors put in their "
+        "place are a part of the text, and are sent with it. Plain quotes around them say that they"
+        " are meant.",
+        tree("root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: “map”}\n"),
+        tree('root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: "map"}\n'),
+    ),
 }  # fmt: skip

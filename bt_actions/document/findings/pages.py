@@ -250,7 +250,8 @@ PAGES: Mapping[str, Page] = {
         tree("root: {python: py_trees.behaviours.Success}\n"),
     ),
     "BT215": Page(
-        "The arguments do not fit the constructor of the class. Its name is given by the node.",
+        "The arguments do not fit the constructor of the class. Its name is given by the node. "
+        "Where a parameter is annotated with an enum, the argument is the name of a member.",
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {number: 3}}\n"),
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {n: 3}}\n"),
     ),
@@ -260,6 +261,16 @@ PAGES: Mapping[str, Page] = {
              "root: {check: $door}\n"),
         tree("topics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
              "root: {check: $door.data}\n"),
+    ),
+    "BT217": Page(
+        "A name of ROS has one type. A tree, with all that it includes, uses this action server, "
+        "service or topic with two: the second could not even be connected to.",
+        tree("root:\n  sequence: S\n  children:\n"
+             "    - {publish: said, type: std_msgs/msg/String}\n"
+             "    - {publish: said, type: std_msgs/msg/Bool}\n"),
+        tree("root:\n  sequence: S\n  children:\n"
+             "    - {publish: said, type: std_msgs/msg/String}\n"
+             "    - {publish: on, type: std_msgs/msg/Bool}\n"),
     ),
     **HAZARD_PAGES,
 }  # fmt: skip

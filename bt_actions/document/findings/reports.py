@@ -19,9 +19,11 @@ __all__ = ["REPORTS", "as_github", "as_json", "as_sarif", "as_text"]
 
 
 def as_text(findings: Sequence[Finding], width: int = 200) -> str:
-    """As a compiler prints them, with a count at the end; source lines are cut to `width`."""
+    """As a compiler prints them, errors first, with a count at the end; source lines are cut to
+    `width`. The forms for tools keep the order of places."""
     if not findings:
         return ""
+    findings = sorted(findings, key=lambda one: one.severity is not Severity.ERROR)
     errors = sum(finding.severity is Severity.ERROR for finding in findings)
     warnings = len(findings) - errors
     counts = [f"{n} {word}{'s' if n != 1 else ''}"

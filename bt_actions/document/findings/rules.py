@@ -69,6 +69,7 @@ RULES = MappingProxyType(
             Rule("BT214", "a class cannot be used as a behaviour"),
             Rule("BT215", "arguments do not fit"),
             Rule("BT216", "a name is declared twice"),
+            Rule("BT217", "one name with two types"),
             _warning("BT301", "no result timeout"),
             _warning("BT302", "a variable is read before anything writes it"),
             _warning("BT303", "two parallel branches need one resource"),
@@ -85,6 +86,12 @@ RULES = MappingProxyType(
             _warning("BT314", "an inverted check of what nobody may know"),
             _warning("BT315", "a text that holds a variable's name"),
             _warning("BT316", "a timer that goes by the wall clock"),
+            _warning("BT317", "a long duration without a unit"),
+            _warning("BT318", "a large angle without a unit"),
+            _warning("BT319", "a name that holds a variable"),
+            _warning("BT320", "a branch that fails for the same missing value"),
+            _warning("BT321", "a comparison with what a field never holds"),
+            _warning("BT322", "a text in typographic quotes"),
         )
     }
 )

@@ -12,6 +12,7 @@ import re
 import types
 import typing
 from collections.abc import Collection, Iterator, Mapping
+from enum import Enum
 from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
@@ -93,10 +94,15 @@ def _not_imported(module_name: str, error: BaseException) -> str:
 
 
 def make_behaviour(path: str, name: str, arguments: Mapping[str, object]) -> Behaviour:
-    """A behaviour of the class that `path` names. Raises ClassError."""
+    """A behaviour of the class that `path` names; a text stands for the member of an enum.
+
+    Raises ClassError.
+    """
     cls = find_behaviour(path)
+    wanted = _parameters(cls) or {}
+    given = {key: _meant(_type_of(wanted.get(key)), value) for key, value in arguments.items()}
     try:
-        made: object = cls(name=name, **arguments)
+        made: object = cls(name=name, **given)
     except KeyboardInterrupt:
         raise
     except BaseException as error:
@@ -156,23 +162,79 @@ def _misfit(
         near = did_you_mean(name, named) or f"; it takes {', '.join(named)}"
         text = f"{cls.__name__} takes no argument {name!r}{near}"
         return None if takes_any else Misfit(name, text)
-    if _takes(named[name].annotation, value):
+    wanted = _type_of(named[name])
+    if _takes(wanted, value):
         return None
-    wanted = _annotation(named[name].annotation)
-    text = f"{cls.__name__} takes a {name!r} of type {wanted}, not {value!r:.60}"
+    text = f"{cls.__name__} takes a {name!r} of type {_annotation(wanted)}, not {value!r:.60}"
+    members = [member for kind in _enums_in(wanted) for member in kind.__members__]
+    if members:
+        text += f": one of {listing(members)}"
     return Misfit(name, text, at_key=False)
 
 
 def _parameters(cls: type[Behaviour]) -> Mapping[str, inspect.Parameter] | None:
     """The parameters of a constructor, their types resolved where that is possible."""
-    with contextlib.suppress(
-        Exception
-    ):  # an annotation may be any code, and name what is not there
-        return inspect.signature(cls, eval_str=True).parameters
     try:
-        return inspect.signature(cls).parameters
+        parameters = inspect.signature(cls).parameters
     except (TypeError, ValueError):
         return None
+    names = getattr(inspect.unwrap(cls.__init__), "__globals__", {})
+    return {name: _resolved(parameter, names) for name, parameter in parameters.items()}
+
+
+def _resolved(parameter: inspect.Parameter, names: dict[str, object]) -> inspect.Parameter:
+    """A parameter whose type is no text; as it is where that cannot be told."""
+
+    def alone() -> None:
+        pass
+
+    alone.__annotations__ = {"it": parameter.annotation}
+    with contextlib.suppress(Exception):  # the text may be any code, and name what is not there
+        found = inspect.get_annotations(alone, globals=names, eval_str=True)
+        return parameter.replace(annotation=found["it"])
+    return parameter
+
+
+def _type_of(parameter: inspect.Parameter | None) -> object:
+    """The type that a parameter is annotated with, or that of its default where that is a member
+    of an enum."""
+    if parameter is None:
+        return inspect.Parameter.empty
+    bare = parameter.annotation is parameter.empty and isinstance(parameter.default, Enum)
+    return type(parameter.default) if bare else parameter.annotation
+
+
+def _meant(annotation: object, value: object) -> object:
+    """A value as the annotated type has it: the members of enums in the places of their names."""
+    parts = typing.get_args(annotation)
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        taken = next((part for part in parts if _takes(part, value)), None)
+        return value if taken is None else _meant(taken, value)
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        member = _member(annotation, value)
+        return value if member is None else member
+    if parts and isinstance(value, list):
+        return [_meant(parts[0], one) for one in value]
+    if parts and isinstance(value, dict):
+        return {key: _meant(parts[-1], one) for key, one in value.items()}
+    return value
+
+
+def _member(kind: type[Enum], value: object) -> Enum | None:
+    """The member of a name; of an enum of numbers or texts, also of a value."""
+    if isinstance(value, str) and value in kind.__members__:
+        return kind[value]
+    if issubclass(kind, (int, str)) and isinstance(value, (int, str)):
+        with contextlib.suppress(Exception):  # an enum may have code for what it does not know
+            return kind(value)
+    return None
+
+
+def _enums_in(annotation: object) -> Iterator[type[Enum]]:
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        yield annotation
+    for part in typing.get_args(annotation):
+        yield from _enums_in(part)
 
 
 def _takes(annotation: object, value: object) -> bool:
@@ -186,6 +248,8 @@ def _takes(annotation: object, value: object) -> bool:
         return isinstance(value, (int, float)) and not isinstance(value, bool)
     if plain is int:
         return isinstance(value, int) and not isinstance(value, bool)
+    if isinstance(plain, type) and issubclass(plain, Enum):
+        return _member(plain, value) is not None
     parts = typing.get_args(annotation)
     if plain is list:
         return isinstance(value, list) and all(_takes(part, one) for part in parts for one in value)

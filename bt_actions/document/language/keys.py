@@ -26,9 +26,10 @@ from bt_actions.document.language.shapes import AnyValue, Key, ListOf, Record, T
 from bt_actions.goals.policy import RETRYABLE, Busy
 
 __all__ = [
-    "ACTION_KEYS", "ACTION_SERVER", "ACTION_TYPE", "ALIAS", "DOING", "INPUT", "LIBRARY_KEYS",
-    "NAMESPACE", "NODE", "NODES", "OUTPUT", "POLICIES", "QOS", "RESULT", "RETRY", "SERVICE_RETRY",
-    "TIMEOUT", "TOPIC", "TOPIC_NAME", "TOP_KEYS", "keyed",
+    "ACTION_KEYS", "ACTION_NAME", "ACTION_SERVER", "ACTION_TYPE", "ALIAS", "DEFAULTS", "DOING",
+    "INPUT", "LIBRARY_KEYS", "MESSAGE_TYPE", "NAMESPACE", "NODE", "NODES", "OUTPUT", "POLICIES",
+    "QOS", "RESULT", "RETRY", "SERVICE_RETRY", "TIMEOUT", "TOPIC", "TOPIC_NAME", "TOP_KEYS",
+    "keyed",
 ]  # fmt: skip
 
 
@@ -84,16 +85,22 @@ DOING = (
 )  # fmt: skip
 ACTION_KEYS = keyed(*DOING)
 """What may stand beside an action's alias."""
-ACTION_TYPE = Key("type", TypeName("action"), "The action's type.", required=True)
+ACTION_TYPE = Key("type", TypeName("action"), "The action's type.", required=True,
+                  example="robot_control_interfaces/action/MoveRobot")  # fmt: skip
 ACTION_SERVER = RosName("the name of an action server")
+ACTION_NAME = Key("server", ACTION_SERVER, "The action's name.", required=True,
+                  example="move_robot")  # fmt: skip
+MESSAGE_TYPE = Key("type", TypeName("msg"), "The message's type.", required=True,
+                   example="std_msgs/msg/Bool")  # fmt: skip
+_VALUE_TYPE = Key("type", TypeName("value"), "What the value is.", required=True, example="float64")
 ALIAS = Record(
     "an action: its type, server and settings",
-    keyed(ACTION_TYPE, Key("server", ACTION_SERVER, "The action's name.", required=True), *DOING),
+    keyed(ACTION_TYPE, ACTION_NAME, *DOING),
 )
 INPUT = Record(
     "the type of an input",
     keyed(
-        Key("type", TypeName("value"), "What the value is.", required=True),
+        _VALUE_TYPE,
         Key("default", AnyValue(), "The value where none is given; without it one must be."),
         Key("unit", Text(), "For people."),
         Key("description", Text(), "For people."),
@@ -103,7 +110,7 @@ INPUT = Record(
 OUTPUT = Record(
     "the type of an output",
     keyed(
-        Key("type", TypeName("value"), "What the value is.", required=True),
+        _VALUE_TYPE,
         Key("unit", Text(), "For people."),
         Key("description", Text(), "For people."),
     ),
@@ -114,8 +121,8 @@ TOPIC_NAME = RosName("the name of a topic")
 TOPIC = Record(
     "a topic: its name and type",
     keyed(
-        Key("topic", TOPIC_NAME, "The topic's name.", required=True),
-        Key("type", TypeName("msg"), "The message's type.", required=True),
+        Key("topic", TOPIC_NAME, "The topic's name.", required=True, example="door"),
+        MESSAGE_TYPE,
         Key("qos", QOS, "How it is subscribed to.", default="default"),
         Key("max_age", Duration(or_none=True), default="none",
             doc="A value older than this, by the node's clock, counts as missing."),
@@ -154,14 +161,14 @@ class _NodesShape(_NodeShape):
 NODE: Shape = _NodeShape()
 NODES: Shape = _NodesShape()
 TOP_KEYS = keyed(
-    Key("tree", Name(), "The tree's name.", required=True),
+    Key("tree", Name(), "The tree's name.", required=True, example="fetch"),
     _DESCRIPTION,
     _IMPORT,
     Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
     Key("inputs", Table(INPUT), "Values that whoever runs the tree gives."),
     Key("outputs", Table(OUTPUT), "Values that the tree gives back."),
     *_SHARED,
-    Key("root", NODE, "The root node.", required=True),
+    Key("root", NODE, "The root node.", required=True, example="{success: Done}"),
 )
 """What may stand at the top of a tree."""
 LIBRARY_KEYS = keyed(_DESCRIPTION, _IMPORT, *_SHARED)

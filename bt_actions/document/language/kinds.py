@@ -12,9 +12,11 @@ from enum import StrEnum
 from types import MappingProxyType
 
 from bt_actions.document.language.keys import (
+    ACTION_NAME,
     ACTION_SERVER,
     ACTION_TYPE,
     DOING,
+    MESSAGE_TYPE,
     NAMESPACE,
     NODE,
     NODES,
@@ -95,12 +97,13 @@ _POLICY = OneOf(
     Choice(("all", "one")),
     Record(
         "{at_least: N}",
-        keyed(Key("at_least", Whole(1), "So many must succeed.", required=True)),
+        keyed(Key("at_least", Whole(1), "So many must succeed.", required=True, example="2")),
     ),
 )
 _LIST = ListValue()
-_CHILDREN_KEY = Key("children", NODES, "The nodes it holds.", required=True)
-_CHILD_KEY = Key("child", NODE, "The node it holds.", required=True)
+_CHILDREN_KEY = Key("children", NODES, "The nodes it holds.", required=True,
+                    example="[{success: First}, {success: Second}]")  # fmt: skip
+_CHILD_KEY = Key("child", NODE, "The node it holds.", required=True, example="{success: Done}")
 _MEMORY = Key(
     "memory",
     Flag(),
@@ -161,7 +164,13 @@ def _all() -> Iterable[Kind]:
         "Stops its child after some time, and fails when what it stopped has ended, or did not end "
         "within its own 'cancel'.",
         "timeout: Ten seconds at most\nafter: 10 s\nchild:\n  success: Search",
-        Key("after", Duration(values=True), "How long the child may take.", required=True),
+        Key(
+            "after",
+            Duration(values=True),
+            "How long the child may take.",
+            required=True,
+            example="10 s",
+        ),
     )
     yield _decorator(
         "invert", "Succeeds when its child fails, and fails when it succeeds.",
@@ -184,7 +193,7 @@ def _all() -> Iterable[Kind]:
         "Ticks its child once for each item of a list.",
         "for_each: Every station\nin: [1.0, 2.0]\nas: station\nchild:\n"
         "  check: $station > 0",
-        Key("in", _LIST, "The list.", required=True),
+        Key("in", _LIST, "The list.", required=True, example="[1.0, 2.0]"),
         Key("as", Name(), "The variable that holds the item.", default="item"),
         Key("index", Name(), "A variable that counts the items, from 0."),
         Key("on_failure", Choice(("stop", "continue")),
@@ -207,7 +216,7 @@ def _all() -> Iterable[Kind]:
         "action: To the part\ntype: robot_control_interfaces/action/MoveRobot\n"
         "server: move_robot\ngoal: {distance: 2.0}\ntimeout: 30 s",
         ACTION_TYPE,
-        Key("server", ACTION_SERVER, "The action's name.", required=True),
+        ACTION_NAME,
         *DOING,
     )
     yield _leaf(
@@ -217,7 +226,8 @@ def _all() -> Iterable[Kind]:
         "where the end of a goal of that run is not known, it is not known here either.",
         "run_tree: Fetch the part\ntree: fetch\nserver: /r1/run_tree\ninputs: {pick_at: 2.0}\n"
         "save: {at: outputs.at}",
-        Key("tree", Text(values=True), "The tree's name at that server.", required=True),
+        Key("tree", Text(values=True), "The tree's name at that server.", required=True,
+            example="fetch"),
         Key("server", ACTION_SERVER, "The server's action.", default="run_tree"),
         Key("inputs", Values(), "Values for the tree's inputs."),
         Key("timeout", TIMEOUT, "As for an action, but `cancel` is 15 s where nothing is said: "
@@ -233,8 +243,20 @@ def _all() -> Iterable[Kind]:
         "Calls a service.",
         "service: Switch the light on\ntype: std_srvs/srv/SetBool\nserver: light\n"
         "request: {data: true}\nexpect: result.success",
-        Key("type", TypeName("srv"), "The service's type.", required=True),
-        Key("server", RosName("the name of a service"), "The service.", required=True),
+        Key(
+            "type",
+            TypeName("srv"),
+            "The service's type.",
+            required=True,
+            example="std_srvs/srv/SetBool",
+        ),
+        Key(
+            "server",
+            RosName("the name of a service"),
+            "The service.",
+            required=True,
+            example="light",
+        ),
         Key("request", Values(), "The fields of the request."),
         Key("timeout", SERVICE_TIMEOUT, "How long to wait; a bare duration is the answer's."),
         Key("retry", SERVICE_RETRY, "How often to try; a bare number is the attempts."),
@@ -248,7 +270,7 @@ def _all() -> Iterable[Kind]:
         "Publishes a message. While a process is new (3.5 s), who listens may not be discovered "
         "yet, so it waits for one until then; where nobody listens it succeeds with a warning.",
         "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
-        Key("type", TypeName("msg"), "The message's type.", required=True),
+        MESSAGE_TYPE,
         Key("message", Values(), "The fields of the message."),
         Key(
             "subscribers",
@@ -271,8 +293,8 @@ def _all() -> Iterable[Kind]:
         "Succeeds with the first message, since it started, that fits.",
         "wait_for_message: The door opens\ntopic: door\ntype: std_msgs/msg/Bool\n"
         "until: message.data\ntimeout: 60 s",
-        Key("topic", TOPIC_NAME, "The topic.", required=True),
-        Key("type", TypeName("msg"), "The message's type.", required=True),
+        Key("topic", TOPIC_NAME, "The topic.", required=True, example="door"),
+        MESSAGE_TYPE,
         Key("until", Condition(_MESSAGE), "What the message must be.", default="any message"),
         Key("timeout", Duration(or_none=True), "After which it fails.", default="none"),
         Key("save", Table(Place(_MESSAGE)), "Names to keep parts of the message under."),
@@ -298,7 +320,7 @@ def _all() -> Iterable[Kind]:
     yield _leaf(
         "log",
         Text(values=True),
-        "Writes a line to the log.",
+        "Writes a line to the log. It never fails: `(no value)` stands for what has none.",
         "log: The level is $(level)\nlevel: warn",
         Key(
             "level",
@@ -312,7 +334,7 @@ def _all() -> Iterable[Kind]:
         Text("a class, such as package.module.Class, as a text"),
         "A behaviour of one's own, made with its name and `arguments`.",
         "python: py_trees.behaviours.Periodic\narguments: {n: 3}",
-        Key("arguments", Values(), "For its constructor."),
+        Key("arguments", Values(), "For its constructor; of an enum, a member's name."),
     )
     yield _leaf(
         "check",

@@ -8,8 +8,10 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass
+from typing import Literal
 
 from bt_actions.document.findings.elsewhere import notation_here
+from bt_actions.document.language.bare import warn_bare_duration
 from bt_actions.document.language.shape import (
     Schema,
     is_computed,
@@ -18,8 +20,9 @@ from bt_actions.document.language.shape import (
     words_for,
     wrong_form,
 )
+from bt_actions.document.language.types import meant_type
 from bt_actions.document.language.values import BAD, Computed, read_expression, read_value
-from bt_actions.document.yaml.cut import warn_cut
+from bt_actions.document.yaml.cut import warn_cut, warn_quotes
 from bt_actions.document.yaml.nodes import NULLS, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, spoken
 from bt_actions.utilities.suggest import did_you_mean
@@ -31,6 +34,8 @@ __all__ = [
 ]  # fmt: skip
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_MARKED = re.compile(r"\$(?:[({]+\s*)?[A-Za-z_]")
+"""A variable as a text or an expression holds it, or as other tools write one."""
 GREATEST = sys.float_info.max
 _NAME_LIMIT = 200
 
@@ -48,6 +53,7 @@ class Text:
         if self.values:
             return read_value(node, source)
         warn_cut(node, source, "text")
+        warn_quotes(node, source)
         return node.text
 
     def schema(self) -> Schema:
@@ -85,6 +91,12 @@ class NodeName:
             return BAD
         if source.commented:
             warn_cut(node, source, "name")
+        warn_quotes(node, source)
+        if _MARKED.search(text):
+            source.report(
+                "BT319", span_of(node), f"no value is put into a name: it stays {text!r}",
+                hint="leave the '$' away; 'log: ...' beside the node can show the value",
+            )  # fmt: skip
         return text
 
     def schema(self) -> Schema:
@@ -221,6 +233,7 @@ class Duration:
         if seconds == 0 and not self.zero:
             source.report("BT110", span_of(node), "a duration here is more than zero")
             return BAD
+        warn_bare_duration(node, seconds, source)
         return seconds
 
     def schema(self) -> Schema:
@@ -297,7 +310,7 @@ class Place(Condition):
 class TypeName:
     """The name of a ROS interface, or (kind `value`) of a type that a variable can have."""
 
-    kind: str
+    kind: Literal["action", "srv", "msg", "value"]
 
     @property
     def words(self) -> str:
@@ -310,7 +323,9 @@ class TypeName:
             return wrong_form(self, node, source)
         if self.kind != "value" and not re.fullmatch(_TYPE_NAMES[self.kind], node.text):
             text = f"{node.text!r} is no type name"
-            hint = f"it is written package/{self.kind}/Name"
+            if "_" in node.text.rpartition("/")[2] and "/" in node.text:
+                text += ": its last part has no '_'"
+            hint = meant_type(node.text, self.kind) or f"it is written package/{self.kind}/Name"
             source.report("BT207", span_of(node), text, hint=hint)
             return BAD
         return node.text

@@ -148,6 +148,12 @@ class Key:
     doc: str
     required: bool = False
     default: str | None = None
+    example: str = ""
+
+    @property
+    def hint(self) -> str:
+        """What to write where the key is missing."""
+        return f"{self.doc.removesuffix('.')}, such as {self.name}: {self.example}"
 
 
 def required_in(keys: MappingType[str, Key]) -> tuple[Key, ...]:
@@ -173,7 +179,9 @@ class Record:
                     return wrong_form(self.keys[self.short].shape, node, source, hint=hint)
                 value = self.keys[self.short].shape.read(node, source)
                 return BAD if value is BAD else {self.short: value}
-            return wrong_form(self, node, source)
+            needs = required_in(self.keys)
+            hint = f"write {{{', '.join(f'{one.name}: {one.example}' for one in needs)}}}"
+            return wrong_form(self, node, source, hint=hint if needs else None)
         return read_keys(node, self.keys, source)
 
     def schema(self) -> Schema:
@@ -229,7 +237,7 @@ def read_keys(
         for key_model in keys.values():
             if key_model.required and key_model.name not in values:
                 source.report("BT108", span_of(node), f"the key {key_model.name!r} is missing",
-                              hint=key_model.doc)  # fmt: skip
+                              hint=key_model.hint)  # fmt: skip
                 source.unread.nodes.append(node.pairs[0][0] if node.pairs else node)
     return values
 

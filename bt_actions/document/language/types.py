@@ -18,22 +18,25 @@ from bt_actions.messages.fields import (
     Message,
     Scalar,
 )
-from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.messages.interfaces import DURATION
+from bt_actions.utilities.suggest import closest, did_you_mean, listing
 
 if TYPE_CHECKING:
     from bt_actions.messages.interfaces import Kind
 
-__all__ = ["PLAIN_TYPES", "Either", "Record", "TypeNameError", "fits", "interface_of", "misfits",
-           "parse_type"]  # fmt: skip
+__all__ = ["PLAIN_TYPES", "Either", "Record", "TypeNameError", "fits", "interface_of", "meant_type",
+           "misfits", "parse_type"]  # fmt: skip
 
 PLAIN_TYPES = ("bool", *FLOATS, *(name for name in INTEGERS), "string")
 """The types that need no package."""
 _STAND_FOR = {
     "builtin_interfaces/msg/Time": (*FLOATS, *INTEGERS),
-    "builtin_interfaces/msg/Duration": (*FLOATS, *INTEGERS, "string"),
+    DURATION: (*FLOATS, *INTEGERS, "string"),
 }
 """The plain types whose values may be given for a message: seconds, and `500 ms`."""
 _TEXT = Scalar("string")
+_WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
+_KINDS = ("action", "srv", "msg")
 _SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{1,9}))?(\])?)?")
 
 
@@ -75,7 +78,8 @@ def parse_type(text: str, *, types: bool = True) -> FieldType | None:
     match = _SYNTAX.fullmatch(text)
     listed = "[" in text
     if match is None or listed != (match[5] is not None) or (match[2] and match[1] != "string"):
-        raise TypeNameError(f"{text!r} is no type{_instead(text)}")
+        near = _instead(text) or _installed(text, types)
+        raise TypeNameError(f"{text!r} is no type{near}")
     item = _item(match[1], int(match[2]) if match[2] else None, types)
     if item is None or not listed:
         return item
@@ -89,7 +93,7 @@ def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
     if name in PLAIN_TYPES:
         return Scalar(name, limit)
     if "/" not in name:
-        near = _instead(name) or did_you_mean(name, PLAIN_TYPES)
+        near = _instead(name) or did_you_mean(name, PLAIN_TYPES) or _installed(name, types)
         known = near or f"; there is {', '.join(PLAIN_TYPES)}, and package/msg/Name"
         raise TypeNameError(f"{name!r} is no type{known}")
     if not types:
@@ -100,6 +104,27 @@ def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
 def _instead(text: str) -> str:
     here = type_here(text)
     return f": {here}" if here else ""
+
+
+def _installed(text: str, types: bool) -> str:
+    meant = meant_type(text, "msg") if types else None
+    return f": {meant}" if meant else ""
+
+
+def meant_type(text: str, kind: Kind) -> str | None:
+    """What to write for an installed type that is named without its package, or as elsewhere:
+    ``Pose``, ``geometry_msgs.msg.Pose``, ``geometry_msgs/msg/pose``."""
+    from bt_actions.messages.interfaces import installed
+
+    *before, short = [word for word in _WORD.findall(text) if word not in _KINDS] or [""]
+    shorts: dict[str, list[str]] = {}
+    for name in installed(kind) if short else ():
+        shorts.setdefault(name.rpartition("/")[2], []).append(name)
+    near = short if short in shorts else closest(short, shorts, cutoff=0.8)
+    found = shorts.get(near or "", [])
+    own = [name for name in found if name.partition("/")[0] in before]
+    names = listing(own or found, 4)
+    return f"write {names if len(own or found) == 1 else f'one of {names}'}" if names else None
 
 
 def interface_of(name: str, kind: Kind) -> type:

@@ -19,7 +19,7 @@ from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.bounds import MAX_ITEMS, refuse_large
 from bt_actions.document.yaml.braces import report_braces
 from bt_actions.document.yaml.compose import compose
-from bt_actions.document.yaml.cut import cut_hint, warn_cut
+from bt_actions.document.yaml.cut import cut_hint, warn_cut, warn_quotes
 from bt_actions.document.yaml.inner import inner_span
 from bt_actions.document.yaml.nodes import (
     Listing,
@@ -50,6 +50,7 @@ __all__ = [
     "read_expression",
     "read_value",
     "resolve",
+    "spoken",
 ]
 
 Lookup = Callable[[str], object]
@@ -101,8 +102,25 @@ class Interpolated:
         return "".join(texts)
 
 
+def spoken(value: object, variable: Lookup) -> str:
+    """The text of a log, which has one whatever it reads.
+
+    `(no value)` stands for what cannot be computed, and the text ends with an ellipsis where it is
+    longer than an expression may make it.
+    """
+    text = ""
+    for part in value.parts if isinstance(value, Interpolated) else (value,):
+        try:
+            text += part if isinstance(part, str) else _as_text(resolve(part, variable))
+        except ExpressionError as error:
+            text += "…" if error.message == _TOO_LONG else "(no value)"
+        if len(text) > MAX_TEXT:
+            return f"{text[: MAX_TEXT - 1]}…"
+    return text
+
+
 _TOO_LONG = f"the text would be longer than {MAX_TEXT:,} characters"
-_VARIABLE = re.compile(r"\$[A-Za-z_]\w*(?:\.\w+|\[-?\d+\])*", re.ASCII)
+_VARIABLE = re.compile(r"\$[A-Za-z_]\w*(?:\.\w+|\[(?:-?\d+|-?\d*:-?\d*)\])*", re.ASCII)
 _DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
 
 
@@ -115,6 +133,7 @@ def read_value(node: Node, source: Source) -> object:
                 warn_cut(node, source, "expression")
         elif isinstance(value, (str, Interpolated)):
             warn_cut(node, source, "text")
+            warn_quotes(node, source)
         return value
     bad = False
     if isinstance(node, Listing):
@@ -160,7 +179,7 @@ def _lacks_space(text: str) -> bool:
 
 
 def names_value(text: str) -> bool:
-    """Whether a text stands for one value: ``$name``, ``$name.field.0``."""
+    """Whether a text stands for one value: ``$name``, ``$name.field.0``, ``$name[1:3]``."""
     return _VARIABLE.fullmatch(text) is not None
 
 

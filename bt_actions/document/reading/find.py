@@ -7,16 +7,23 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.document.yaml.source import broken_link
+from bt_actions.utilities.suggest import closest, did_you_mean, listing
 
 __all__ = ["TreeNotFoundError", "find_tree", "installed_trees", "tree_folder", "tree_folders"]
 
 _SUFFIXES = (".yaml", ".yml")
+_MOST = 4
+"""Folders that a message names."""
 _SEARCH_PATH = "BT_ACTIONS_TREE_PATH"
 
 
 class TreeNotFoundError(FileNotFoundError):
-    """There is no such tree; the text says where it was looked for."""
+    """There is no such tree; the text says what may be meant, `hint` where it was looked for."""
+
+    def __init__(self, text: str, hint: str | None = None) -> None:
+        super().__init__(text)
+        self.hint = hint
 
 
 def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = None) -> Path:
@@ -38,7 +45,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
     candidates: list[Path] = []
     if path.suffix not in _SUFFIXES and exact.name:
         candidates += [exact.with_name(path.name + suffix) for suffix in _SUFFIXES]
-    is_name = len(path.parts) == 1
+    is_name = len(path.parts) == 1 and not wanted.startswith(".")
     if is_name and path.suffix in _SUFFIXES:
         candidates += [folder / path for folder in tree_folders()]
     elif is_name:
@@ -50,7 +57,8 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
             return candidate
     if _is_there(exact):
         return exact  # whoever reads it will say what it is
-    raise TreeNotFoundError(_nowhere(wanted, exact, is_name))
+    _refuse_links(exact, *candidates)
+    raise TreeNotFoundError(_nowhere(wanted, exact, is_name), _searched(exact) if is_name else None)
 
 
 def tree_folders() -> Iterator[Path]:
@@ -89,7 +97,7 @@ def installed_trees() -> dict[str, Path]:
         except OSError:
             continue
         for file in files:
-            if file.suffix in _SUFFIXES:
+            if file.suffix in _SUFFIXES and not file.name.startswith("."):
                 found.setdefault(file.stem, file)
     return found
 
@@ -115,11 +123,21 @@ def _in_package(wanted: str) -> Path:
     package, _, inner = wanted.removeprefix("package://").partition("/")
     if not package or not inner or ".." in Path(inner).parts:
         raise TreeNotFoundError(f"{wanted!r} is no place: it is written package://pkg/trees/x.yaml")
-    for prefix in _prefixes():
-        candidate = prefix / "share" / package / inner
+    places = [prefix / "share" / package / inner for prefix in _prefixes()]
+    for candidate in places:
         if _is_file(candidate):
             return candidate
-    raise TreeNotFoundError(f"there is no {inner!r} in the package {package!r}")
+    _refuse_links(*places)
+    near = next(filter(None, map(_beside, places)), "")
+    raise TreeNotFoundError(f"there is no {inner!r} in the package {package!r}{near}")
+
+
+def _refuse_links(*places: Path) -> None:
+    """Raise TreeNotFoundError for a link to nowhere, or a folder that is one."""
+    for place in places:
+        for path in (place, place.parent):
+            if link := broken_link(path):
+                raise TreeNotFoundError(f"{path} is {link}")
 
 
 def _is_file(path: Path) -> bool:
@@ -139,6 +157,27 @@ def _is_there(path: Path) -> bool:
 
 def _nowhere(wanted: str, exact: Path, is_name: bool) -> str:
     if not is_name:
-        return f"there is no tree {str(exact)!r}"
+        folder = "" if exact.parent.is_dir() else f": there is no folder {str(exact.parent)!r}"
+        return f"there is no tree {str(exact)!r}{folder or _beside(exact)}"
     text = f"there is no tree {wanted!r} here, and none of that name is installed"
-    return text + did_you_mean(Path(wanted).stem, installed_trees())
+    return text + (_beside(exact) or did_you_mean(Path(wanted).stem, installed_trees()))
+
+
+def _beside(path: Path) -> str:
+    """Which tree in the folder of a path that is not there may be meant."""
+    try:
+        files = {each.stem: each.name for each in sorted(path.parent.iterdir()) if _is_tree(each)}
+    except (OSError, ValueError):
+        return ""
+    near = path.stem if path.stem in files else closest(path.stem, files)
+    return f"; did you mean {files[near]!r}?" if near else ""
+
+
+def _searched(exact: Path) -> str:
+    """Where a name was looked for."""
+    folders = [exact.parent.absolute(), *(each for each in tree_folders() if each.is_dir())]
+    return f"looked in {listing(dict.fromkeys(map(str, folders)), _MOST)}"
+
+
+def _is_tree(path: Path) -> bool:
+    return path.suffix in _SUFFIXES and not path.name.startswith(".")

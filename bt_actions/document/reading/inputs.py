@@ -34,6 +34,11 @@ __all__ = [
 class InputError(ValueError):
     """A value given to a tree does not fit what it declares; the fault is the giver's."""
 
+    def __init__(self, message: str, missing: str = "") -> None:
+        """`missing` is the input without a value, where that is what is wrong."""
+        super().__init__(message)
+        self.missing = missing
+
 
 @dataclass(frozen=True, slots=True)
 class TreeInput:
@@ -73,10 +78,8 @@ def check_inputs(
         elif "default" in declared.values:
             values[name] = _fit(document, name, declared.values["default"], text, types=types)
         else:
-            raise InputError(
-                f"the tree {document.name!r} needs the input {name!r} ({text}): "
-                f"give it a value, such as --set {name}=..."
-            )
+            needs = f"the tree {document.name!r} needs the input {name!r} ({text})"
+            raise InputError(f"{needs}: give it a value", missing=name)
     return values
 
 

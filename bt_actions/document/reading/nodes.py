@@ -11,7 +11,7 @@ from itertools import chain
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.findings.elsewhere import kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
-from bt_actions.document.language.kinds import KINDS, Kind
+from bt_actions.document.language.kinds import KINDS, Group, Kind
 from bt_actions.document.language.scalars import Name
 from bt_actions.document.language.shape import words_for, wrong_form
 from bt_actions.document.language.shapes import (
@@ -21,6 +21,7 @@ from bt_actions.document.language.shapes import (
     required_in,
 )
 from bt_actions.document.language.values import BAD
+from bt_actions.document.reading.around import around
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
@@ -37,6 +38,7 @@ _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
 _BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
 """Kinds that are taken for keys in a node whose kind stands behind 'type:'."""
+_IN_SEQUENCE = "put a sequence there, and the list into it: {sequence: name, children: [...]}"
 _FIELDS = ("goal", "request", "message")
 """Keys for the fields of what a node sends."""
 
@@ -60,6 +62,8 @@ class _Reader:
         own = actions.pairs if isinstance(actions, Mapping) else []
         self._refused = {key.text for key, _ in own} & NODE_KEYS
         """Names of actions that were reported: what looks like a key may be meant for one."""
+        self._astray = {key.text for key, _ in document.node.pairs} & {*_CHILDREN}
+        """Keys of some node that stand at the top, which was reported."""
         self._waiting: list[tuple[TreeNode, Node]] = []
         """Children to be read, each with its parent; the next is the last."""
 
@@ -78,11 +82,13 @@ class _Reader:
         """A node by itself; its children wait."""
         source = self._source
         if not isinstance(written, Mapping):
-            hint = None
+            hint: str | None = None
             if isinstance(written, Scalar):
                 word, _, name = written.text.partition(":")
                 if word in self._kinds:
                     hint = f"write '{word}: {name or 'name'}'"
+            elif isinstance(written, Listing) and written.items:
+                hint = _IN_SEQUENCE
             message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
             source.report("BT111", span_of(written), message, hint=hint)
             source.unread.nodes.append(written)
@@ -147,7 +153,8 @@ class _Reader:
             self._source.report(
                 "BT112", span_of(second),
                 f"a node is one thing: this is a {first.text!r} and a {second.text!r}",
-                hint="begin a new item with '-'", related=Related(place, "the first is here"),
+                hint=self._nested(written, first, second) or "begin a new item with '-'",
+                related=Related(place, "the first is here"),
             )  # fmt: skip
             return None
         words = [key for key, _ in written.pairs if key.text not in NODE_KEYS]
@@ -162,6 +169,14 @@ class _Reader:
         ):
             return beside[0]  # with what it holds in the place of 'child'
         self._report_no_kind(written, words)
+        return None
+
+    def _nested(self, written: Mapping, first: Scalar, second: Scalar) -> str | None:
+        """What to write where one of two kinds is a decorator, which goes around the other."""
+        for outer, inner in ((first, second), (second, first)):
+            kind = KINDS.get(outer.text)
+            if kind is not None and kind.group is Group.DECORATOR:
+                return around(written, outer, inner)
         return None
 
     def _report_no_kind(self, written: Mapping, words: list[Scalar]) -> None:
@@ -236,13 +251,22 @@ class _Reader:
             node.name = own
         if unknown:
             return
-        for wanted in needs:
-            if wanted.name not in written:
-                source.report(
-                    "BT108", span_of(node.key),
-                    f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.doc,
-                )  # fmt: skip
-                source.unread.nodes.append(node.key)
+        missing = [
+            wanted for wanted in needs
+            if wanted.name not in written and wanted.name not in self._astray
+        ]  # fmt: skip
+        if missing and node.is_action and node.name in self._actions:
+            said = f"{node.name!r} is an action of this tree: its name is the node's kind"
+            source.report("BT108", span_of(node.key), said, hint=f"write '{node.name}: name'")
+            source.unread.nodes.append(node.key)
+            source.unread.actions = True
+            return
+        for wanted in missing:
+            source.report(
+                "BT108", span_of(node.key),
+                f"{node.key.text!r} needs the key {wanted.name!r}", hint=wanted.hint,
+            )  # fmt: skip
+            source.unread.nodes.append(node.key)
 
     def _below_name(
         self,
@@ -300,6 +324,8 @@ class _Reader:
             self._source.report("BT107", span_of(key), message, hint=hint)
         else:
             hint = None
+            if key.text in _BESIDE_CHILD:
+                hint = around(node.node, key, node.key)
             if key.text == "name" and "name" not in keys:
                 hint = f"the name stands behind '{node.key.text}:'"
             report_unknown_key(key, keys, self._source, hint)
@@ -308,7 +334,7 @@ class _Reader:
         if name == "child":
             if isinstance(inner, Listing):
                 message = "'child' is one node, not a list"
-                self._source.report("BT109", span_of(inner), message, hint="use a sequence")
+                self._source.report("BT109", span_of(inner), message, hint=_IN_SEQUENCE)
                 self._source.unread.nodes.append(inner)
                 written: list[Node] = inner.items
             else:

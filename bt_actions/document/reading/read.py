@@ -6,10 +6,12 @@ part that was reported stands as BAD, so that nothing is said about it twice.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from collections.abc import Mapping as MappingType
 
 from bt_actions.document.findings import Span
-from bt_actions.document.language.keys import LIBRARY_KEYS, TOP_KEYS
+from bt_actions.document.findings.elsewhere import key_here
+from bt_actions.document.language.keys import DEFAULTS, LIBRARY_KEYS, TOP_KEYS
 from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.shape import words_for
 from bt_actions.document.language.shapes import Key, read_keys
@@ -37,7 +39,8 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
         return None
     if not isinstance(node, Mapping):
         message = f"a tree is a mapping with the keys 'tree' and 'root', not {words_for(node)}"
-        source.report("BT106", span_of(node), message)
+        hint = "write 'tree: name' and 'root:', and below that a node"
+        source.report("BT106", span_of(node), message, hint=hint)
         return None
     document = Document(source, node)
     if not library and node.get("root") is None and node.get("tree") is None:
@@ -50,7 +53,9 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
             "BT106", start_of(node), "this is not a tree: the keys 'tree' and 'root' are missing"
         )
         return None
-    values = read_keys(_without(node, "root"), _but_root(keys), source, keys)
+    misplaced = _misplaced(node, keys, source) if "root" in keys else []
+    rest = _without(node, {"root", *misplaced})
+    values = read_keys(rest, _but_root(keys), source, keys)
     wanted = "root" in keys and not library and node.get("root") is None
     if wanted and all(closest(key.text, keys) != "root" for key, _ in node.pairs):
         message = "the key 'root' is missing: it holds the tree's nodes"
@@ -65,11 +70,30 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
     return document
 
 
-def _without(node: Mapping, name: str) -> Mapping:
+def _misplaced(node: Mapping, keys: MappingType[str, Key], source: Source) -> list[str]:
+    """Keys at the top that belong to a node, or to all actions, which are reported."""
+    found = []
+    for key, _ in node.pairs:
+        if key.text in keys or not _of_node(key.text) or any(key_here(key.text, keys)):
+            continue
+        hint = "indent it below 'root:', as far as the other keys of its node"
+        if key.text in DEFAULTS.keys:
+            hint = f"for all actions write defaults: {{{key.text}: ...}}"
+        source.report("BT107", span_of(key), f"{key.text!r} is a key of a node", hint=hint)
+        source.unread.names = True
+        found.append(key.text)
+    return found
+
+
+def _of_node(name: str) -> bool:
+    return name in KINDS or name in NODE_KEYS
+
+
+def _without(node: Mapping, names: Container[str]) -> Mapping:
     copy = Mapping()
     copy.begin = copy.end = node.begin
     copy.flow = node.flow
-    copy.pairs = [pair for pair in node.pairs if pair[0].text != name]
+    copy.pairs = [pair for pair in node.pairs if pair[0].text not in names]
     return copy
 
 
@@ -90,7 +114,7 @@ def _declare(document: Document, table: str, into: dict[str, Declared]) -> None:
         if read is BAD:
             own = {"type": BAD}
         into[key.text] = Declared(key.text, own, key, node, document.source)
-        if table == "actions" and (key.text in KINDS or key.text in NODE_KEYS):
+        if table == "actions" and _of_node(key.text):
             what = "a kind of node" if key.text in KINDS else "a key of nodes"
             document.source.report(
                 "BT208", span_of(key), f"{key.text!r} is {what} and cannot name an action"

@@ -19,7 +19,7 @@ from bt_actions.document.reading.read import read_document
 from bt_actions.document.reading.settings import merged
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.yaml.nodes import Listing, Node, span_of
-from bt_actions.document.yaml.source import SUFFIXES, Source, read_source
+from bt_actions.document.yaml.source import SUFFIXES, Source, absolute, read_source
 
 __all__ = ["MAX_LEVELS", "MAX_TREE_NODES", "Workspace"]
 
@@ -38,8 +38,11 @@ class Workspace:
     """The documents that belong to one or several trees."""
 
     def __init__(self, within: Iterable[Path] | None = None) -> None:
-        """`within` are the folders in which every file must lie, links resolved; None: anywhere."""
-        self._within = None if within is None else tuple(each.resolve() for each in within)
+        """`within` are the folders in which every file must lie; None: anywhere."""
+        self._within: tuple[Path, ...] | None = None
+        if within is not None:
+            ways = [(absolute(each), each.resolve()) for each in within]
+            self._within = tuple(folder for both in ways for folder in both)
         self._documents: dict[tuple[Path, bool], Document | None] = {}
         self._sources: list[Source] = []
         self._sizes: dict[int, int] = {}
@@ -52,7 +55,7 @@ class Workspace:
 
         Raises DocumentError when the file cannot be read at all.
         """
-        source = read_source(path, name)
+        source = read_source(path, name, pipes=self._within is None)
         source.within = self._within
         if refusal := source.refusal(path):
             source.report("BT209", Span(1, 1, 1, 2), refusal)
@@ -70,9 +73,9 @@ class Workspace:
 
     @property
     def files(self) -> dict[Path, str]:
-        """Every file that was read, resolved, with its text; that of data files is empty."""
-        found = {self._key(each.path): each.text for each in self._sources if each.path}
-        return found | {self._key(path): "" for each in self._sources for path in each.files}
+        """Every file that was read, as it was named, with its text; that of data files is empty."""
+        found = {each.path: each.text for each in self._sources if each.path}
+        return found | {path: "" for each in self._sources for path in each.files}
 
     @property
     def findings(self) -> list[Finding]:
@@ -163,9 +166,9 @@ class Workspace:
         try:
             path = find_tree(wanted, beside=beside)
         except TreeNotFoundError as error:
-            hint = package_here(wanted)
-            text = f"there is no tree {wanted!r}" if hint else str(error)
-            source.report("BT209", span_of(written), text, hint=hint)
+            here = package_here(wanted)
+            text = f"there is no tree {wanted!r}" if here else str(error)
+            source.report("BT209", span_of(written), text, hint=here or error.hint)
             return None
         if path.suffix not in SUFFIXES and _is_file(path):
             text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"

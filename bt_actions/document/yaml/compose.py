@@ -21,6 +21,7 @@ from yaml import SequenceStartEvent as ListingStartEvent
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, TooManyErrors
+from bt_actions.document.yaml.stand_ins import replaced, restored
 from bt_actions.document.yaml.syntax import report_syntax
 
 __all__ = ["MAX_DEPTH", "MAX_NODES", "compose", "compose_written"]
@@ -77,8 +78,10 @@ class _Composer:
     def __init__(self, source: Source, *, unfold: bool = True) -> None:
         if not yaml.__with_libyaml__:
             raise ImportError(NO_LIBYAML, name="libyaml")
-        parser = yaml.CSafeLoader(source.text)
+        text = replaced(source.text)
+        parser = yaml.CSafeLoader(text)
         self._source = source
+        self._restores = text is not source.text
         self._events = chain(
             starmap(parser.get_event, repeat((), MAX_NODES)), _beyond(source, parser.get_event)
         )
@@ -117,6 +120,8 @@ class _Composer:
         node = Scalar()
         node.text, node.plain = event.value, not event.style
         node.begin, node.end = event.start_mark, event.end_mark
+        if self._restores:
+            node.text = restored(event.value, quoted=event.style == '"')
         if event.tag is not None:
             node.plain = False
             if event.tag not in ("!", "tag:yaml.org,2002:str"):

@@ -1,15 +1,16 @@
-"""A plain text that a '#' cut short: ``Part #3`` is the text ``Part`` and a comment.
+"""A plain text that is not what it looks like: cut by a '#', or in quotes that YAML does not know.
 
-Where a space follows the '#' a comment was meant; nobody can tell more.
+``Part #3`` is the text ``Part`` and a comment; where a space follows the '#' a comment was meant,
+nobody can tell more. In ``“map”`` the quotes are a part of the text.
 """
 
 from __future__ import annotations
 
 from bt_actions.document.findings import Span
-from bt_actions.document.yaml.nodes import Scalar
-from bt_actions.document.yaml.source import Source
+from bt_actions.document.yaml.nodes import Scalar, span_of
+from bt_actions.document.yaml.source import Source, unquoted
 
-__all__ = ["cut_hint", "warn_cut"]
+__all__ = ["cut_hint", "warn_cut", "warn_quotes"]
 
 
 def warn_cut(node: Scalar, source: Source, what: str) -> None:
@@ -26,6 +27,16 @@ def warn_cut(node: Scalar, source: Source, what: str) -> None:
         f"{mark.rstrip()!r} is read as a comment: the {what} is {node.text!r}",
         hint=f"put the {what} in quotes, or a space behind the '#'",
     )  # fmt: skip
+
+
+def warn_quotes(node: Scalar, source: Source) -> None:
+    """Say so where a text is written in typographic quotes."""
+    inside = unquoted(node.text) if node.plain else None
+    if inside is not None:
+        source.report(
+            "BT322", span_of(node), f"the quotes are a part of the text: {node.text}",
+            hint=f"write \"{inside}\", or '{node.text}' where they are meant",
+        )  # fmt: skip
 
 
 def cut_hint(node: Scalar, source: Source) -> str | None:

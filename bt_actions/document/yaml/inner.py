@@ -16,7 +16,10 @@ from bt_actions.document.yaml.source import Char, Source
 
 __all__ = ["inner_span"]
 
-_ESCAPE = re.compile(r"\\(?:x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))")
+_ESCAPE = re.compile(
+    r"\\(?:u([Dd][89ABab]..)\\u([Dd][C-Fc-f]..)"
+    r"|x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))"
+)
 _SHORT = {'"': '"', "\\": "\\", "/": "/", " ": " ", "n": "\n", "t": "\t", "r": "\r", "0": "\0"}
 
 
@@ -101,6 +104,10 @@ def _double(inside: str, line: int, column: int) -> Iterator[Char]:
             yield inside[at], line, column + at
             at += 1
             continue
-        code = match[1] or match[2] or match[3]
-        yield chr(int(code, 16)) if code else _SHORT.get(match[4], "\0"), line, column + at
+        if match[1]:
+            char = bytes.fromhex(match[1] + match[2]).decode("utf-16-be")
+        else:
+            code = match[3] or match[4] or match[5]
+            char = chr(int(code, 16)) if code else _SHORT.get(match[6], "\0")
+        yield char, line, column + at
         at = match.end()

@@ -5,6 +5,7 @@ Reading never takes more than `MAX_BYTES` of memory, whatever the path leads to.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import stat
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
-    "read_source", "read_stream", "source_of", "spoken",
+    "absolute", "broken_link", "read_source", "read_stream", "source_of", "spoken", "unquoted",
 ]  # fmt: skip
 
 MAX_BYTES = 32 * 1024 * 1024
@@ -36,15 +37,15 @@ PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
 Char = tuple[str, int, int]
 """A character of a text, and the line and column where it is written, from 1."""
-_PAIR = re.compile(
-    r"(?<!\\)((?:\\\\)*)\\u(d[89ab][0-9a-f]{2})\\u(d[c-f][0-9a-f]{2})", re.IGNORECASE
-)
-"""A character as JSON may write it, and YAML may not: as two halves of UTF-16."""
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PLAIN = bytes([9, 10, 13, *range(32, 127)])
 """What most texts are made of alone: then none is forbidden, and that is seen faster."""
-_UNSEEN = re.compile("[\xa0\u1680\u2000-\u200d\u202f\u205f\u2060\u3000\ufeff]")
+_UNSEEN = re.compile("[\x85\xa0\u1680\u2000-\u200d\u2028\u2029\u202f\u205f\u2060\u3000\ufeff]")
 """Looks like a space, or like nothing."""
+_QUOTES = "“”„«»‘’‚"
+_QUOTED = re.compile(f"[{_QUOTES}]([^{_QUOTES}\"']+)[{_QUOTES}\"']")
+_DASHED = re.compile("[‐‑–—−][0-9.]")
+"""A number behind what looks like a minus sign."""
 
 
 class TooManyErrors(Exception):
@@ -87,7 +88,7 @@ class Source:
     decoded: tuple[Node, list[Char]] | None = None
     """The scalar that inner.py was last asked about, and where its characters are written."""
     within: tuple[Path, ...] | None = None
-    """The folders, resolved, in which every file must lie that it names; None: anywhere."""
+    """The folders in which every file must lie that it names; None: anywhere."""
     files: dict[Path, object] = field(default_factory=dict)
     """What was read for it from other files as data, or the ValueError that came of it."""
     items: int = 0
@@ -104,9 +105,10 @@ class Source:
 
     @property
     def lines(self) -> list[str]:
-        """The lines, without their ends."""
+        """The lines as YAML 1.2 and editors count them, without their ends."""
         if self._lines is None:
-            self._lines = self.text.splitlines() if self.text else []
+            text = self.text.replace("\r\n", "\n").replace("\r", "\n")
+            self._lines = text.removesuffix("\n").split("\n") if text else []
         return self._lines
 
     def line(self, number: int) -> str | None:
@@ -115,14 +117,21 @@ class Source:
         return lines[number - 1] if 0 < number <= len(lines) else None
 
     def refusal(self, path: Path) -> str:
-        """Why it may not name this file, wherever links lead; or ""."""
+        """Why it may not name this file; or "".
+
+        By its name, or by where links lead, a file must lie in one of the folders: whoever may
+        write there has made the links in them. A link counts only where it is named as it lies
+        there: `link/../x` is beside what the link leads to.
+        """
         if self.within is None:
             return ""
+        named = absolute(path)
         try:
             resolved = path.resolve()
+            lies = {resolved, named} if named.resolve() == resolved else {resolved}
         except (OSError, RuntimeError):
             return f"{path.name} cannot be found"
-        if any(resolved.is_relative_to(folder) for folder in self.within):
+        if any(each.is_relative_to(folder) for each in lies for folder in self.within):
             return ""
         return f"{path.name} lies outside of the folders whose trees are served"
 
@@ -140,7 +149,7 @@ class Source:
             return
         is_error = RULES[code].severity is Severity.ERROR
         if is_error:
-            hint = self._unseen(code, span, message) or hint
+            hint = self._look_alike(code, span, message) or hint
             if self.errors >= MAX_ERRORS:
                 raise TooManyErrors
             self.errors += 1
@@ -159,17 +168,22 @@ class Source:
         if is_error and self.errors == MAX_ERRORS:
             raise TooManyErrors
 
-    def _unseen(self, code: str, span: Span, message: str) -> str | None:
-        """Name what only looks like a space, and may be why an error is found here.
+    def _look_alike(self, code: str, span: Span, message: str) -> str | None:
+        """Name what only looks like a space, a quote or a minus sign, and may be why an error is
+        found here.
 
-        Looked for in the indentation and the place itself; what is no YAML may go wrong anywhere
-        on the line, or the one above.
+        A space is looked for in the indentation and the place itself; what is no YAML may go wrong
+        anywhere on the line, or the one above.
         """
         line = self.line(span.line) or ""
         end = span.end_column - 1 if span.end_line == span.line else len(line)
         parts = [line[: len(line) - len(line.lstrip())], line[span.column - 1 : end]]
         if code == "BT102":
             parts = [line, self.line(span.line - 1) or ""]
+        if (inside := unquoted(parts[1])) is not None:
+            return f"{parts[1][0]} is a typographic quote: write {inside}"
+        if _DASHED.match(parts[1]):
+            return f"{parts[1][0]} is no minus sign: write -{parts[1][1:]}"
         odd = _UNSEEN.search("\n".join(parts))
         if odd is None or spoken(odd[0]) in message:
             return None
@@ -206,10 +220,25 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
     except DocumentError:  # is a ValueError, too
         raise
     except FileNotFoundError:
-        raise _unreadable(name, "there is no such file") from None
+        link = broken_link(path)
+        raise _unreadable(name, f"this is {link}" if link else "there is no such file") from None
     except (OSError, ValueError) as error:
         raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
     return source_of(data, name, path)
+
+
+def absolute(path: Path) -> Path:
+    """The path from the root, without "..", by its words alone: links are not followed."""
+    return Path(os.path.abspath(path))  # noqa: PTH100 - `Path.absolute` keeps ".."
+
+
+def broken_link(path: Path) -> str:
+    """Describe a link that leads to no file: ``a link to Y, which is not there``; else ""."""
+    with contextlib.suppress(OSError, ValueError):  # of a name that no file can have
+        target = os.path.realpath(path)
+        if path.is_symlink() and not os.path.exists(target):  # noqa: PTH110 - a text
+            return f"a link to {target}, which is not there"
+    return ""
 
 
 def read_stream(stream: BinaryIO | None, name: str) -> Source:
@@ -265,8 +294,6 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
         raise _unreadable(
             name, f"byte 0x{data[error.start]:02x} is no UTF-8", "BT101", line, column
         ) from None
-    if path is not None and path.suffix == ".json":
-        text = _PAIR.sub(_joined, text)
     source = Source(name, text, path)
     bad = _FORBIDDEN.search(text) if data.translate(None, _PLAIN) else None
     if bad is not None:
@@ -279,14 +306,16 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
     return source
 
 
+def unquoted(text: str) -> str | None:
+    """What stands inside of typographic quotes, where a text is in such quotes."""
+    found = _QUOTED.fullmatch(text) if text[:1] in _QUOTES else None
+    return None if found is None else found[1]
+
+
 def spoken(char: str) -> str:
     """What to call a character that nobody sees."""
-    known = {"\t": "a tab", "\n": "a line break"}.get(char)
+    known = {"\t": "a tab", "\n": "a line break", "\x85": "U+0085 (next line)"}.get(char)
     return known or f"U+{ord(char):04X} ({unicodedata.name(char, 'no name').lower()})"
-
-
-def _joined(pair: re.Match[str]) -> str:
-    return pair[1] + bytes.fromhex(pair[2] + pair[3]).decode("utf-16-be")
 
 
 def _unreadable(

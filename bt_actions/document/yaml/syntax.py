@@ -12,11 +12,14 @@ import yaml
 
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
+from bt_actions.document.yaml.indentation import column_hint
 from bt_actions.document.yaml.source import Source
 
 __all__ = ["report_syntax"]
 
 _OPENS = re.compile("flow mapping|flow sequence|quoted scalar")
+_EXPECTED = ("expected key", "expected '-' indicator", "expected <document start>")
+"""What libyaml misses where a line is not indented as those that it belongs to."""
 _REACH = 200
 """How much of a line is looked at, before and behind the place."""
 _BRACKETED = re.compile(r"""([^\s,:{}\[\]'"][^,:{}\[\]'"]*)(\[[^\[\]{}]*\]?)""")
@@ -43,8 +46,8 @@ def report_syntax(source: Source, error: yaml.YAMLError) -> None:
     """Report what libyaml raised. After it nothing can be read on."""
     what = getattr(error, "context", None) or ""
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
-    if "block scalar" in what:
-        mark = error.context_mark  # type: ignore[attr-defined]  # where its '>' or '|' stands
+    if "block scalar" in what or "simple key" in what:
+        mark = error.context_mark  # type: ignore[attr-defined]  # where it begins
     problem = getattr(error, "problem", None) or str(error) or "this is not YAML"
     line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
     if line > len(source.lines) > 0:
@@ -77,10 +80,13 @@ def _explain(source: Source, problem: str, line: int, column: int) -> _Said:
         return cut
     if "could not find expected ':'" in problem:
         return _Said(span, "a key without its ':'")
-    if "did not find expected key" in problem:
-        return _Said(span, "this does not line up with the keys above", "check the indentation")
-    if "did not find expected '-' indicator" in problem:
-        return _Said(span, "this does not line up with the list above", "check the indentation")
+    if any(expected in problem for expected in _EXPECTED):
+        if column > len(indent) + 1:
+            return _Said(span, "this cannot stand behind what is before it", "put it in quotes")
+        return _Said(
+            span, f"this lines up with nothing above: it begins in column {column}",
+            column_hint(source, line) or "check the indentation",
+        )  # fmt: skip
     if "unexpected end of stream" in problem:
         return _Said(span, "the quote that was opened is never closed")
     if "cannot start any token" in problem:
@@ -98,7 +104,7 @@ def _second_colon(source: Source, text: str, span: Span) -> _Said:
     unspaced = _UNSPACED.match(source.lines[above - 1])
     if unspaced is None:
         message = "this line goes on with the text above it, where no ':' can stand"
-        return _Said(span, message, "check the indentation")
+        return _Said(span, message, column_hint(source, span.line) or "check the indentation")
     key, rest = unspaced[1], unspaced[2].rstrip()
     column = unspaced.end(1) + 1
     span = Span(above, column, above, column + 1)

@@ -68,7 +68,7 @@ def begin(goal: Facts) -> State:
 def rejected(goal: Facts) -> State:
     """Nothing was started: REJECTED, or what it was canceled for."""
     goal.end = End.NEVER_STARTED
-    why = f"{goal.server} refused the goal"
+    why = f"{goal.server} refused the goal {goal.fields}".rstrip()
     if goal.planned is Outcome.ACCEPT_TIMEOUT:  # this is the answer, though late
         goal.settle(Outcome.REJECTED, why)
     goal.settle_as_planned(Outcome.REJECTED, why)

@@ -63,12 +63,12 @@ def ask_for_result(goal: Facts) -> State:
 @leads_to(State.DONE)
 def finished(goal: Facts) -> State:
     """SUCCEEDED, ABORTED or CANCELED_BY_OTHER."""
-    ended = goal.take_result()
-    told = {
-        STATUS_CANCELED: "canceled, and not by this process",
-        STATUS_ABORTED: f"aborted by {goal.server}",
-    }
-    goal.settle(OUTCOMES[ended], told.get(ended, ""))
+    ended, why = goal.take_result(), ""
+    if ended == STATUS_ABORTED:
+        why = f"aborted by {goal.server}{goal.blamed}"
+    elif ended == STATUS_CANCELED:
+        why = "canceled, and not by this process"
+    goal.settle(OUTCOMES[ended], why)
     return State.DONE
 
 

@@ -20,6 +20,7 @@ from rclpy.action.server import (
     ServerGoalHandle,
 )
 
+from bt_actions.ros.naming import warn_of_remapping
 from bt_actions.ros.serving.endpoints import Endpoints
 
 
@@ -33,6 +34,8 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
         dropped: called with the goal's id where the client could not be told of that.
         cancel: called with a goal when its client has been granted its cancel, and again as long as
             that is under way; it may come before `accepted` and `dropped`.
+        yields: whether another server of this name answers: this one then does so for its own
+            goals only, and leaves all else unanswered, as a client takes the first answer.
         keeps: seconds for which a result can be asked for.
     """
 
@@ -46,13 +49,16 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
         accepted: Callable[[ServerGoalHandle, Any], None],
         dropped: Callable[[bytes], None],
         cancel: Callable[[ServerGoalHandle], None],
+        yields: Callable[[], bool],
         keeps: int,
     ) -> None:
+        self._yields = yields
         self._admit, self._accepted, self._dropped = admit, accepted, dropped
         self._cancel = cancel
         self._admitted: dict[int, Any] = {}
         """What `admit` returned, until it is handed over; by the request's id in Python, as rclpy
         tells of no other."""
+        warn_of_remapping(endpoints.node, name)
         super().__init__(
             endpoints.node,
             action_type,
@@ -101,6 +107,23 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
     remove_future = add_future
 
     # Requests; on the executor's threads
+
+    async def execute(self, taken_data: dict[str, Any]) -> None:
+        """Do what rclpy does with what was taken from the middleware, unless another is to."""
+        if taken_data and self._yields():
+            taken_data = {
+                what: taken for what, taken in taken_data.items() if self._is_own(what, taken)
+            }
+        await super().execute(taken_data)
+
+    def _is_own(self, what: str, taken: Any) -> bool:
+        if what == "expired":
+            return True
+        request = taken[1]
+        goal = request.goal_info if what == "cancel" else request
+        goal_id = bytes(goal.goal_id.uuid)
+        own = self._goal_handles.keys() | ({bytes(16)} if self._goal_handles else set())
+        return what != "goal" and goal_id in own  # zeros: whoever cancels all, cancels ours
 
     async def _execute_goal_request(self, request_header_and_message: Any) -> None:
         try:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Generator, Iterator
-from typing import Any
+from collections.abc import Callable, Generator, Iterator
+from typing import Any, Self
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -48,6 +48,38 @@ def heard(message_type: type, depth: int) -> Generator[Any]:
             node.executor.spin_once(GLANCE)
             yield from came
             came.clear()
+
+
+class Asker:
+    """Calls one service after another; a context manager."""
+
+    def __enter__(self) -> Self:
+        self._context = _asking()
+        self._node = self._context.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._context.__exit__(*error)
+
+    def find(self, service_type: type, fits: Callable[[str], bool]) -> str:
+        """Return the first service of a type whose name fits; "" where none comes in sight."""
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            for name, types in sorted(self._node.get_service_names_and_types()):
+                if interface_name(service_type) in types and fits(name):
+                    return str(name)
+            self._node.executor.spin_once(GLANCE)
+        return ""
+
+    def ask(self, service_type: Any, name: str, request: Any) -> Any:
+        """Return what a service answers; None where it does not."""
+        client, future = self._node.create_client(service_type, name), None
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until and not (future and future.done()):
+            if future is None and client.service_is_ready():
+                future = client.call_async(request)
+            self._node.executor.spin_once(GLANCE)
+        return future.result() if future is not None and future.done() else None
 
 
 def answers(service_type: Any, namespace: str) -> dict[str, Any]:

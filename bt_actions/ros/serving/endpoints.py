@@ -67,9 +67,21 @@ class Endpoints:
         finally:
             taken.set()
 
-    def service(self, kind: type, name: str, callback: Callable[..., Any]) -> None:
-        """Offer a service; the callback may be a coroutine."""
+    def service(
+        self,
+        kind: type,
+        name: str,
+        callback: Callable[..., Any],
+        *,
+        silent: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Offer a service; the callback may be a coroutine.
+
+        While it is `silent`, nobody is answered: of two answers a client takes the first.
+        """
         service = self.node.create_service(kind, name, callback, callback_group=self.group)
+        send = service.send_response
+        service.send_response = lambda *answer: None if silent() else send(*answer)
         self._made.callback(self.node.destroy_service, service)
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile | int) -> Any:
@@ -78,7 +90,9 @@ class Endpoints:
         self._made.callback(self.node.destroy_publisher, publisher)
         return publisher
 
-    def timer(self, period: float, callback: Callable[[], None], *, autostart: bool = True) -> Any:
+    def timer(
+        self, period: float, callback: Callable[[], object], *, autostart: bool = True
+    ) -> Any:
         """Return a timer on the steady clock."""
         timer = self.node.create_timer(
             period,

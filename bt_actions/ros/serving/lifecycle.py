@@ -15,8 +15,8 @@ from lifecycle_msgs.msg import State, Transition, TransitionDescription, Transit
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from bt_actions.ros.log import log
 from bt_actions.ros.serving.endpoints import Endpoints
+from bt_actions.ros.serving.telling import Telling
 from bt_actions.utilities.plain_text import in_words
 
 
@@ -27,9 +27,11 @@ class Lifecycle:
     the state is as before. One change at a time.
     """
 
-    def __init__(self, endpoints: Endpoints, steps: Mapping[str, Callable[[], None]]) -> None:
+    def __init__(
+        self, endpoints: Endpoints, steps: Mapping[str, Callable[[], None]], tell: Telling
+    ) -> None:
         node = self._node = endpoints.node
-        self._steps, self._off = steps, endpoints.off
+        self._steps, self._off, self._say = steps, endpoints.off, tell
         self._changes = threading.Lock()
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, False)
@@ -56,12 +58,12 @@ class Lifecycle:
         try:
             self._trigger(transition)
             state = self.state
-            log.info(f"{self._node.get_name()}: {state}")
+            self._say("info", state)
             try:
                 self._steps[state]()
                 how = "success"
             except Exception as error:  # noqa: BLE001 - it is told, and the state is as before
-                log.error(f"{self._node.get_name()}: {state} failed: {in_words(error)}")
+                self._say("error", f"{state} failed: {in_words(error)}")
                 how = "failure"
             self._trigger(f"transition_{how}")
         except (KeyError, RuntimeError):  # rclpy's RCLError: the context was shut down

@@ -1,0 +1,116 @@
+"""One name with two types: an action server, a service or a topic, over all trees included: BT217.
+
+Names that are relative in one place and absolute in the other are taken for two: the namespace that
+the tree runs in is not known here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from bt_actions.document.checking.checker import Checker
+from bt_actions.document.findings import Place, Related
+from bt_actions.document.reading.settings import join_names, server_of, shared_settings, text_of
+from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.yaml.nodes import Node, span_of
+from bt_actions.messages.interfaces import RUN_TREE
+
+__all__ = ["check_names"]
+
+_WORDS = {"action": "the action server", "srv": "the service", "msg": "the topic"}
+_KINDS = {"action": ("action", "server"), "service": ("srv", "server"),
+          "publish": ("msg", "publish"), "wait_for_message": ("msg", "topic")}  # fmt: skip
+"""What kinds of nodes connect to, and the key that names it."""
+_Name = tuple[str, str]
+"""The kind of interface, and the full name."""
+
+
+class _Use(NamedTuple):
+    """Where a name is used with a type; `at` is in the document that is checked."""
+
+    type: str
+    place: Place
+    at: Node
+
+
+_Known = dict[int, dict[_Name, _Use]]
+
+
+def check_names(checker: Checker) -> None:
+    """Report each name that a tree uses with another type than before."""
+    first: dict[_Name, _Use] = {}
+    told: set[_Name] = set()
+    for name, use in _uses(checker.document, {}):
+        other = first.setdefault(name, use)
+        if other.type != use.type and name not in told and use.at is not other.at:
+            told.add(name)
+            kind, full = name
+            inside = use.place.file != checker.source.name
+            here = f"in {use.place.file}:{use.place.line}" if inside else "here"
+            checker.source.report(
+                "BT217", span_of(use.at),
+                f"{_WORDS[kind]} {full!r} is {use.type} {here}, and {other.type} elsewhere",
+                related=Related(other.place, "elsewhere"),
+                hint="correct one of the two types, or one of the names",
+            )  # fmt: skip
+
+
+def _uses(document: Document, known: _Known) -> Iterator[tuple[_Name, _Use]]:
+    """The names that a document uses, in its own namespace; `known` keeps those of the included."""
+    for declared in document.topics.values():
+        at = _place(declared, document, document.node.get("import") or document.node)
+        yield from _use("msg", "topic", declared.values, at, document)
+    seen: set[tuple[str | None, str]] = set()
+    for node in document.nodes():
+        kind, key = _KINDS.get(node.kind.name if node.kind is not None else "action", ("", ""))
+        namespace = text_of(node.values, "namespace")
+        if node.alias is not None:
+            if (node.alias, namespace) in seen or node.alias not in document.actions:
+                continue
+            seen.add((node.alias, namespace))
+            settings = {**shared_settings(node.alias, document), **node.values}
+            at = _place(document.actions[node.alias], document, node.key)
+            yield from _use("action", "server", settings, at, document)
+        elif node.included is not None:
+            yield from _included(node, document, known)
+        elif node.kind is not None and node.kind.name == "run_tree":
+            values = {"type": RUN_TREE, "server": server_of(node.values), "namespace": namespace}
+            yield from _use("action", "server", values, (node.place, node.key), document)
+        elif kind:
+            at = node.place, node.written.get("type", node.key)
+            yield from _use(kind, key, node.values, at, document)
+
+
+def _place(declared: Declared, document: Document, used: Node) -> tuple[Place, Node]:
+    """Where a name is declared, and where that is told in the document, which may import it."""
+    own = declared.source is document.source
+    return declared.place, declared.written("type") if own else used
+
+
+def _included(node: TreeNode, document: Document, known: _Known) -> Iterator[tuple[_Name, _Use]]:
+    included = node.included
+    assert included is not None
+    below = known.get(id(included))
+    if below is None:
+        below = known[id(included)] = {}
+        for name, use in _uses(included, known):
+            below.setdefault(name, use)
+    for (kind, named), use in below.items():
+        full = join_names(document.namespace, text_of(node.values, "namespace"), named)
+        yield (kind, full), use._replace(at=node.key)
+
+
+def _use(
+    kind: str,
+    key: str,
+    values: Mapping[str, object],
+    at: tuple[Place, Node],
+    document: Document,
+) -> Iterator[tuple[_Name, _Use]]:
+    name, given = text_of(values, key), text_of(values, "type")
+    if name and given:
+        package, _, short = given.partition("/")
+        full = join_names(document.namespace, text_of(values, "namespace"), name)
+        whole = f"{package}/{kind}/{short.rpartition('/')[2]}"
+        yield (kind, full), _Use(whole, *at)

@@ -1,0 +1,34 @@
+"""What to write for a decorator that was written as a setting of another node."""
+
+from __future__ import annotations
+
+from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
+
+__all__ = ["around"]
+
+_SETTINGS = {"retry": ("attempts", "3"), "repeat": ("times", "3"), "timeout": ("after", "30 s"),
+             "for_each": ("in", "[...]")}  # fmt: skip
+"""The key that says how often, or how long, and an example of its value."""
+_LONGEST = 40
+_SIGNS = frozenset(":,{}[]#\n")
+
+
+def around(written: Mapping, outer: Scalar, inner: Scalar) -> str:
+    """Put a decorator around a node: `outer` and `inner` are the two keys of what was written."""
+    decorator, said = outer.text, _text(written.get(outer.text))
+    name = _text(written.get(inner.text))
+    parts = [f"{decorator}: {said if decorator == 'while' else name}"]
+    if decorator in _SETTINGS:
+        key, example = _SETTINGS[decorator]
+        given = _text(written.get(key))
+        if given == "..." and said[:1].isdigit():
+            given = said
+        parts.append(f"{key}: {example if given == '...' else given}")
+    parts.append(f"child: {{{inner.text}: {name}, ...}}")
+    return f"a {decorator!r} goes around the node: {{{', '.join(parts)}}}"
+
+
+def _text(node: Node | None) -> str:
+    """A short scalar as it is, if it can stand in braces so; dots for anything else."""
+    said = node.text if isinstance(node, Scalar) else ""
+    return said if 0 < len(said) <= _LONGEST and _SIGNS.isdisjoint(said) else "..."

@@ -1,0 +1,45 @@
+"""What to write for a message that was given as a list of numbers: ``{x: 1.0, y: 2.0, z: 0.0}``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from bt_actions.messages.fields import FLOATS, INTEGERS, Message, Scalar, describe
+from bt_actions.messages.interfaces import interface_name
+from bt_actions.utilities.shorten import shorten
+
+_PARTS = (list, tuple, Mapping, str)
+_ANGLES = "{roll: %s, pitch: %s, yaw: %s}"
+
+
+def as_fields(cls: type, value: object) -> str:
+    """The fields of a message, filled with the numbers of a list in their order; "" where they do
+    not fit it. What a variable gives stands as dots."""
+    if not isinstance(value, (list, tuple)) or any(isinstance(each, _PARTS) for each in value):
+        return ""
+    items = [shorten(each, 20) if isinstance(each, (int, float)) else "..." for each in value]
+    if interface_name(cls) == "geometry_msgs/msg/Quaternion":
+        if len(items) == 3:
+            return _ANGLES % tuple(items)
+        return f"{_filled(cls, iter(items))} or {{yaw: 90 deg}}" if len(items) == 4 else ""
+    return _filled(cls, iter(items)) if 1 < len(items) == _numbers_in(cls) else ""
+
+
+def _numbers_in(cls: type) -> int:
+    """How many numbers a message consists of; 0 where there is something else in it."""
+    counts = []
+    for kind in describe(cls).values():
+        if isinstance(kind, Message):
+            counts.append(_numbers_in(kind.cls))
+        else:
+            number = isinstance(kind, Scalar) and (kind.name in FLOATS or kind.name in INTEGERS)
+            counts.append(int(number))
+    return sum(counts) if all(counts) else 0
+
+
+def _filled(cls: type, items: Iterator[str]) -> str:
+    parts = []
+    for name, kind in describe(cls).items():
+        inner = _filled(kind.cls, items) if isinstance(kind, Message) else next(items)
+        parts.append(f"{name}: {inner}")
+    return f"{{{', '.join(parts)}}}"
