@@ -295,7 +295,7 @@ def test_a_relative_name_is_the_same_action_as_the_full_one(node: Node, name: st
 def test_two_types_under_one_name_are_an_error_that_names_both(node: Node, name: str) -> None:
     first, second = MoveRobot("a", 1.0, action_name=name), Gripper("b", 1.0, action_name=name)
     first.setup(node=node)
-    with pytest.raises(TypeError, match=rf"{name}.*MoveRobot.*Gripper"):
+    with pytest.raises(TypeError, match=rf"{name}.*Gripper.*MoveRobot"):
         second.setup(node=node)
     first.shutdown()
     second.setup(node=node)  # the name is free again
