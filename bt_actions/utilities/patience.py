@@ -10,14 +10,17 @@ from functools import partial
 from typing import Any, Self, TypeVar
 
 T = TypeVar("T")
+_LEAST = 0.1
+"""Seconds in which a file is read where nothing is wrong with its disk."""
 _Jobs = queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]
 
 
 class Patience:
     """Does one piece of work after another on a thread of its own, and waits so long for each.
 
-    Each is waited for `seconds`; a quarter of that while another hangs, as many files may lie on
-    one stuck mount. A context manager, at whose end the thread goes; for one user at a time.
+    Each is waited for `seconds`, and for half as long with each other one that hangs, as many files
+    may lie on one stuck mount. A context manager, at whose end the thread goes; for one user at a
+    time.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -41,7 +44,7 @@ class Patience:
         if future is None:
             future = self._submit(work)
             try:
-                return future.result(self.seconds / 4 if self._hanging else self.seconds)
+                return future.result(max(self.seconds / 2 ** len(self._hanging), _LEAST))
             except TimeoutError:
                 if future.done():
                     raise
