@@ -136,7 +136,8 @@ class Facts:
     def fields(self) -> str:
         """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
         given = given_fields(self.message) or self.message  # one that gives none is told whole
-        return shorten(given, FIELDS_SHOWN) if given else ""
+        text = shorten(given, FIELDS_SHOWN) if given else ""
+        return f"{text}}}" if text.endswith("…") else text
 
     # For the steps
 

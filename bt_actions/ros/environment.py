@@ -82,9 +82,11 @@ def of_other_users() -> str:
         segments = [each for each in os.scandir(SHARED) if each.name.startswith(_SEGMENT)]
         others = any(each.stat().st_uid != os.getuid() for each in segments)
         if others and f"{SHARED}/{_SEGMENT}" in Path("/proc/self/maps").read_text():
+            here = os.environ.get(_RANGES[0]) == Reach.MACHINE.value
+            without = f", without {_RANGES[0]}=LOCALHOST" if here else ""
             return (
-                "; its server may be another user's, with whom Fast DDS shares no memory: set "
-                f"{_TRANSPORTS}=UDPv4 for both, and no {_RANGES[0]}=LOCALHOST"
+                "; its server may be another user's, who shares no memory with this process: "
+                f"set {_TRANSPORTS}=UDPv4 for both{without}"
             )
     return ""
 

@@ -52,7 +52,10 @@ def control(action: str, command: str, beginning: str) -> str:
         if told is None:
             raise NotControlled(f"{found} does not answer")
         runs = {
-            bytes(each.uuid).hex(): clean(tree.name) for tree in told.trees for each in tree.running
+            bytes(each.uuid).hex(): clean(tree.name)
+            for tree in told.trees
+            for each in tree.running
+            if beginning or each not in tree.waiting
         }
         goal_id = _chosen(action, runs, beginning)
         request = ControlTree.Request(

@@ -30,11 +30,14 @@ _LONGEST_NAME = 60
 """Characters of a name that nobody knows in what is said of it."""
 PATIENCE = 2.0
 """Seconds in which a file or a folder must be read: less than a client waits for its answer."""
-AT_START = 10.0
-"""The same when the trees are read first: nobody waits, and much is imported for them."""
+AT_START = 5.0
+"""The same when the trees are read first, and much is imported for them."""
 RACY = 1_000_000_000
 """Nanoseconds in which two changes of a file may have the same time of change."""
-_NOT_READ = f"this cannot be read: there is no answer within {PATIENCE:g} s; is its disk there?"
+_NOT_READ = (
+    f"this, or a file that it names, cannot be read: there is no answer within {PATIENCE:g} s; "
+    "are their disks there?"
+)
 _Stamp = tuple[int, int, int] | None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
@@ -55,7 +56,8 @@ def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
 class Diagnostics:
     """Publishes what `look` returns: how the trees stand, and why the server accepts nothing.
 
-    `look` is called by what `submit` submits it to, not on the executor's threads.
+    `look` is called by what `submit` submits it to, not on the executor's threads. A server that
+    `yields` to another, which may have a node of the same name, has its process in the names.
     """
 
     def __init__(
@@ -63,8 +65,10 @@ class Diagnostics:
         endpoints: Endpoints,
         look: Callable[[], tuple[Iterable[Standing], str]],
         submit: Callable[[Callable[[], None]], object],
+        yields: Callable[[], bool],
     ) -> None:
         self._node, self._look, self._submit = endpoints.node, look, submit
+        self._yields = yields
         self._publisher = endpoints.publisher(DiagnosticArray, "/diagnostics", 10)
         endpoints.timer(PERIOD, self._on_timer)
 
@@ -74,11 +78,14 @@ class Diagnostics:
 
     def _tell(self) -> None:
         standings, refuses = self._look()
-        message = DiagnosticArray(status=[self._status(each, refuses) for each in standings])
+        who = self._node.get_fully_qualified_name()
+        if self._yields():
+            who += f" (process {os.getpid()})"
+        message = DiagnosticArray(status=[self._status(who, each, refuses) for each in standings])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
-    def _status(self, standing: Standing, refuses: str) -> DiagnosticStatus:
+    def _status(self, who: str, standing: Standing, refuses: str) -> DiagnosticStatus:
         level, message = judge(standing, refuses)
         values = {
             "state": standing.state.name,
@@ -88,7 +95,7 @@ class Diagnostics:
         }
         return DiagnosticStatus(
             level=level,
-            name=f"{self._node.get_fully_qualified_name()}: {standing.tree}",
+            name=f"{who}: {standing.tree}",
             message=message,
             hardware_id=self._node.get_namespace(),
             values=[KeyValue(key=key, value=value) for key, value in values.items()],

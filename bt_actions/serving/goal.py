@@ -49,4 +49,4 @@ class Goal:
         changes = self.run.changes
         if changes != self._told or now - self._told_at >= SLOWEST - FASTEST / 2:
             self._told, self._told_at = changes, now
-            self.client.publish_feedback(feedback(self.run))
+            self.client.publish_feedback(feedback(self.run, begun=self.begun))

@@ -30,10 +30,14 @@ def result(outcome: RunOutcome) -> RunTree.Result:
     )
 
 
-def feedback(run: Run) -> RunTree.Feedback:
+def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
     """How far a run is."""
-    leaves = [RunningLeaf(**leaf._asdict()) for leaf in run.running()]
-    return RunTree.Feedback(running=leaves, leaves_ended=run.leaves_ended, paused=run.paused)
+    return RunTree.Feedback(
+        running=[RunningLeaf(**leaf._asdict()) for leaf in run.running()],
+        leaves_ended=run.leaves_ended,
+        paused=run.paused,
+        waiting=not begun,
+    )
 
 
 def finding(said: Said) -> Finding:
@@ -41,9 +45,9 @@ def finding(said: Said) -> Finding:
     return Finding(**said._asdict())
 
 
-def info(entry: Entry, running: Iterable[tuple[UUID, Run]]) -> TreeInfo:
-    """A tree that can be run, and the goals and runs that there are of it."""
-    tree, running = entry.tree, list(running)
+def info(entry: Entry, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
+    """A tree that can be run, and the goals of it: the run of each, and whether that has begun."""
+    tree, goals = entry.tree, list(goals)
     return TreeInfo(
         name=entry.name,
         description="" if tree is None else tree.description,
@@ -51,8 +55,9 @@ def info(entry: Entry, running: Iterable[tuple[UUID, Run]]) -> TreeInfo:
         digest=entry.digest,
         state=entry.state.value,
         findings=[finding(each) for each in (*entry.findings, *warnings_of(entry))],
-        running=[goal_id for goal_id, _ in running],
-        paused=[goal_id for goal_id, run in running if run.paused],
+        running=[goal_id for goal_id, _, _ in goals],
+        paused=[goal_id for goal_id, run, _ in goals if run.paused],
+        waiting=[goal_id for goal_id, _, begun in goals if not begun],
         inputs=[
             TreeInput(
                 name=each.name,

@@ -53,6 +53,7 @@ class Ending(enum.Enum):
     REPLACED = (Code.REPLACED, "a newer goal replaced it")
     HALTED = (Code.HALTED, "it was halted")
     DEACTIVATED = (Code.DEACTIVATED, "its server was deactivated")
+    SERVER_ENDS = (Code.DEACTIVATED, "its server ends")
 
 
 @dataclass(frozen=True, slots=True)

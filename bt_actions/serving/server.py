@@ -138,7 +138,7 @@ class TreeServer:
         )
         endpoints.service(ControlTree, "~/control_tree", control.answer, silent=silent)
         self._timer = endpoints.timer(FASTEST, self._tell, autostart=False)
-        Diagnostics(endpoints, self._standings, self._worker.submit)
+        Diagnostics(endpoints, self._standings, self._worker.submit, self.precedence.yields)
         self.lifecycle: Lifecycle | None = None
         if managed:
             steps = {
@@ -161,7 +161,7 @@ class TreeServer:
         """
         if self.lifecycle is not None:
             self.lifecycle.stop()
-        self.halt(Ending.DEACTIVATED)
+        self.halt(Ending.SERVER_ENDS)
         with contextlib.suppress(RuntimeError):  # of an interpreter that ends
             wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
         time.sleep(_LINGER)
@@ -309,12 +309,9 @@ class TreeServer:
         entries = await self._off(self.catalog.entries)
         with self._lock:
             goals = list(self._goals.values())
+        there = [(each.tree, (each.client.goal_id, each.run, each.begun)) for each in goals]
         response.trees = [
-            info(
-                entry,
-                [(each.client.goal_id, each.run) for each in goals if each.tree == entry.name],
-            )
-            for entry in entries
+            info(entry, [goal for tree, goal in there if tree == entry.name]) for entry in entries
         ]
         return response
 
@@ -389,8 +386,8 @@ class TreeServer:
     def _tell(self) -> None:
         """Tell the clients how far their runs are; the timer's callback."""
         with self._lock:
-            goals = [goal for goal in self._turns.running if goal.begun]
-            if not goals:
+            goals = [*self._turns.running, *self._turns.waiting]
+            if not any(goal.begun for goal in goals):
                 self._timer.cancel()
         now = time.monotonic()
         for goal in goals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,8 @@ import pytest
 from tests.support.processes import Process
 
 if TYPE_CHECKING:
+    from rclpy.node import Node
+
     from tests.support.tree_client import TreeClient
 
 MAIN = "import sys; from bt_actions.cli import main; sys.exit(main())"
@@ -100,3 +103,26 @@ def client(fresh_context: Any, space: str) -> Iterator[TreeClient]:
     client = TreeClient(fresh_context, space)
     yield client
     client.close()
+
+
+@pytest.fixture
+def new_node(context: Any, space: str) -> Iterator[Callable[[str], Node]]:
+    """Make nodes in the test's namespace, which are spun."""
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.node import Node
+
+    executor = SingleThreadedExecutor(context=context)
+    nodes: list[Node] = []
+
+    def make(name: str) -> Node:
+        nodes.append(Node(name, context=context, namespace=space))
+        executor.add_node(nodes[-1])
+        return nodes[-1]
+
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    yield make
+    executor.shutdown()
+    thread.join()
+    for each in nodes:
+        each.destroy_node()

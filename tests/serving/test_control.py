@@ -166,6 +166,22 @@ def test_control_takes_the_one_run_there_is_or_the_beginning_of_its_id(
     client.result(first)
 
 
+def test_a_run_that_waits_for_its_turn_is_told_of_as_one_and_is_not_meant(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, control: Control
+) -> None:
+    serve()
+    serve_trees("--policy", "queue")
+    first, second = client.send("move", LONG), client.send("move", LONG)
+    client.until(lambda: second.feedback and second.feedback[-1].waiting, "it waits")
+    assert not any(each.waiting for each in first.feedback)
+    move = next(each for each in client.call(ListTrees).trees if each.name == "move")
+    assert [list(each.uuid) for each in move.waiting] == [list(second.handle.goal_id.uuid)]
+    assert control("halt") == (0, f"being halted: move {id_of(first)}")
+    client.until(lambda: not second.feedback[-1].waiting, "its turn has come")
+    client.cancel(second)
+    client.result(second)
+
+
 def test_call_shows_that_its_run_is_paused(
     serve: Callable[..., Journal],
     serve_trees: Serve,

@@ -6,8 +6,12 @@ import json
 from collections.abc import Callable
 
 from bt_actions_interfaces.msg import TreeInfo, TreeInput
+from bt_actions_interfaces.srv import ListTrees
+from rclpy.node import Node
 
 from bt_actions.cli.commands.list_trees import text_of, tree_data
+from bt_actions.ros.serving.endpoints import Endpoints
+from bt_actions.serving.asking import trees_in_sight
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Process
 
@@ -49,3 +53,19 @@ def test_what_a_server_says_cannot_command_the_terminal() -> None:
     text = "".join(text_of({"/s": [tree_data(tree)]}))
     assert "\x1b" not in text
     assert "\n" not in text
+
+
+def test_a_server_that_was_not_asked_at_first_is_asked_again(
+    new_node: Callable[[str], Node], space: str
+) -> None:
+    """As where another server of the service, which leaves it to this one, was discovered first."""
+    asked: list[ListTrees.Request] = []
+
+    def answer(request: ListTrees.Request, response: ListTrees.Response) -> ListTrees.Response:
+        asked.append(request)
+        return response
+
+    endpoints = Endpoints(new_node("bt_actions_serve"))
+    endpoints.service(ListTrees, "~/list_trees", answer, silent=lambda: len(asked) < 2)
+    assert trees_in_sight(space) == {f"{space}/bt_actions_serve": []}
+    endpoints.close()

@@ -6,10 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
@@ -18,7 +16,6 @@ from bt_actions_interfaces.srv import CheckTree
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.action import ActionServer
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from bt_actions.goals.ids import new_goal_id
@@ -58,11 +55,12 @@ def test_a_second_server_says_so_and_leaves_every_goal_to_the_first(
     first = serve_trees()
     second = start_second()
     waits(second, first, space)
-    levels: set[bytes] = set()
+    levels: dict[str, set[bytes]] = {}
 
     def hear(message: DiagnosticArray) -> None:
-        mine = [each for each in message.status if each.hardware_id == space]
-        levels.update(each.level for each in mine if "for longer" in each.message)
+        for each in message.status:
+            if each.hardware_id == space and each.name.endswith(": empty"):
+                levels.setdefault(each.name, set()).add(each.level)
 
     client.node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
     for _ in range(5):
@@ -73,7 +71,12 @@ def test_a_second_server_says_so_and_leaves_every_goal_to_the_first(
         assert not any(each.code == "INACTIVE" for each in asked.findings), "the first is asked"
     until(lambda: begun(first) == 5)
     assert begun(second) == 0
-    client.until(lambda: levels == {DiagnosticStatus.ERROR}, "it is in the diagnostics")
+    node = f"{space}/bt_actions_serve"
+    told = {
+        f"{node}: empty": {DiagnosticStatus.OK},
+        f"{node} (process {second.popen.pid}): empty": {DiagnosticStatus.ERROR},
+    }
+    client.until(lambda: levels == told, "it is in the diagnostics")
     first.send(signal.SIGTERM)
     assert first.wait() == 0
     second.line("ready: ")
@@ -91,26 +94,6 @@ def test_where_the_first_was_killed_on_this_machine_the_second_answers_at_once(
     second.line("ready: ")
     third = start_second()
     waits(third, second, space)
-
-
-@pytest.fixture
-def new_node(context: Any, space: str) -> Iterator[Callable[[str], Node]]:
-    """Make nodes in the test's namespace, which are spun."""
-    executor = SingleThreadedExecutor(context=context)
-    nodes: list[Node] = []
-
-    def make(name: str) -> Node:
-        nodes.append(Node(name, context=context, namespace=space))
-        executor.add_node(nodes[-1])
-        return nodes[-1]
-
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    yield make
-    executor.shutdown()
-    thread.join()
-    for each in nodes:
-        each.destroy_node()
 
 
 def test_of_two_that_have_both_begun_the_later_one_yields(

@@ -79,6 +79,7 @@ def tree_data(tree: Any) -> dict[str, Any]:
         ],
         "running": [bytes(each.uuid).hex() for each in tree.running],
         "paused": [bytes(each.uuid).hex() for each in tree.paused],
+        "waiting": [bytes(each.uuid).hex() for each in tree.waiting],
         "inputs": [
             {
                 "name": clean(one.name),
@@ -106,11 +107,9 @@ def text_of(servers: dict[str, list[dict[str, Any]] | None]) -> list[str]:
                 default = "" if each["required"] else f" = {each['default_json']}"
                 about = f"  {each['description']}" if each["description"] else ""
                 lines.append(f"    {each['name']}: {each['type']}{unit}{default}{about}")
-            paused = tree["paused"]
-            lines += [
-                f"    {'paused' if each in paused else 'running'}: {each}"
-                for each in tree["running"]
-            ]
+            for each in tree["running"]:
+                states = [state for state in ("paused", "waiting") if each in tree[state]]
+                lines.append(f"    {' and '.join(states) or 'running'}: {each}")
             lines += [_finding_text(tree["state"], each) for each in tree["findings"]]
     return lines
 

@@ -62,7 +62,8 @@ class CallView(GoalView):
         if message is None:
             return ""
         running = ", ".join(_leaf_text(each) for each in message.running)
-        return f"paused{': ' if running else ''}{running}" if message.paused else running
+        state = "waits for its turn" if message.waiting else "paused" if message.paused else ""
+        return ": ".join(filter(None, [state, running]))
 
     def result_lines(self) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""

@@ -18,6 +18,8 @@ from bt_actions.ros.workarounds import participant
 
 PATIENCE = 5.0
 """Seconds for a server to come in sight, and for one to answer."""
+AGAIN = 1.0
+"""Seconds after which a request without an answer is sent again."""
 GLANCE = 0.05
 """Seconds between two looks."""
 
@@ -50,6 +52,29 @@ def heard(message_type: type, depth: int) -> Generator[Any]:
             came.clear()
 
 
+class _Question:
+    """A request that is sent again each second until it is answered.
+
+    Of several servers of a service, the one that answers may be discovered last.
+    """
+
+    def __init__(self, node: Node, service_type: Any, name: str, request: Any) -> None:
+        self._client = node.create_client(service_type, name)
+        self._request = request
+        self._sent: list[Any] = []
+        self._next = 0.0
+
+    def answer(self) -> Any:
+        """Return the answer; None as long as there is none. Sends the request where it is time."""
+        for future in self._sent:
+            if future.done():
+                return future.result()
+        if time.monotonic() >= self._next and self._client.service_is_ready():
+            self._sent.append(self._client.call_async(self._request))
+            self._next = time.monotonic() + AGAIN
+        return None
+
+
 class Asker:
     """Calls one service after another; a context manager."""
 
@@ -73,32 +98,26 @@ class Asker:
 
     def ask(self, service_type: Any, name: str, request: Any) -> Any:
         """Return what a service answers; None where it does not."""
-        client, future = self._node.create_client(service_type, name), None
+        question = _Question(self._node, service_type, name, request)
         until = time.monotonic() + PATIENCE
-        while time.monotonic() < until and not (future and future.done()):
-            if future is None and client.service_is_ready():
-                future = client.call_async(request)
+        while (answer := question.answer()) is None and time.monotonic() < until:
             self._node.executor.spin_once(GLANCE)
-        return future.result() if future is not None and future.done() else None
+        return answer
 
 
 def answers(service_type: Any, namespace: str) -> dict[str, Any]:
     """Ask every service of a type below a namespace; by its name, None where it does not answer."""
     below = f"/{namespace.strip('/')}/".replace("//", "/")
-    clients: dict[str, Any] = {}
-    futures: dict[str, Any] = {}
+    asked: dict[str, _Question] = {}
     begun = time.monotonic()
     with _asking() as node:
-        while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if clients else 0.0):
+        while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if asked else 0.0):
             for name, types in node.get_service_names_and_types():
                 fits = interface_name(service_type) in types and name.startswith(below)
-                if fits and name not in clients:
-                    clients[name] = node.create_client(service_type, name)
-            for name, client in clients.items():
-                if name not in futures and client.service_is_ready():
-                    futures[name] = client.call_async(service_type.Request())
-            all_called = 0 < len(futures) == len(clients)
-            if now >= DISCOVERS and all_called and all(each.done() for each in futures.values()):
+                if fits and name not in asked:
+                    asked[name] = _Question(node, service_type, name, service_type.Request())
+            missing = [each for each in asked.values() if each.answer() is None]
+            if now >= DISCOVERS and asked and not missing:
                 break
             node.executor.spin_once(GLANCE)
-    return {name: futures[name].result() if name in futures else None for name in sorted(clients)}
+        return {name: asked[name].answer() for name in sorted(asked)}
