@@ -73,7 +73,7 @@ class _Inference:
     ) -> None:
         self.wrong: list[Wrong] = []
         self._fields: dict[ast.expr, tuple[type, str]] = {}
-        """The messages and fields that parts of the expression read."""
+        """The messages and fields, or items of these, that parts of the expression read."""
         self._types = types
         self._expression = expression
         self._roots = roots
@@ -212,11 +212,14 @@ class _Inference:
         size = owner.size
         if size is not None and isinstance(literal, int) and not -size <= literal < size:
             self._wrong(node, f"index {literal} is outside of {size} items")
+        if isinstance(node, ast.Subscript) and node.value in self._fields:
+            cls, name = self._fields[node.value]
+            self._fields[node] = cls, f"{name}[{literal!s}]"
         return owner.item
 
-    def _index(self, node: ast.expr, kind: FieldType | None) -> None:
+    def _index(self, node: ast.expr, kind: FieldType | None, what: str = "an index") -> None:
         if kind is not None and not (isinstance(kind, Scalar) and kind.name in INTEGERS):
-            self._wrong(node, f"an index is a whole number, not {named(kind)}")
+            self._wrong(node, f"{what} is a whole number, not {named(kind)}")
 
     def _slice(
         self, node: ast.expr, owner: FieldType | None, bounds: list[ast.expr | None]
