@@ -262,7 +262,8 @@ class _Inference:
 
     def _joined(self, *sides: tuple[ast.expr, FieldType | None]) -> FieldType | None:
         """The type of a sum that is not known to be one of numbers."""
-        for (_, kind), (other, given) in (sides, sides[::-1]):
+        lists_first = sorted(sides, key=lambda side: not isinstance(side[1], Listing))
+        for (_, kind), (other, given) in (lists_first, lists_first[::-1]):
             text = self._expression.text[slice(*self._expression.span(other))]
             if isinstance(kind, Listing):
                 if given is not None and (said := unjoinable(kind, given)):
@@ -337,7 +338,7 @@ class _Inference:
         if name in ("abs", "round"):
             kind = self._number(args[0])
             for digits in args[1:]:
-                self._index(digits, self.type_of(digits))
+                self._index(digits, self.type_of(digits), "a number of digits")
             return INTEGER if name == "round" and len(args) == 1 else kind
         kinds = [self.type_of(arg) for arg in args]
         if len(kinds) == 1:
