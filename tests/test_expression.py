@@ -40,6 +40,7 @@ VARIABLES: dict[str, Any] = {
     "singles": array.array("f", [0.7, 0.1]),
     "single": np.float32(0.7),
     "long": [0] * 60_000,
+    "text": "a" * 10_000,
 }
 
 
@@ -232,6 +233,8 @@ def test_what_is_no_expression_is_refused_with_its_place(
         ("$a and $on", "true or false is needed, not 1", (0, 2)),
         ("len(3)", "3 has no length", (0, 6)),
         ("['part ' + $a]", "a text is joined with a text: write str(...) around 1", (1, 13)),
+        ("'c' + $list", "a list is joined with a list: write [...] around 'c'", (0, 11)),
+        ("$text + 'c'", "the text would have more than 10,000 characters", (0, 11)),
         ("$list + $a", "a list is joined with a list: write [...] around 1", (0, 10)),
         ("1 + $long + 1", "a list is joined with a list: write [...] around 1", (0, 9)),
         ("$long + $long", "the list would have more than 100,000 items", (0, 13)),

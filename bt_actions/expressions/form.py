@@ -40,7 +40,9 @@ _FOREIGN = {
     "FALSE": "write 'false'",
 }
 _INTERFACE = re.compile(r"[a-z]\w*(?:/(?:msg|srv|action))?/(?P<constant>[A-Z]\w*(?:\.\w+)+)")
-_PERCENT = re.compile(r"(?<![\w.$])(\d+(?:\.\d+)?) *%(?= *(?:$|[)\],]|and\b|or\b))")
+_PERCENT = re.compile(
+    r"(?<![\w.$])(\d+(?:\.\d+)?) *(?:%|percent\b)(?= *(?:$|[)\],<>=!]|and\b|or\b))"
+)
 """What is not the remainder of a division."""
 _COMPARED = re.compile(r"(?:[=!]=|[\[,]) *\Z")
 """What stands before a word that may be meant as a text."""

@@ -42,11 +42,13 @@ def add(left: object, right: object) -> object:
         if len(left) + len(right) > MAX_JOINED:
             raise ValueError(f"the list would have more than {MAX_JOINED:,} items")
         return left + right
-    for one, other in ((left, right), (right, left)):
-        if isinstance(one, list):
-            raise ValueError(f"a list is joined with a list: write [...] around {show(other)}")
-        if isinstance(one, str):
-            raise ValueError(f"a text is joined with a text: write str(...) around {show(other)}")
+    for kind, remedy in (
+        (list, "a list is joined with a list: write [...]"),
+        (str, "a text is joined with a text: write str(...)"),
+    ):
+        for one, other in ((left, right), (right, left)):
+            if isinstance(one, kind):
+                raise ValueError(f"{remedy} around {show(other)}")
     return number(left) + number(right)
 
 
@@ -145,7 +147,7 @@ def bounded(value: object) -> object:
     if isinstance(value, int) and value.bit_length() > MAX_BITS:
         raise ValueError("the number is too large")
     if isinstance(value, str) and len(value) > MAX_ITEMS:
-        raise ValueError("the text is too long")
+        raise ValueError(f"the text would have more than {MAX_ITEMS:,} characters")
     return value
 
 

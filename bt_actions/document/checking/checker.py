@@ -368,7 +368,8 @@ class Checker:
             known = listing(f"${known}" for known in self.variables)
             nothing = None if maybe else "this tree has no inputs and saves nothing"
             hint = f"this tree has {known}" if known else nothing
-            if computed.expression.reads_field_of(name):
+            expression = computed.expression
+            if name in expression.asked or expression.reads_field_of(name):
                 declared = f"topics: {{{name}: {{topic: {name}, type: package/msg/Name}}}}"
                 has = f"{hint}; " if known else ""
                 hint = f"{has}the messages of a topic are declared: {declared}"

@@ -73,7 +73,7 @@ class _Inference:
     ) -> None:
         self.wrong: list[Wrong] = []
         self._fields: dict[ast.expr, tuple[type, str]] = {}
-        """The messages and fields that parts of the expression read."""
+        """The messages and fields, or items of these, that parts of the expression read."""
         self._types = types
         self._expression = expression
         self._roots = roots
@@ -212,11 +212,14 @@ class _Inference:
         size = owner.size
         if size is not None and isinstance(literal, int) and not -size <= literal < size:
             self._wrong(node, f"index {literal} is outside of {size} items")
+        if isinstance(node, ast.Subscript) and node.value in self._fields:
+            cls, name = self._fields[node.value]
+            self._fields[node] = cls, f"{name}[{literal!s}]"
         return owner.item
 
-    def _index(self, node: ast.expr, kind: FieldType | None) -> None:
+    def _index(self, node: ast.expr, kind: FieldType | None, what: str = "an index") -> None:
         if kind is not None and not (isinstance(kind, Scalar) and kind.name in INTEGERS):
-            self._wrong(node, f"an index is a whole number, not {named(kind)}")
+            self._wrong(node, f"{what} is a whole number, not {named(kind)}")
 
     def _slice(
         self, node: ast.expr, owner: FieldType | None, bounds: list[ast.expr | None]
@@ -259,7 +262,8 @@ class _Inference:
 
     def _joined(self, *sides: tuple[ast.expr, FieldType | None]) -> FieldType | None:
         """The type of a sum that is not known to be one of numbers."""
-        for (_, kind), (other, given) in (sides, sides[::-1]):
+        lists_first = sorted(sides, key=lambda side: not isinstance(side[1], Listing))
+        for (_, kind), (other, given) in (lists_first, lists_first[::-1]):
             text = self._expression.text[slice(*self._expression.span(other))]
             if isinstance(kind, Listing):
                 if given is not None and (said := unjoinable(kind, given)):
@@ -334,7 +338,7 @@ class _Inference:
         if name in ("abs", "round"):
             kind = self._number(args[0])
             for digits in args[1:]:
-                self._index(digits, self.type_of(digits))
+                self._index(digits, self.type_of(digits), "a number of digits")
             return INTEGER if name == "round" and len(args) == 1 else kind
         kinds = [self.type_of(arg) for arg in args]
         if len(kinds) == 1:

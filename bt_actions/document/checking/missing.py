@@ -3,7 +3,7 @@
 A fallback's later child is there for the failure of an earlier one. A node fails where it reads a
 topic without a message, or a variable that nothing has written; a log does not. A later child that
 reads the value in a check of its own is one of several cases, and no hazard, unless the earlier one
-does nothing but ask and no other child is left.
+does nothing but ask and no other child is left. Behind a child that asks `known`, nothing is one.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ _READ_FIRST = {
     "action": "goal", "run_tree": "inputs", "service": "request", "publish": "message",
     "set": "set", "wait": "wait", "check": "check", "while": "while", "subtree": "with",
     "for_each": "in", "repeat": "times", "retry": "attempts", "timeout": "after",
+    "wait_until": "wait_until",
 }  # fmt: skip
 """What a kind of node computes before it does anything, and fails without."""
 _ASKS = frozenset({"check", "while"})
 _AT_ONCE = _ASKS | {"set", "publish"}
 """Kinds that fail for a missing value, and for hardly anything else."""
-_CONDITIONS = frozenset({"sequence", "fallback", "check"})
+_CONDITIONS = frozenset({"sequence", "fallback", "check", "wait_until", "timeout"})
 _DOES_WITHOUT = frozenset({"invert", "force_success"})
 """Kinds that succeed where their child has failed."""
 
@@ -86,21 +87,23 @@ class _Missing:
 
     def _look_at(self, fallback: TreeNode) -> None:
         lacked: dict[str, tuple[_Need, TreeNode]] = {}
-        told: set[str] = set()
+        settled: set[str] = set()  # it was told of, or an earlier child asks whether it is known
         for child in fallback.children:
             needs = [need for need in self._needs(child)[0] if self._may_lack(need.name)]
             for need in needs:
                 first, branch = lacked.get(need.name, (None, child))
                 rescues = _only_asks(branch) and not _only_asks(child)
                 last = child is fallback.children[-1]
-                if first is None or need.name in told:
+                if first is None or need.name in settled or _kind(need.node) == "wait_until":
                     continue
                 if not need.asks or (rescues and last):
-                    told.add(need.name)
+                    settled.add(need.name)
                     self._report(need, first)
             for need in needs:
-                if _kind(need.node) in _AT_ONCE:
+                if _kind(need.node) in _AT_ONCE or _gives_up(need.node, child):
                     lacked.setdefault(need.name, (need, child))
+            for each in child.walk():
+                settled.update(*(one.expression.asked for one in computed_in(each.values)))
 
     def _may_lack(self, name: str) -> bool:
         if name in self._there or self._doubts.mentions(name):
@@ -160,6 +163,14 @@ class _Missing:
 
 def _kind(node: TreeNode) -> str:
     return "action" if node.kind is None else node.kind.name
+
+
+def _gives_up(node: TreeNode, branch: TreeNode) -> bool:
+    """Whether a node waits until a condition holds, and a timeout in its branch ends that."""
+    if _kind(node) != "wait_until":
+        return False
+    limits = [each for each in branch.walk() if _kind(each) == "timeout"]
+    return "timeout" in node.values or any(node in limit.walk() for limit in limits)
 
 
 def _only_asks(node: TreeNode) -> bool:

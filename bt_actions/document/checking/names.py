@@ -1,7 +1,7 @@
 """One name with two types: an action server, a service or a topic, over all trees included: BT217.
 
-Names that are relative in one place and absolute in the other are taken for two: the namespace that
-the tree runs in is not known here.
+A relative name is taken for what it is in the namespace `/`: that which the tree will run in is not
+known here.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ def check_names(checker: Checker) -> None:
     """Report each name that a tree uses with another type than before."""
     first: dict[_Name, _Use] = {}
     told: set[_Name] = set()
-    for name, use in _uses(checker.document, {}):
+    for (kind, full), use in _uses(checker.document, {}):
+        name = kind, join_names("/", full)
         other = first.setdefault(name, use)
         if other.type != use.type and name not in told and use.at is not other.at:
             told.add(name)
-            kind, full = name
             inside = use.place.file != checker.source.name
             here = f"in {use.place.file}:{use.place.line}" if inside else "here"
             checker.source.report(

@@ -144,11 +144,13 @@ HAZARD_PAGES: Mapping[str, Page] = {
     "BT320": Page(
         "A later child of a 'fallback' reads the value without which an earlier child fails: while "
         "nothing has come on the topic, or nothing has written the variable, both fail, and what "
-        "the later one was there for is not done. 'known' asks whether there is a value and never "
-        "fails; a 'log' does not fail either. A later child that asks for itself in a 'check' is "
-        "taken for another case, and only warned of where the first child does nothing but ask and "
-        "no other child is left. Where nothing can be done without the value, say so with "
-        "'# bt: ignore[BT320]'.",
+        "the later one was there for is not done. A 'wait_until' that a timeout ends fails as a "
+        "'check' does; an action whose goal or 'expect' reads the value may fail for much else, "
+        "and is not warned of as the earlier child. 'known' asks whether there is a value and "
+        "never fails: behind a child that asks, nothing is warned of. A 'log' does not fail "
+        "either. A later child that asks for itself in a 'check' is taken for another case, and "
+        "only warned of where the first child does nothing but ask and no other child is left. "
+        "Where nothing can be done without the value, say so with '# bt: ignore[BT320]'.",
         moving("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
                "outputs: {level: float64}\n"
                "root:\n  fallback: Home when it is low\n  children:\n"
@@ -164,10 +166,11 @@ HAZARD_PAGES: Mapping[str, Page] = {
     "BT321": Page(
         "The field's message fixes its range in a comment, and the number is outside: the "
         "comparison is always true, or always false. The charge of a battery is a fraction: 20 % "
-        "are 0.2. Known are the charge, the parts of a quaternion, latitude and longitude, and "
-        "relative humidity, where the field itself is compared with a number. A driver that has a "
-        "number of its own for what it does not know, such as -1, keeps to no range: silence the "
-        "warning there.",
+        "are 0.2. Known are the charge, the parts of a quaternion, latitude and longitude, "
+        "relative humidity, and the variances in a covariance, where the field itself is compared "
+        "with a number. A variance is never negative, and in a sensor's message -1 where nothing "
+        "is known. Another driver that has a number of its own for what it does not know, such as "
+        "-1, keeps to no range: silence the warning there.",
         tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
              "root: {check: $battery.percentage < 20}\n"),
         tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"

@@ -264,7 +264,9 @@ PAGES: Mapping[str, Page] = {
     ),
     "BT217": Page(
         "A name of ROS has one type. A tree, with all that it includes, uses this action server, "
-        "service or topic with two: the second could not even be connected to.",
+        "service or topic with two: the second could not even be connected to. A relative name is "
+        "read as in the namespace /: where the tree runs in another, 'robot' and '/robot' differ, "
+        "and the tree's own 'namespace' says so.",
         tree("root:\n  sequence: S\n  children:\n"
              "    - {publish: said, type: std_msgs/msg/String}\n"
              "    - {publish: said, type: std_msgs/msg/Bool}\n"),
