@@ -68,7 +68,7 @@ def never_held(
     if allowed is None or kind not in _OUTCOMES:
         return None
     least, most = allowed
-    above = number > most or (number == most and kind in (ast.Gt, ast.LtE))
+    above = number > most or (number == most and kind is ast.Gt)
     if not above and number >= least:
         return None
     outcome = "true" if _OUTCOMES[kind][above] else "false"
