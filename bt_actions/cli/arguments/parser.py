@@ -6,6 +6,7 @@ An unknown command or option is answered with the nearest known one, on one line
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn, TypeAlias
@@ -15,6 +16,10 @@ from bt_actions.cli.streams.writing import write
 from bt_actions.utilities.suggest import did_you_mean
 
 Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 - no public name
+_SETTING = re.compile(r"([A-Za-z_]\w*)(?:\s*:?=\s*|:?\s+)(?!--|:?=)(\S.*)", re.ASCII | re.DOTALL)
+"""An input and its value in another spelling: `speed:=2`, `speed: 2`, `speed 2`."""
+_OF_ROS = frozenset({"-p", "--param", "--params-file", "-r", "--remap"})
+"""Options that count behind --ros-args alone."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -57,10 +62,14 @@ class Parser(argparse.ArgumentParser):
         options = [name for action in self._actions for name in action.option_strings]
         is_value = not word.startswith("-") or word[1:2].isdigit()
         if "--set" in options and is_value:
-            name = next((each for each in settings if "=" not in each), "")
-            meant = f"{name}={word.strip('=') or 'VALUE'}" if name else word
-            if "=" in meant:
+            name = [each for each in settings if "=" not in each][:1]
+            meant = _setting([*name, *unknown]) or (f"{name[0]}=VALUE" if name else "")
+            if meant:
                 self.error(f"unexpected argument {word!r}; write --set {meant}")
+        if word in _OF_ROS and "--ros-args" in options:
+            also = _setting(unknown[1:]) if "--set" in options else ""
+            remedy = f"--ros-args {' '.join(unknown[:2])}{also and f', or --set {also}'}"
+            self.error(f"no option {word} before --ros-args; write {remedy}")
         if word.startswith("-"):
             name = word.split("=", 1)[0]
             self.error(f"no option {name}{_suggestion(name, options)}")
@@ -76,6 +85,13 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print `message` on one line and exit with 2."""
         self.exit(Exit.BAD_INPUT, f"{self.prog}: {message}\n")
+
+
+def _setting(words: Sequence[str]) -> str:
+    """Return `name=value` as the first of `words` mean it, or an empty text."""
+    texts = (" ".join(words[:many]) for many in (1, 2, 3))
+    found = next(filter(None, map(_SETTING.fullmatch, texts)), None)
+    return f"{found[1]}={found[2]}" if found else ""
 
 
 def _suggestion(word: str, known: Sequence[str] | dict[str, Any]) -> str:

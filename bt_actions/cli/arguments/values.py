@@ -16,7 +16,11 @@ def split(word: str, what: str) -> tuple[str, str]:
     name, equals, text = word.partition("=")
     if not equals or not name.strip():
         raise BadInput(f"{what} {word!r}: expected name=value, as in distance=2.0")
-    return name.strip(), text
+    name = name.strip()
+    if name.endswith(":"):  # as ROS has it
+        option = f"{what} " if what.startswith("-") else ""
+        raise BadInput(f"{what} {word!r}: write {option}{name[:-1].strip()}={text.strip()}")
+    return name, text
 
 
 def goal_fields(words: Iterable[str], what: str = "field") -> dict[str, object]:
