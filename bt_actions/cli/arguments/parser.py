@@ -62,9 +62,8 @@ class Parser(argparse.ArgumentParser):
         options = [name for action in self._actions for name in action.option_strings]
         is_value = not word.startswith("-") or word[1:2].isdigit()
         if "--set" in options and is_value:
-            name = [each for each in settings if "=" not in each][:1]
-            meant = _setting([*name, *unknown]) or (f"{name[0]}=VALUE" if name else "")
-            if meant:
+            named = [each for each in settings if "=" not in each][:1]
+            if meant := _setting([*named, *unknown]) or _setting([*named, "VALUE"]):
                 self.error(f"unexpected argument {word!r}; write --set {meant}")
         if word in _OF_ROS and "--ros-args" in options:
             also = _setting(unknown[1:]) if "--set" in options else ""

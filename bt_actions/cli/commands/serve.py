@@ -237,8 +237,8 @@ def _announce(server: TreeServer, *, managed: bool) -> None:
     entries = server.catalog.entries()
     broken = [each.name for each in entries if each.tree is None]
     more = f", {len(broken)} broken: {listing(broken)}" if broken else ""
-    if hidden := [file for each in entries for file in each.hides]:
-        more += f"; {len(hidden)} not served, as another has the name: {listing(map(str, hidden), 1)}"
+    if hidden := [str(file) for each in entries for file in each.hides]:
+        more += f"; {len(hidden)} not served, as another has the name: {listing(hidden, 1)}"
     name = f"{server.node.get_namespace().rstrip('/')}/run_tree"
     ready = f"ready: {name}, {len(entries) - len(broken)} trees{more}"
     server.precedence.regained = lambda: say(ready)
