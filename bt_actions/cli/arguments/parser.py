@@ -6,19 +6,18 @@ An unknown command or option is answered with the nearest known one, on one line
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn, TypeAlias
 
+from bt_actions.cli.arguments.values import meant_by
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.streams.writing import write
 from bt_actions.utilities.suggest import did_you_mean
 
 Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 - no public name
-_SETTING = re.compile(r"([A-Za-z_]\w*)(?:\s*:?=\s*|:?\s+)(?!--|:?=)(\S.*)", re.ASCII | re.DOTALL)
-"""An input and its value in another spelling: `speed:=2`, `speed: 2`, `speed 2`."""
-_OF_ROS = frozenset({"-p", "--param", "--params-file", "-r", "--remap"})
+_PARAMETER = ("-p", "--param")
+_OF_ROS = (*_PARAMETER, "--params-file", "-r", "--remap")
 """Options that count behind --ros-args alone."""
 
 
@@ -63,10 +62,11 @@ class Parser(argparse.ArgumentParser):
         is_value = not word.startswith("-") or word[1:2].isdigit()
         if "--set" in options and is_value:
             named = [each for each in settings if "=" not in each][:1]
-            if meant := _setting([*named, *unknown]) or _setting([*named, "VALUE"]):
+            if meant := meant_by([*named, *unknown]) or meant_by([*named, "VALUE"]):
                 self.error(f"unexpected argument {word!r}; write --set {meant}")
         if word in _OF_ROS and "--ros-args" in options:
-            also = _setting(unknown[1:]) if "--set" in options else ""
+            is_input = "--set" in options and word in _PARAMETER
+            also = meant_by(unknown[1:]) if is_input else ""
             remedy = f"--ros-args {' '.join(unknown[:2])}{also and f', or --set {also}'}"
             self.error(f"no option {word} before --ros-args; write {remedy}")
         if word.startswith("-"):
@@ -84,13 +84,6 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print `message` on one line and exit with 2."""
         self.exit(Exit.BAD_INPUT, f"{self.prog}: {message}\n")
-
-
-def _setting(words: Sequence[str]) -> str:
-    """Return `name=value` as the first of `words` mean it, or an empty text."""
-    texts = (" ".join(words[:many]) for many in (1, 2, 3))
-    found = next(filter(None, map(_SETTING.fullmatch, texts)), None)
-    return f"{found[1]}={found[2]}" if found else ""
 
 
 def _suggestion(word: str, known: Sequence[str] | dict[str, Any]) -> str:
