@@ -155,7 +155,7 @@ class Catalog:
     def _same(self, file: Path, other: Path) -> bool:
         """Whether a file is another by a second path, as far as anybody can tell."""
         with contextlib.suppress(OSError):  # TimeoutError is one
-            return self._patience(file, partial(file.samefile, other))
+            return self._patience((file, other), partial(file.samefile, other))
         return False
 
     def _entry(self, name: str, files: Sequence[Path]) -> Entry | None:
