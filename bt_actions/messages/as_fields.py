@@ -1,12 +1,15 @@
-"""What to write for a message that was given as a list of numbers: ``{x: 1.0, y: 2.0, z: 0.0}``."""
+"""What to write for a message that was given as a list of numbers, or as an angle:
+``{x: 1.0, y: 2.0, z: 0.0}``, ``{yaw: 90 deg}``."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Mapping
 
 from bt_actions.messages.fields import FLOATS, INTEGERS, Message, Scalar, describe
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.units import TURN, parse_angle
 
 _PARTS = (list, tuple, Mapping, str)
 _ANGLES = "{roll: %s, pitch: %s, yaw: %s}"
@@ -14,15 +17,26 @@ _ANGLES = "{roll: %s, pitch: %s, yaw: %s}"
 
 def as_fields(cls: type, value: object) -> str:
     """The fields of a message, filled with the numbers of a list in their order; "" where they do
-    not fit it. What a variable gives stands as dots."""
+    not fit it. What a variable gives stands as dots. An angle is the yaw of a quaternion."""
+    is_rotation = interface_name(cls) == "geometry_msgs/msg/Quaternion"
+    if is_rotation and isinstance(value, (str, int, float)):
+        with contextlib.suppress(ValueError):
+            return f"{{yaw: {_in_degrees(value, abs(parse_angle(value)) > TURN)}}}"
     if not isinstance(value, (list, tuple)) or any(isinstance(each, _PARTS) for each in value):
         return ""
     items = [shorten(each, 20) if isinstance(each, (int, float)) else "..." for each in value]
-    if interface_name(cls) == "geometry_msgs/msg/Quaternion":
+    if is_rotation:
         if len(items) == 3:
-            return _ANGLES % tuple(items)
+            beyond = any(isinstance(each, (int, float)) and abs(each) > TURN for each in value)
+            return _ANGLES % tuple(_in_degrees(each, beyond) for each in items)
         return f"{_filled(cls, iter(items))} or {{yaw: 90 deg}}" if len(items) == 4 else ""
-    return _filled(cls, iter(items)) if 1 < len(items) == _numbers_in(cls) else ""
+    return _filled(cls, iter(items)) if 0 < len(items) == _numbers_in(cls) else ""
+
+
+def _in_degrees(angle: object, beyond: bool) -> str:
+    """An angle as people mean it who write one `beyond` a turn, without a unit."""
+    said = angle if isinstance(angle, str) else shorten(angle, 20)
+    return f"{said} deg" if beyond and said[-1].isdigit() and said != "0" else said
 
 
 def _numbers_in(cls: type) -> int:

@@ -150,8 +150,16 @@ class Catalog:
         found: dict[str, list[Path]] = {}
         for folder in self.folders:
             for file in self._listed.get(folder, ()):
-                found.setdefault(file.stem, []).append(file)
+                beside = found.setdefault(file.stem, [])
+                if not any(self._same(file, each) for each in beside):
+                    beside.append(file)
         return found
+
+    def _same(self, file: Path, other: Path) -> bool:
+        """Whether a file is another by a second path, as far as anybody can tell."""
+        with contextlib.suppress(OSError):  # TimeoutError is one
+            return self._patience((file, other), partial(file.samefile, other))
+        return False
 
     def _entry(self, name: str, files: Sequence[Path]) -> Entry | None:
         """The entry of the first of some files that holds a tree, as it is now."""

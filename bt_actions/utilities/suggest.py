@@ -30,11 +30,12 @@ def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
         return min(longer, key=len)
     slack = max(2, len(word) // 3)
     near = [name for name in known if name != word and abs(len(name) - len(word)) <= slack]
-    if len(near) > _MOST:  # comparing takes its time
-        near = [name for name in near if name[:1] == word[:1]][:_MOST]
     forms = {folded(name): name for name in near}
     if wanted in forms:
         return forms[wanted]
+    if len(forms) > _MOST:  # comparing takes its time
+        alike = [form for form in forms if form[:1] == wanted[:1]][:_MOST]
+        forms = {form: forms[form] for form in alike}
     matches = difflib.get_close_matches(wanted, forms, n=1, cutoff=cutoff)
     return forms[matches[0]] if matches else None
 

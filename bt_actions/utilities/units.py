@@ -7,7 +7,8 @@ import re
 
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["DURATION_UNITS", "parse_angle", "parse_duration", "parse_seconds", "spoken_duration"]
+__all__ = ["DURATION_UNITS", "TURN", "parse_angle", "parse_duration", "parse_seconds",
+           "spoken_duration"]  # fmt: skip
 
 DURATION_UNITS = {
     "ns": 1e-9,
@@ -19,7 +20,11 @@ DURATION_UNITS = {
     "h": 3600.0,
 }
 """Seconds in each unit that a duration may carry."""
+TURN = 2 * math.pi + 0.01
+"""Radians, rounded up as people round. An angle beyond is likely to be meant in degrees."""
 _ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
+_LONG = 2
+"""Days from which hours are no help."""
 _WITH_UNIT = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(\S*)\s*")
 
 
@@ -40,7 +45,10 @@ def parse_seconds(value: object) -> float:
 
 
 def spoken_duration(seconds: float) -> str:
-    """Seconds as people say them: ``8 min 20 s``."""
+    """Seconds as people say them: ``8 min 20 s``; from two days on, ``3.5 days``."""
+    days = seconds / 86_400
+    if abs(days) >= _LONG:
+        return f"{days:.6g} days"
     minutes, rest = divmod(abs(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     parts = [(hours, "h"), (minutes, "min"), (rest, "s")]

@@ -187,6 +187,7 @@ def test_a_field_of_an_input_is_set_whatever_way_the_default_is_written(tmp_path
         ("big.x", 5, "the parameter 'big.x' is no input of the tree 't'"),
         ("names", [1, True], "quotes make it one: -p \"names:=['1', 'true']\""),
         ("header.frame_id", True, "quotes make it one: -p \"header.frame_id:='on'\""),
+        ("header.frame_id", ["a"], "quotes make it one: -p \"header.frame_id:='on'\""),
     ],
 )
 def test_a_field_that_is_not_there_or_does_not_fit_is_told_by_its_name(
@@ -197,6 +198,14 @@ def test_a_field_that_is_not_there_or_does_not_fit_is_told_by_its_name(
     with pytest.raises(BadInput) as raised:
         as_inputs(Given(values={name: value}, written={name: "on"}), tree_inputs(path), "t")
     assert message in str(raised.value)
+
+
+@pytest.mark.ros
+def test_a_text_that_a_file_gives_is_put_in_quotes_there(tmp_path: Path) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text(SHORT)
+    with pytest.raises(BadInput, match=r"a text is needed, not true; put it in quotes in the file"):
+        as_inputs(Given(values={"header.frame_id": True}), tree_inputs(path), "t")
 
 
 def test_parameters_become_what_the_inputs_are(tree: Path) -> None:

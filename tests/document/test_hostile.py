@@ -70,7 +70,9 @@ def test_a_name_that_no_file_can_have_is_told_as_any_other() -> None:
     ("x" * 300, "x: this cannot be read: File name too long"),
     ("x/" * 3000, "x: this cannot be read: File name too long"),
     ('"a\\0b"', "there is no tree 'a\\x00b' here, and none of that name is installed"),
-    ("loop.yaml", "loop.yaml is a link to {folder}/loop.yaml, which is not there"),
+    ("loop.yaml", "loop.yaml is a link that leads round in a circle"),
+    ("round.yaml", "round.yaml is a link that leads round in a circle"),
+    ("circle/a.yaml", "circle is a link that leads round in a circle"),
     ("file.yaml/inner", "there is no tree 'file.yaml/inner': there is no folder 'file.yaml'"),
     ("lost.yaml", "lost.yaml is a link to {folder}/gone.yaml, which is not there"),
     ("lost", "lost.yaml is a link to {folder}/gone.yaml, which is not there"),
@@ -83,6 +85,9 @@ def test_a_file_that_cannot_be_there_is_told_where_it_is_named(
     monkeypatch.chdir(tmp_path)
     Path("file.yaml").touch()
     Path("loop.yaml").symlink_to("loop.yaml")
+    Path("round.yaml").symlink_to("back.yaml")
+    Path("back.yaml").symlink_to("round.yaml")
+    Path("circle").symlink_to("circle")
     Path("lost.yaml").symlink_to("first.yaml")
     Path("first.yaml").symlink_to("gone.yaml")
     Path("tree.yaml").write_text(f"tree: t\n{line.replace('NAME', name)}\n", encoding="utf-8")

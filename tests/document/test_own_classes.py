@@ -127,6 +127,9 @@ class A(Base):
     [
         ("n: Status", "SUCCESS", "<Status.SUCCESS: 'SUCCESS'>"),
         ("n: py_trees.common.Status", "FAILURE", "<Status.FAILURE: 'FAILURE'>"),
+        ("n: Status", "Status.SUCCESS", "<Status.SUCCESS: 'SUCCESS'>"),
+        ("n: Status", "py_trees.common.Status.SUCCESS", "<Status.SUCCESS: 'SUCCESS'>"),
+        ("n: list[Mode]", "[Mode.SLOW]", "[<Mode.SLOW: 'slow'>]"),
         ("n=Status.SUCCESS", "RUNNING", "<Status.RUNNING: 'RUNNING'>"),
         ("n: Mode | None", "FAST", "<Mode.FAST: 'quick'>"),
         ("n: Mode | None", "null", "None"),
@@ -148,14 +151,21 @@ def test_a_text_stands_for_the_member_of_an_enum(
 
 
 @pytest.mark.parametrize(
-    ("parameter", "value"),
-    [("n: Mode", "FASR"), ("n: Mode", "quick"), ("n: Mode | None", "3"), ("n: list[Mode]", "[X]")],
+    ("parameter", "value", "named"),
+    [
+        ("n: Mode", "FASR", "Mode"),
+        ("n: Mode", "quick", "Mode"),
+        ("n: Mode", "Level.FAST", "Mode"),
+        ("n: Mode | None", "3", "Mode | None"),
+        ("n: Optional[Mode]", "3", "Optional[Mode]"),
+        ("n: list[Mode]", "[X]", "list[Mode]"),
+    ],
 )
 def test_a_name_that_no_member_has_is_told_with_those_there_are(
-    own: Own, parameter: str, value: str
+    own: Own, parameter: str, value: str, named: str
 ) -> None:
     (found,) = checked(own(ENUMS.format(parameter=parameter), f"{{n: {value}}}"))
-    assert found.startswith("4:18 BT215 A takes a 'n' of type ")
+    assert found.startswith(f"4:18 BT215 A takes a 'n' of type {named}, not ")
     assert found.endswith(": one of FAST, SLOW")
 
 

@@ -246,6 +246,16 @@ def test_of_two_files_of_one_name_the_first_is_served_and_names_the_other(
     assert (entry.file, entry.hides) == (beside, (elsewhere,)), "a file without a tree hides none"
 
 
+def test_one_file_by_two_paths_hides_nothing(write: Write, tmp_path: Path) -> None:
+    folder = tmp_path / "trees"
+    first = write("go.yaml")
+    (folder / "go.yml").symlink_to("go.yaml")
+    (tmp_path / "linked").symlink_to("trees")
+    twice = [folder, folder, tmp_path / "linked", folder / ".." / "trees"]
+    (entry,) = Catalog(twice).entries()
+    assert (entry.file, entry.hides) == (first, ())
+
+
 @pytest.fixture(params=["pipe", "socket", "folder", "device"])
 def no_file(request: pytest.FixtureRequest, tmp_path: Path, write: Write) -> Path:
     """Something among the trees that is none, and nobody writes to."""

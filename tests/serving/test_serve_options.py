@@ -133,6 +133,18 @@ def test_ready_counts_the_trees_that_can_be_run_and_names_the_others(serve_trees
     assert server.lines[0].endswith("/run_tree, 2 trees, 1 broken: broken")
 
 
+def test_ready_counts_the_files_whose_name_another_has_and_names_the_first(
+    serve_trees: Serve, folder: Path, tmp_path: Path
+) -> None:
+    for other in (tmp_path / "b", tmp_path / "c"):
+        other.mkdir()
+        (other / "move.yaml").write_bytes((folder / "empty.yaml").read_bytes())
+    server = serve_trees("--trees", str(tmp_path / "b"), "--trees", str(tmp_path / "c"))
+    hidden = f"; 2 not served, as another has the name: {tmp_path}/b/move.yaml and 1 more"
+    assert server.lines[0].endswith(hidden)
+    assert sum("is served as 'move'" in line for line in server.errors) == 2
+
+
 def test_a_second_ctrl_c_waits_for_no_goal_and_names_what_may_still_run(
     serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient, name: str
 ) -> None:

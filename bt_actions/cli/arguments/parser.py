@@ -10,11 +10,15 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn, TypeAlias
 
+from bt_actions.cli.arguments.values import meant_by
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.streams.writing import write
 from bt_actions.utilities.suggest import did_you_mean
 
 Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 - no public name
+_PARAMETER = ("-p", "--param")
+_OF_ROS = (*_PARAMETER, "--params-file", "-r", "--remap")
+"""Options that count behind --ros-args alone."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -57,10 +61,14 @@ class Parser(argparse.ArgumentParser):
         options = [name for action in self._actions for name in action.option_strings]
         is_value = not word.startswith("-") or word[1:2].isdigit()
         if "--set" in options and is_value:
-            name = next((each for each in settings if "=" not in each), "")
-            meant = f"{name}={word.strip('=') or 'VALUE'}" if name else word
-            if "=" in meant:
+            named = [each for each in settings if "=" not in each][:1]
+            if meant := meant_by([*named, *unknown]) or meant_by([*named, "VALUE"]):
                 self.error(f"unexpected argument {word!r}; write --set {meant}")
+        if word in _OF_ROS and "--ros-args" in options:
+            is_input = "--set" in options and word in _PARAMETER
+            also = meant_by(unknown[1:]) if is_input else ""
+            remedy = f"--ros-args {' '.join(unknown[:2])}{also and f', or --set {also}'}"
+            self.error(f"no option {word} before --ros-args; write {remedy}")
         if word.startswith("-"):
             name = word.split("=", 1)[0]
             self.error(f"no option {name}{_suggestion(name, options)}")

@@ -136,6 +136,7 @@ def _no_fit(
     assert given is not None
     whole = name.partition(".")[0]
     name = next((each for each in values if each.startswith(f"{name}.")), name)
+    below = ""
     while name not in values and "." in name:  # the item of a list, a field of a text
         name, _, below = name.rpartition(".")
         why = f"{below}: {why}"
@@ -144,11 +145,13 @@ def _no_fit(
     text = f"--ros-args: the parameter {name!r}{value} the input{of} is {kind}: {why}"
     if "a text is needed" not in why:
         return text
-    given_value = values.get(name)
-    written = f"'{given.written.get(name, str(given_value).lower())}'"
-    if isinstance(given_value, list):
-        written = str([str(each).lower() for each in given_value])
-    return f'{text}; quotes make it one: -p "{name}:={written}"'
+    if name not in given.written:
+        return f"{text}; put it in quotes in the file"
+    written = "'{}'".format(given.written[name].replace("'", "''"))
+    if below and isinstance(items := values[name], list):
+        written = str([str(each).lower() for each in items])
+    word = f"{name}:={written}".replace('"', r"\"")
+    return f'{text}; quotes make it one: -p "{word}"'
 
 
 def _over(value: Any, fields: Any, kind: FieldType | None) -> Any:

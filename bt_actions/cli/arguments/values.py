@@ -6,17 +6,35 @@ else it holds, so that `message=hello: world # 1` is a text.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 
 from bt_actions.cli.exits import BadInput
+
+_OTHERWISE = re.compile(
+    r"(?:([A-Za-z_][\w.]*)(?:\s*:?=\s*|:\s+)|([A-Za-z_]\w*)\s+)(?!--|:?=)(\S.*)",
+    re.ASCII | re.DOTALL,
+)
+"""A name and its value, however written: `speed=2`, `speed:=2`, `speed: 2`, `speed 2`."""
 
 
 def split(word: str, what: str) -> tuple[str, str]:
     """Split `name=value`; raise BadInput, beginning with `what`, for anything else."""
     name, equals, text = word.partition("=")
-    if not equals or not name.strip():
-        raise BadInput(f"{what} {word!r}: expected name=value, as in distance=2.0")
-    return name.strip(), text
+    name = name.strip()
+    if equals and name and not name.endswith(":"):
+        return name, text
+    remedy = "expected name=value, as in distance=2.0"
+    if meant := meant_by([word]):
+        remedy = f"write {what} {meant}" if what.startswith("-") else f"write {meant}"
+    raise BadInput(f"{what} {word!r}: {remedy}")
+
+
+def meant_by(words: Sequence[str]) -> str:
+    """Return `name=value` as the first of `words` mean it, or an empty text."""
+    texts = (" ".join(words[:many]) for many in (1, 2, 3))
+    found = next(filter(None, map(_OTHERWISE.fullmatch, texts)), None)
+    return f"{found[1] or found[2]}={found[3]}" if found else ""
 
 
 def goal_fields(words: Iterable[str], what: str = "field") -> dict[str, object]:

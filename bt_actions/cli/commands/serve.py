@@ -47,8 +47,6 @@ and says which goals are not accounted for (exit code 3).
 
 _POLICIES = ("reject", "queue", "replace", "parallel")
 _ONE_AT_A_TIME = ("reject", "replace")
-_NAMED = 3
-"""Of several files of one name, how many are told where it is ready; the log has them all."""
 _LISTS = {"trees": "DIR", "python": "PACKAGE"}
 _HELP = {
     "trees": "a folder of trees, or package://NAME/trees; repeatable; nothing outside is read; "
@@ -233,16 +231,14 @@ def _announce(server: TreeServer, *, managed: bool) -> None:
     if managed:
         say(f"unconfigured: {server.node.get_fully_qualified_name()}")
         return
-    from bt_actions.serving.story import warnings_of
-
     assert server.lifecycle is not None
     server.lifecycle.change("configure")
     server.lifecycle.change("activate")
     entries = server.catalog.entries()
     broken = [each.name for each in entries if each.tree is None]
     more = f", {len(broken)} broken: {listing(broken)}" if broken else ""
-    if warnings := [one.message for each in entries for one in warnings_of(each)]:
-        more += f"; {listing(warnings, _NAMED)}"
+    if hidden := [str(file) for each in entries for file in each.hides]:
+        more += f"; {len(hidden)} not served, as another has the name: {listing(hidden, 1)}"
     name = f"{server.node.get_namespace().rstrip('/')}/run_tree"
     ready = f"ready: {name}, {len(entries) - len(broken)} trees{more}"
     server.precedence.regained = lambda: say(ready)

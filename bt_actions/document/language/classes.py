@@ -221,9 +221,12 @@ def _meant(annotation: object, value: object) -> object:
 
 
 def _member(kind: type[Enum], value: object) -> Enum | None:
-    """The member of a name; of an enum of numbers or texts, also of a value."""
-    if isinstance(value, str) and value in kind.__members__:
-        return kind[value]
+    """The member of a name, ``FAST`` or ``Mode.FAST``; of an enum of numbers or texts, also of a
+    value."""
+    if isinstance(value, str):
+        *before, name = value.split(".")
+        if name in kind.__members__ and before[-1:] in ([], [kind.__name__]):
+            return kind[name]
     if issubclass(kind, (int, str)) and isinstance(value, (int, str)):
         with contextlib.suppress(Exception):  # an enum may have code for what it does not know
             return kind(value)
@@ -263,4 +266,7 @@ def _takes(annotation: object, value: object) -> bool:
 
 
 def _annotation(annotation: object) -> str:
-    return annotation.__name__ if isinstance(annotation, type) else str(annotation)
+    """The type as its author reads it: without the modules of its parts."""
+    if isinstance(annotation, type):
+        return annotation.__name__
+    return re.sub(r"\b([A-Za-z_]\w*\.)+", "", str(annotation))

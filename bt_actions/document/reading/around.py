@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 
-__all__ = ["around"]
+__all__ = ["a_kind", "around"]
 
 _SETTINGS = {"retry": ("attempts", "3"), "repeat": ("times", "3"), "timeout": ("after", "30 s"),
              "for_each": ("in", "[...]")}  # fmt: skip
@@ -13,9 +14,16 @@ _LONGEST = 40
 _SIGNS = frozenset(":,{}[]#\n")
 
 
-def around(written: Mapping, outer: Scalar, inner: Scalar) -> str:
-    """Put a decorator around a node: `outer` and `inner` are the two keys of what was written."""
-    decorator, said = outer.text, _text(written.get(outer.text))
+def around(written: Mapping, outer: Scalar, inner: Scalar, decorator: str = "") -> str:
+    """Put a decorator around a node: `outer` and `inner` are the two keys of what was written.
+
+    `decorator` is the kind that is meant, where `outer` is one of its keys, or looks like its name.
+    """
+    decorator = decorator or outer.text
+    keys = KINDS[decorator].keys
+    said = _text(written.get(decorator))
+    if said == "..." and outer.text not in keys:
+        said = _text(written.get(outer.text))
     name = _text(written.get(inner.text))
     parts = [f"{decorator}: {said if decorator == 'while' else name}"]
     if decorator in _SETTINGS:
@@ -24,8 +32,16 @@ def around(written: Mapping, outer: Scalar, inner: Scalar) -> str:
         if given == "..." and said[:1].isdigit():
             given = said
         parts.append(f"{key}: {example if given == '...' else given}")
+    first = _SETTINGS.get(decorator, ("",))[0]
+    own = {key: _text(written.get(key)) for key in keys if key != first}
+    parts += [f"{key}: {given}" for key, given in own.items() if key != "name" and given != "..."]
     parts.append(f"child: {{{inner.text}: {name}, ...}}")
-    return f"a {decorator!r} goes around the node: {{{', '.join(parts)}}}"
+    return f"{a_kind(decorator)} goes around the node: {{{', '.join(parts)}}}"
+
+
+def a_kind(word: str) -> str:
+    """Return ``a 'retry'``, ``an 'invert'``."""
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word!r}"
 
 
 def _text(node: Node | None) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Mapping as MappingType
 from itertools import chain
 
 from bt_actions.document.findings import Place, Related
-from bt_actions.document.findings.elsewhere import kind_here
+from bt_actions.document.findings.elsewhere import key_here, kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
 from bt_actions.document.language.kinds import KINDS, Group, Kind
 from bt_actions.document.language.scalars import Name
@@ -21,7 +21,8 @@ from bt_actions.document.language.shapes import (
     required_in,
 )
 from bt_actions.document.language.values import BAD
-from bt_actions.document.reading.around import around
+from bt_actions.document.reading.around import a_kind, around
+from bt_actions.document.reading.listed import FIELDS, fields_for
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
@@ -38,9 +39,10 @@ _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
 _BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
 """Kinds that are taken for keys in a node whose kind stands behind 'type:'."""
+_DECORATORS = {kind.name: kind.name for kind in KINDS.values() if kind.group is Group.DECORATOR}
+_DECORATORS |= {key: name for name in _DECORATORS for key in KINDS[name].keys if key != "name"}
+"""Which kind a decorator's name, or a key of one, is written for."""
 _IN_SEQUENCE = "put a sequence there, and the list into it: {sequence: name, children: [...]}"
-_FIELDS = ("goal", "request", "message")
-"""Keys for the fields of what a node sends."""
 
 
 def read_root(document: Document) -> None:
@@ -86,7 +88,11 @@ class _Reader:
             if isinstance(written, Scalar):
                 word, _, name = written.text.partition(":")
                 if word in self._kinds:
-                    hint = f"write '{word}: {name or 'name'}'"
+                    kind = KINDS.get(word)
+                    example = f"{word}: {name.strip() or 'name'}"
+                    if kind is not None and not (name or kind.named_by_value):
+                        example = kind.example.partition("\n")[0]
+                    hint = f"write '{example}'"
             elif isinstance(written, Listing) and written.items:
                 hint = _IN_SEQUENCE
             message = f"a node is a mapping such as 'sequence: name', not {words_for(written)}"
@@ -152,7 +158,7 @@ class _Reader:
             place = Place(self._source.name, first.line, first.column)
             self._source.report(
                 "BT112", span_of(second),
-                f"a node is one thing: this is a {first.text!r} and a {second.text!r}",
+                f"a node is one thing: this is {a_kind(first.text)} and {a_kind(second.text)}",
                 hint=self._nested(written, first, second) or "begin a new item with '-'",
                 related=Related(place, "the first is here"),
             )  # fmt: skip
@@ -243,7 +249,13 @@ class _Reader:
                         self._children(TreeNode(None, key, node.node, source), name, inner)
                     continue
                 written[name] = inner
-                value = values[name] = known.shape.read(inner, source)
+                if name in FIELDS and isinstance(inner, Listing):
+                    typed = self._actions[node.alias].node if node.alias else node.node
+                    hint = fields_for(name, inner, typed)
+                    value = wrong_form(known.shape, inner, source, hint=hint)
+                else:
+                    value = known.shape.read(inner, source)
+                values[name] = value
                 if value is BAD:
                     source.unread.nodes.append(inner)
                     source.unread.names |= isinstance(known.shape, Name)
@@ -285,7 +297,7 @@ class _Reader:
             return None
         write = f"write '{node.key.text}: {'name' if kind.named_by_value else '...'}'"
         held = next((name for name in _CHILDREN if name in keys), None)
-        fields = next((name for name in _FIELDS if name in keys), None)
+        fields = next((name for name in FIELDS if name in keys), None)
         if isinstance(inner, Mapping):
             names = {key.text for key, _ in inner.pairs}
             known = names & {*keys, "name"}
@@ -324,8 +336,8 @@ class _Reader:
             self._source.report("BT107", span_of(key), message, hint=hint)
         else:
             hint = None
-            if key.text in _BESIDE_CHILD:
-                hint = around(node.node, key, node.key)
+            if (near := _decorator_of(key.text, keys)) and near not in keys:
+                hint = around(node.node, key, node.key, near)
             if key.text == "name" and "name" not in keys:
                 hint = f"the name stands behind '{node.key.text}:'"
             report_unknown_key(key, keys, self._source, hint)
@@ -351,6 +363,13 @@ class _Reader:
                 self._source.report("BT110", span_of(inner), "there must be a child at least")
                 self._source.unread.nodes.append(inner)
         self._waiting += [(node, item) for item in reversed(written)]
+
+
+def _decorator_of(word: str, keys: MappingType[str, Key]) -> str | None:
+    """The decorator that an unknown key is likely to be meant for."""
+    if word in _DECORATORS or closest(word, keys) or any(key_here(word, keys)):
+        return _DECORATORS.get(word)
+    return closest(word, (*_BESIDE_CHILD, "repeat"))
 
 
 _ACTION_NAME = KINDS["sequence"]

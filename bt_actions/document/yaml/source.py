@@ -5,7 +5,7 @@ Reading never takes more than `MAX_BYTES` of memory, whatever the path leads to.
 
 from __future__ import annotations
 
-import contextlib
+import errno
 import os
 import re
 import stat
@@ -219,11 +219,12 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
                 data += more  # it has grown, or nobody knows how large it is
     except DocumentError:  # is a ValueError, too
         raise
-    except FileNotFoundError:
-        link = broken_link(path)
-        raise _unreadable(name, f"this is {link}" if link else "there is no such file") from None
     except (OSError, ValueError) as error:
-        raise _unreadable(name, f"this cannot be read: {_reason(error)}") from None
+        why = f"this cannot be read: {_reason(error)}"
+        if isinstance(error, FileNotFoundError):
+            why = "there is no such file"
+        link = broken_link(path)
+        raise _unreadable(name, f"this is {link}" if link else why) from None
     return source_of(data, name, path)
 
 
@@ -234,10 +235,14 @@ def absolute(path: Path) -> Path:
 
 def broken_link(path: Path) -> str:
     """Describe a link that leads to no file: ``a link to Y, which is not there``; else ""."""
-    with contextlib.suppress(OSError, ValueError):  # of a name that no file can have
-        target = os.path.realpath(path)
-        if path.is_symlink() and not os.path.exists(target):  # noqa: PTH110 - a text
-            return f"a link to {target}, which is not there"
+    if not os.path.islink(path):  # noqa: PTH114 - `Path.is_symlink` raises for too long a name
+        return ""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return f"a link to {os.path.realpath(path)}, which is not there"
+    except OSError as error:
+        return "a link that leads round in a circle" if error.errno == errno.ELOOP else ""
     return ""
 
 
