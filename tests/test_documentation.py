@@ -69,7 +69,7 @@ def test_the_example_of_a_server_runs_trees_for_the_example_of_a_client(
     serving.send(signal.SIGINT)
     assert serving.wait() == 0, serving
     assert waiting.wait() == 1, waiting
-    assert waiting.lines[-1].startswith("its server was deactivated"), waiting
+    assert waiting.lines[-1].startswith("its server ends"), waiting
     assert "Traceback" not in "\n".join(serving.errors), serving
 
 

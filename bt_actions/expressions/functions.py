@@ -10,9 +10,10 @@ import math
 import re
 from collections.abc import Callable, Sized
 from types import MappingProxyType
+from typing import Any
 
 from bt_actions.expressions.values import number, show
-from bt_actions.utilities.plain_data import plain, scalar
+from bt_actions.utilities.plain_data import of_float32, plain, scalar, shortest
 
 __all__ = ["ARGUMENTS", "FUNCTIONS", "KNOWN", "instead_of", "listed"]
 
@@ -33,6 +34,9 @@ _FOREIGN = {word: name for name, words in _CALLED.items() for word in words.spli
 _JOINS = {"append": "[{}]", "push": "[{}]", "push_back": "[{}]", "extend": "{}", "concat": "{}"}
 """How other languages join lists, and what stands here behind a plus sign."""
 _WHOLE = re.compile(r"\s*[-+]?[0-9]{1,100}\s*", re.ASCII)
+_FRACTION = re.compile(
+    r"\s*[-+]?([0-9]{1,100}(\.[0-9]{0,100})?|\.[0-9]{1,100})([eE][-+]?[0-9]{1,3})?\s*", re.ASCII
+)
 
 
 def _length(value: object) -> int:
@@ -44,13 +48,18 @@ def _length(value: object) -> int:
 
 def _extreme(name: str, function: Callable[..., object]) -> Callable[..., object]:
     def call(*values: object) -> object:
-        items = plain(values[0]) if len(values) == 1 else [plain(value) for value in values]
+        only: Any = values[0] if len(values) == 1 else None
+        scan = of_float32(only) and hasattr(only, "tolist")  # a long one, often: read as it is
+        items = only.tolist() if scan else plain(only)
+        if len(values) != 1:
+            items = [plain(value) for value in values]
         if not isinstance(items, (list, tuple)):
             raise ValueError(f"{name}() of one value needs a list, not {show(items)}")
         if not items:
             raise ValueError(f"{name}() of an empty list")
         try:
-            return function(items)
+            found = function(items)
+            return shortest(found) if scan else found
         except TypeError:
             raise ValueError(f"{name}() is of numbers alone, or of texts alone") from None
 
@@ -83,12 +92,11 @@ def _whole(value: int | float, function: Callable[[float], int]) -> int:
 
 def _float(value: object) -> float:
     value = plain(value)
-    try:
-        return float(value if isinstance(value, str) else _number_or_text(value))
-    except ValueError:
-        if isinstance(value, str):
-            raise ValueError(f"{show(value)} is no number") from None
-        raise
+    if not isinstance(value, str):
+        return float(_number_or_text(value))
+    if _FRACTION.fullmatch(value) is None:
+        raise ValueError(f"{show(value)} is no number")
+    return float(value)
 
 
 def _number_or_text(value: object) -> int | float:

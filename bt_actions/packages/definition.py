@@ -76,7 +76,7 @@ def _text(package: str, kind: str, short: str) -> str:
         for suffix in (kind, "idl"):
             path = Path(entry or ".") / "share" / package / kind / f"{short}.{suffix}"
             if path.is_file():
-                return path.read_text(encoding="utf-8")
+                return path.read_text(encoding="utf-8", errors="replace")
     raise UnknownInterface(
         f"{package}/{kind}/{short} is installed without its file share/{package}/{kind}/"
         f"{short}.{kind}"

@@ -132,6 +132,11 @@ def _files(folder: Path) -> tuple[str, ...]:
 def _uses(package: str, folder: Path, file: str) -> dict[str, str]:
     """The messages of any package that a file uses, with their places. Raises PackageError."""
     path = folder / file
+    if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", path.stem):
+        raise PackageError(
+            f"{path}: {path.stem!r} is no name of an interface: a capital first, then letters and "
+            "digits, as in FetchCrate"
+        )
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
@@ -140,11 +145,6 @@ def _uses(package: str, folder: Path, file: str) -> dict[str, str]:
         found = _INCLUDE.findall(text)
         return {f"{owner}/{name}": str(path) for owner, kind, name in found if kind == "msg"}
     kind = file.split("/")[0]
-    if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", path.stem):
-        raise PackageError(
-            f"{path}: {path.stem!r} is no name of an interface: a capital first, then letters and "
-            "digits, as in FetchCrate"
-        )
     lines = text.splitlines()
     parts = [number for number, line in enumerate(lines) if line == "---"]
     if len(parts) + 1 != _PARTS[kind]:

@@ -166,8 +166,11 @@ class Catalog:
         before = self._entries.get(name)
         for number, file in enumerate(files):
             known = before if before is not None and before.file == file else None
+            there = tuple(self._there)
             try:
-                entry = self._patience(file, partial(self._read, name, file, known))
+                if file.parent not in there:
+                    raise TimeoutError  # as its folder
+                entry = self._patience(file, partial(self._read, name, file, known, there))
             except TimeoutError:
                 said = Said("BT100", _NOT_READ, str(file))
                 known = known or Entry(name, file, None, "", (), {})
@@ -177,13 +180,18 @@ class Catalog:
                 return entry if entry.hides == hides else replace(entry, hides=hides)
         return None
 
-    def _read(self, name: str, file: Path, before: Entry | None) -> Entry | None:
-        """The entry of a file; None for one that holds no tree. May hang, so it changes nothing."""
+    def _read(
+        self, name: str, file: Path, before: Entry | None, there: tuple[Path, ...]
+    ) -> Entry | None:
+        """Return the entry of a file, or None for one that holds no tree.
+
+        May hang, so it changes nothing; `there` are the folders that answer.
+        """
         if before is not None and not before.findings and _unchanged(before.stamps):
             return before
         begun = time.time_ns()
         try:
-            tree = open_tree(file, python=self._python, within=self._there)
+            tree = open_tree(file, python=self._python, within=there)
         except DocumentError as error:
             if before is None and _holds_no_tree(error.findings):
                 return None

@@ -27,7 +27,7 @@ def scalar(value: object) -> object:
         return value[0]
     if type(value).__module__ == "numpy" and not getattr(value, "shape", ()):
         number = value.item()  # type: ignore[attr-defined]
-        return shortest(number) if _of_float32(value) else number
+        return shortest(number) if of_float32(value) else number
     return value
 
 
@@ -41,14 +41,14 @@ def plain(value: object) -> object:
     to_list = getattr(value, "tolist", None)  # array.array and numpy alike
     if to_list is not None and type(value).__module__ in ("array", "numpy"):
         items: object = to_list()
-        return shortest(items) if _of_float32(value) else items
+        return shortest(items) if of_float32(value) else items
     return value
 
 
 def item_of(items: Any, at: int) -> object:
     """An item of a list, whatever holds it."""
     item = scalar(items[at])
-    return shortest(item) if _of_float32(items) else item
+    return shortest(item) if of_float32(items) else item
 
 
 def field_of(message: object, name: str, types: Mapping[str, str]) -> object:
@@ -74,5 +74,6 @@ def shortest(value: Any) -> Any:
     return float(f"{value:.9g}") if abs(value) < _GREATEST else value
 
 
-def _of_float32(value: Any) -> bool:
+def of_float32(value: Any) -> bool:
+    """Whether a numpy scalar, or the items of an array, are float32."""
     return getattr(value, "typecode", None) == "f" or str(getattr(value, "dtype", "")) == "float32"

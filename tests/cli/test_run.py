@@ -43,9 +43,9 @@ root:
   sequence: S
   children:
     - {action: Go, type: robot_control_interfaces/action/MoveRobot, server: door, timeout: 1 s}
-    - {action: Grip, type: robot_control_interfaces/action/Gripper, server: /door, timeout: 1 s}
+    - {action: Grip, type: robot_control_interfaces/action/Gripper, server: /r1/door, timeout: 1 s}
 """
-"""A check takes `door` and `/door` for two names, which they are in a namespace."""
+"""A check takes `door` and `/r1/door` for two names; in the namespace /r1 they are one."""
 SPEAKS = "tree: new\nroot: {publish: lamp, type: std_msgs/msg/Bool, message: {data: true}}\n"
 HEARS = """\
 tree: new
@@ -240,12 +240,12 @@ class TestExitCode2:
         self, start: Start, tmp_path: Path
     ) -> None:
         (tmp_path / "two.yaml").write_text(TWO_TYPES)
-        run = start("run", str(tmp_path / "two.yaml"))
+        run = start("run", str(tmp_path / "two.yaml"), "--namespace", "/r1")
         assert run.wait() == 2, run
         assert clean(run)
-        [line] = [line for line in run.lines if "/door" in line]
+        [line] = [line for line in run.lines if "/r1/door" in line]
         kinds = "robot_control_interfaces/action/{}, and also as robot_control_interfaces/action/{}"
-        assert line.endswith(f"/door is used as {kinds.format('Gripper', 'MoveRobot')}"), run
+        assert line.endswith(f"/r1/door is used as {kinds.format('Gripper', 'MoveRobot')}"), run
 
     def refused(self, capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         assert main(["run", *arguments]) == 2

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.document import check_source, load_tree, source_of
+from bt_actions.document import DocumentError, check_source, load_tree, source_of
 from bt_actions.document.formatting.format import format_source
 from bt_actions.document.language.values import read_data
 from bt_actions.document.reading.inputs import parse_input
@@ -132,3 +132,9 @@ def test_a_line_of_json_is_one_however_lines_are_counted() -> None:
     assert line.splitlines() == [line]
     assert FACE in line
     assert json.loads(line) == value
+
+
+def test_a_code_point_that_unicode_sets_aside_is_no_text() -> None:
+    """Such stand for separators while a text is parsed."""
+    with pytest.raises(DocumentError, match=r"1:7: error\[BT101\]: the character U\+FDD0"):
+        source_of("log: a\ufdd0b\u2028c\n".encode(), "t")

@@ -131,6 +131,8 @@ class A(Base):
         ("n: Status", "py_trees.common.Status.SUCCESS", "<Status.SUCCESS: 'SUCCESS'>"),
         ("n: list[Mode]", "[Mode.SLOW]", "[<Mode.SLOW: 'slow'>]"),
         ("n=Status.SUCCESS", "RUNNING", "<Status.RUNNING: 'RUNNING'>"),
+        ("n=Mode.SLOW", "quick", "'quick'"),
+        ("n: 'exit(7)'", "quick", "'quick'"),
         ("n: Mode | None", "FAST", "<Mode.FAST: 'quick'>"),
         ("n: Mode | None", "null", "None"),
         ("n: Optional[Mode] = None", "SLOW", "<Mode.SLOW: 'slow'>"),

@@ -72,6 +72,7 @@ def test_the_files_are_those_that_cmake_names_or_all(
         ("msg/Do.msg", "int32[<=x] a\n", "msg/Do.msg:1: "),
         ("msg/Do.msg", "int32 a\nint8 a\n", "msg/Do.msg:2: 'a' is there twice"),
         ("action/do_it.action", ACTION, "action/do_it.action: 'do_it' is no name of an interface"),
+        ('msg/A").idl', "module a {};", "msg/A\").idl: 'A\")' is no name of an interface"),
     ],
 )  # fmt: skip
 def test_a_broken_file_is_refused_with_its_line(

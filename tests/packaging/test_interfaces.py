@@ -74,6 +74,7 @@ def test_run_tree_reports_three_leaves_at_most() -> None:
         "running": "sequence<bt_actions_interfaces/RunningLeaf, 3>",
         "leaves_ended": "uint32",
         "paused": "boolean",
+        "waiting": "boolean",
     }
 
 

@@ -86,22 +86,22 @@ class _Missing:
         self._there -= added
 
     def _look_at(self, fallback: TreeNode) -> None:
-        lacked: dict[str, tuple[_Need, TreeNode]] = {}
+        lacked: dict[str, tuple[_Need, bool]] = {}  # and whether its branch does nothing but ask
         settled: set[str] = set()  # it was told of, or an earlier child asks whether it is known
         for child in fallback.children:
             needs = [need for need in self._needs(child)[0] if self._may_lack(need.name)]
+            asks, waits = _only_asks(child), _ended_waits(child)
+            last = child is fallback.children[-1]
             for need in needs:
-                first, branch = lacked.get(need.name, (None, child))
-                rescues = _only_asks(branch) and not _only_asks(child)
-                last = child is fallback.children[-1]
+                first, rescued = lacked.get(need.name, (None, False))
                 if first is None or need.name in settled or _kind(need.node) == "wait_until":
                     continue
-                if not need.asks or (rescues and last):
+                if not need.asks or (rescued and not asks and last):
                     settled.add(need.name)
                     self._report(need, first)
             for need in needs:
-                if _kind(need.node) in _AT_ONCE or _gives_up(need.node, child):
-                    lacked.setdefault(need.name, (need, child))
+                if _kind(need.node) in _AT_ONCE or id(need.node) in waits:
+                    lacked.setdefault(need.name, (need, asks))
             for each in child.walk():
                 settled.update(*(one.expression.asked for one in computed_in(each.values)))
 
@@ -165,12 +165,17 @@ def _kind(node: TreeNode) -> str:
     return "action" if node.kind is None else node.kind.name
 
 
-def _gives_up(node: TreeNode, branch: TreeNode) -> bool:
-    """Whether a node waits until a condition holds, and a timeout in its branch ends that."""
-    if _kind(node) != "wait_until":
-        return False
-    limits = [each for each in branch.walk() if _kind(each) == "timeout"]
-    return "timeout" in node.values or any(node in limit.walk() for limit in limits)
+def _ended_waits(branch: TreeNode) -> set[int]:
+    """Return the ids of the nodes that wait until a condition holds, or a timeout ends them."""
+    found: set[int] = set()
+    waiting = [(branch, False)]
+    while waiting:
+        node, ends = waiting.pop()
+        ends = ends or _kind(node) == "timeout"
+        if _kind(node) == "wait_until" and (ends or "timeout" in node.values):
+            found.add(id(node))
+        waiting += [(child, ends) for child in node.children]
+    return found
 
 
 def _only_asks(node: TreeNode) -> bool:

@@ -7,6 +7,7 @@ known here.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import NamedTuple
 
 from bt_actions.document.checking.checker import Checker
@@ -22,6 +23,8 @@ _WORDS = {"action": "the action server", "srv": "the service", "msg": "the topic
 _KINDS = {"action": ("action", "server"), "service": ("srv", "server"),
           "publish": ("msg", "publish"), "wait_for_message": ("msg", "topic")}  # fmt: skip
 """What kinds of nodes connect to, and the key that names it."""
+_MOST = 10_000
+"""Names of a tree and those that it includes that are compared: subtrees can multiply them."""
 _Name = tuple[str, str]
 """The kind of interface, and the full name."""
 
@@ -41,7 +44,7 @@ def check_names(checker: Checker) -> None:
     """Report each name that a tree uses with another type than before."""
     first: dict[_Name, _Use] = {}
     told: set[_Name] = set()
-    for (kind, full), use in _uses(checker.document, {}):
+    for (kind, full), use in islice(_uses(checker.document, {}), _MOST):
         name = kind, join_names("/", full)
         other = first.setdefault(name, use)
         if other.type != use.type and name not in told and use.at is not other.at:
@@ -94,7 +97,7 @@ def _included(node: TreeNode, document: Document, known: _Known) -> Iterator[tup
     below = known.get(id(included))
     if below is None:
         below = known[id(included)] = {}
-        for name, use in _uses(included, known):
+        for name, use in islice(_uses(included, known), _MOST):
             below.setdefault(name, use)
     for (kind, named), use in below.items():
         full = join_names(document.namespace, text_of(node.values, "namespace"), named)

@@ -162,7 +162,7 @@ def _misfit(
         near = did_you_mean(name, named) or f"; it takes {', '.join(named)}"
         text = f"{cls.__name__} takes no argument {name!r}{near}"
         return None if takes_any else Misfit(name, text)
-    wanted = _type_of(named[name])
+    wanted = named[name].annotation  # a default alone refuses nothing
     if _takes(wanted, value):
         return None
     text = f"{cls.__name__} takes a {name!r} of type {_annotation(wanted)}, not {value!r:.60}"
@@ -189,10 +189,13 @@ def _resolved(parameter: inspect.Parameter, names: dict[str, object]) -> inspect
         pass
 
     alone.__annotations__ = {"it": parameter.annotation}
-    with contextlib.suppress(Exception):  # the text may be any code, and name what is not there
+    try:  # the text may be any code, and name what is not there
         found = inspect.get_annotations(alone, globals=names, eval_str=True)
-        return parameter.replace(annotation=found["it"])
-    return parameter
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # noqa: BLE001 - SystemExit, too
+        return parameter
+    return parameter.replace(annotation=found["it"])
 
 
 def _type_of(parameter: inspect.Parameter | None) -> object:

@@ -37,7 +37,9 @@ PIPE_PATIENCE = 5.0
 """Seconds in which somebody must begin to write to a named pipe that is to be read."""
 Char = tuple[str, int, int]
 """A character of a text, and the line and column where it is written, from 1."""
-_FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_FORBIDDEN = re.compile(
+    "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufdcf\ufdf0-\ufffd\U00010000-\U0010ffff]"
+)
 _PLAIN = bytes([9, 10, 13, *range(32, 127)])
 """What most texts are made of alone: then none is forbidden, and that is seen faster."""
 _UNSEEN = re.compile("[\x85\xa0\u1680\u2000-\u200d\u2028\u2029\u202f\u205f\u2060\u3000\ufeff]")

@@ -52,7 +52,7 @@ class Endpoints:
         def do() -> None:
             try:
                 future.set_result(work())
-            except Exception as error:  # noqa: BLE001 - raised again where it is awaited
+            except BaseException as error:  # noqa: BLE001 - raised again where it is awaited
                 future.set_exception(error)
             # It does not wake the executor by itself; and one that has just looked may not hear it.
             until = time.monotonic() + _SPUN
