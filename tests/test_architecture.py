@@ -48,7 +48,7 @@ MAY_IMPORT_RCLPY = ("ros/", "simulation/ros/")
 STRAYS: set[str] = set()
 """Files outside these rooms that import rclpy."""
 FILES = sorted(ROOT.rglob("*.py"))
-LONGEST, MOST_FILES = 400, 20
+LONGEST, MOST_FILES = 500, 20
 LONG: set[str] = set()
 """Files of more lines than LONGEST."""
 CROWDED: set[str] = set()
