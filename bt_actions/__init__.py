@@ -19,9 +19,9 @@ if _TYPE_CHECKING:
     from bt_actions.behaviours.run_tree import RunTree
     from bt_actions.behaviours.variables import Var
     from bt_actions.document import load_tree
+    from bt_actions.events import GoalReport
     from bt_actions.goals.attempts import AttemptRecord
     from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
-    from bt_actions.running.goals import GoalReport
     from bt_actions.running.loop import TreeError
     from bt_actions.running.runner import TreeRunner
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from py_trees.blackboard import Blackboard, KeyMetaData
 
-from bt_actions.behaviours.variables import key, read
+from bt_actions.behaviours.variables import key, read, write
 from bt_actions.expressions.expression import Expression, ExpressionError
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
@@ -25,7 +25,7 @@ Given = Callable[[Any], Any] | str
 class Reading:
     """The `expect`, `save` and `retry.when` of an action."""
 
-    __slots__ = ("_expect", "_names", "_save", "_wanted", "_written", "when")
+    __slots__ = ("_expect", "_names", "_save", "_unmet", "_written", "wanted", "when")
 
     def __init__(
         self,
@@ -36,9 +36,10 @@ class Reading:
     ) -> None:
         """Raises ValueError for what is neither a function nor an expression."""
         self._names = names
+        self._unmet = False
         self._written: list[tuple[str, Expression]] = []  # what was given as text
         self._expect = None if expect is None else self._function(expect, "expect")
-        self._wanted = expect if isinstance(expect, str) else getattr(expect, "text", None)
+        self.wanted = expect if isinstance(expect, str) else str(getattr(expect, "text", ""))
         self.when = None if when is None else self._function(when, "retry.when")
         self._save = {key(name): self._function(place, "save") for name, place in save.items()}
 
@@ -76,17 +77,31 @@ class Reading:
                             return f"{what}: result has no field {name!r}{hint}"
         return ""
 
+    def seen(self, result: Any) -> dict[str, object]:
+        """What stood for the names in `expect`, where the result that was read last is not as
+        expected; else nothing."""
+        expect = self._expect
+        if not self._unmet:
+            return {}
+        expression = next((each for what, each in self._written if what == "expect"), None)
+        if expression is not None:
+            return expression.seen(self._names(result), read)
+        seen = getattr(expect, "seen", None)
+        return seen(result) if callable(seen) else {}
+
     def read(self, result: Any) -> str:
         """Check the result, and save what is to be kept of it; or return what is wrong with it."""
+        self._unmet = self._expect is not None
         try:
             if self._expect is not None and not self._expect(result):
-                wanted = self._wanted or "something else"
+                wanted = self.wanted or "something else"
                 return f"{wanted} was expected, but the result is: {shorten(result)}"
         except ExpressionError as error:
             return str(error)
+        self._unmet = False
         try:
             saved = [(name, value(result)) for name, value in self._save.items()]
         except ValueError as error:  # ExpressionError, or what is saved does not fit
             return str(error)
-        Blackboard.storage.update(saved)
+        write(dict(saved))
         return ""

@@ -12,6 +12,7 @@ from typing import Any
 
 from py_trees.blackboard import Blackboard
 
+from bt_actions.events.teller import here
 from bt_actions.utilities.plain_data import numbers_only
 
 
@@ -61,6 +62,14 @@ def read(name: str) -> Any:
                 f"variable {name!r}: {step!r} is no field of a {type(value).__name__}"
             ) from None
     return value
+
+
+def write(values: Mapping[str, object]) -> None:
+    """Give variables their values, by their absolute keys, and tell the run of it."""
+    Blackboard.storage.update(values)
+    if (teller := here.get()) is not None:
+        for name, value in values.items():
+            teller.wrote(name, value)
 
 
 def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:

@@ -49,6 +49,8 @@ class RosHost:
         self._bell = threading.Condition(self.lock)
         self._thread: threading.Thread | None = None
 
+    wall = staticmethod(time.time)
+
     def domain(self, number: int) -> Domain:
         """Return what is shared in the ROS domain of this number."""
         with self.lock:

@@ -8,9 +8,12 @@ thread, no wait, no ROS: a thread steps it, or a test in virtual time.
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sys
+import traceback
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from numbers import Real
 from typing import Any
 
@@ -18,9 +21,23 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Duration, Status
 from py_trees.trees import BehaviourTree
 
+from bt_actions import document
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
+from bt_actions.events import (
+    Event,
+    Node,
+    NodeChanged,
+    NodesAdded,
+    Observer,
+    Paused,
+    RunBegan,
+    TreeFinished,
+)
+from bt_actions.events.snapshot import snapshot
+from bt_actions.events.stream import Reader, Stream
+from bt_actions.events.teller import Teller
 from bt_actions.messages.interfaces import TwoTypes
+from bt_actions.running.describing import describe, in_order, versions
 from bt_actions.running.goals import RunGoals
 from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
@@ -30,6 +47,7 @@ from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
 from bt_actions.wiring import backend_of
 
+_ALL = sys.maxsize
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
 LONGEST_WAIT = 3600.0
@@ -85,12 +103,23 @@ class TickLoop:
             misbehaved: is asked after each behaviour's tick what that did wrong.
         """
         self.tree, self._heartbeat = tree, heartbeat
-        self._traffic, self._node, self._wake = backend_of(node).traffic, node, wake
+        self._backend = backend_of(node)
+        self._traffic, self._node, self._wake = self._backend.traffic, node, wake
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
+        self.stream = Stream(self._moment)
+        self.teller = Teller(self.stream, self._traffic.host.steady)
         self._observers: list[Observer] = []
+        self._observed: Reader | None = None
+        self._began = False
+        """Whether this run was told of."""
+        self.asked_by = "", ""
+        """The id of the RunTree goal that the runs answer, and that of its caller's run."""
         self.goals = RunGoals(
-            self._tell_of_goal, wake, lambda: self._traffic.host.scheduler.add(self.watchdog)
+            self.teller,
+            wake,
+            lambda: self._traffic.host.scheduler.add(self.watchdog),
+            self._traffic.host.steady,
         )
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
@@ -100,7 +129,7 @@ class TickLoop:
         self._stop_wanted = self._abandoned = self._pause_wanted = self._paused = False
         self._timeout: float | None = None
         self._deadline = math.inf
-        self._now = 0.0
+        self._now = self._ros = 0.0
         self._burst = 0
         self._status = Status.INVALID
         self._error: BaseException | None = None
@@ -110,6 +139,8 @@ class TickLoop:
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event, in the step; one that raises is removed."""
         self._observers.append(callback)
+        if self._observed is None:
+            self._observed = self.stream.reader(room=sys.maxsize)
 
     # What anybody may ask for, on any thread
 
@@ -137,7 +168,8 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
-        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each)
+        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each, self._tell_of)
+        self._began = False
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)
 
@@ -155,7 +187,7 @@ class TickLoop:
                     return Sleep(seconds)
             except BaseException as error:  # noqa: BLE001 - raised again after the drain
                 self.fail(error)
-            self._drain = self._stop()
+            self._drain = self.goals.begun_in(self._stop)
         return self._wind_up(self._drain)
 
     def fail(self, error: BaseException) -> None:
@@ -182,11 +214,11 @@ class TickLoop:
             self.tree.visitors.append(self._visitor)
             self._guarded(self._set_up_missing)
             self._ready()
-            self._emit(TreeStarted(self._now))
+            self._tell_began()
         self._check()
         if self.is_to_end(self._now):
             return None
-        self.goals.tell(self._now)
+        self._tell_observers()
         rest = self._heartbeat
         if not self._held():
             goes_on = self._tick() and (self._visitor.may_go_on or self._has_others)
@@ -227,6 +259,8 @@ class TickLoop:
             self._left.update(self._nodes - now)
             self._visitor.forget_others(now)
             self._nodes, self._with_children, self._doing = now, found, "tick"
+            if self._began:
+                self._tell_added()
 
     def _is_as_found(self) -> bool:
         """Whether the tree is as it was set up; takes about 10 ns a behaviour."""
@@ -241,8 +275,7 @@ class TickLoop:
             pass
         finally:
             changed = self._visitor.finish()
-            self.goals.tell(self._now)
-            self._tell(changed)
+            self._tell_observers()
         return bool(changed)
 
     def _after_each(self) -> str:
@@ -272,6 +305,7 @@ class TickLoop:
         """Whether the tree is paused; carries a change of that over to goals not sent yet."""
         if self._pause_wanted != self._paused:
             self._paused = self._pause_wanted
+            self.stream.add(Paused, self._paused)
             self._traffic.pause(self.goals.not_over, self._paused)
         return self._paused
 
@@ -295,7 +329,6 @@ class TickLoop:
             self.tree.visitors.remove(self._visitor)
         self._pause_wanted = False
         self._held()
-        self.goals.tell(self._now)  # a goal may have begun in a tick that raised
         root = self.tree.root
         if any(node.status is Status.RUNNING for node in root.iterate()):  # not the root, then
             try:
@@ -320,12 +353,12 @@ class TickLoop:
     def _wind_up(self, drain: Drain) -> Sleep | Done[Status]:
         """Drain the tree's goals, and tell."""
         step = drain.step(self._now, hurry=self._abandoned)
-        self.goals.tell(self._now)
+        self._tell_observers()
         if isinstance(step, Sleep):
             return step
-        self._tell(self._visitor.stopped())
+        self._visitor.stopped()
         self._log.flush()  # who tells of the end tells it last
-        self._emit(TreeFinished(self._now, self._status))
+        self._tell_end()
         timed_out = self._status is Status.INVALID and not self._stop_wanted
         self._rest()
         self.raise_what_ended_it()
@@ -341,6 +374,11 @@ class TickLoop:
                 raise error
         finally:
             del error
+
+    def close(self) -> None:
+        """Tell what has only now become known of goals; nothing is told after that."""
+        self.goals.close()
+        self._tell_observers()
 
     def shutdown(self) -> None:
         """Shut down the tree, and what was pruned, if set up here: else another one may run it."""
@@ -359,13 +397,80 @@ class TickLoop:
 
     # Who is told
 
-    def _tell(self, changes: dict[Behaviour, Status]) -> None:
-        for node, status in changes.items() if self._observers else ():
-            self._emit(NodeChanged(self._now, path_of(node), node, status, node.feedback_message))
+    def _moment(self) -> tuple[float, float, float]:
+        host, ros = self._traffic.host, 0.0
+        with contextlib.suppress(Exception):  # the node is destroyed
+            ros = self._ros = self._backend.stamp() * 1e-9
+        return host.steady(), host.wall(), ros or self._ros
 
-    def _tell_of_goal(self, *change: Any) -> None:
-        if self._observers:
-            self._emit(GoalChanged(*change))
+    def _tell_began(self) -> None:
+        """Tell that this run begins, with all its nodes."""
+        self._began = True
+        teller, root = self.teller, self.tree.root
+        teller.begin()
+        if not teller.is_heard:
+            return
+        given = document.given_inputs(root)
+        self.stream.add(
+            RunBegan,
+            self._backend.traffic.host.new_goal_id().hex(),
+            document.tree_name(root),
+            self._number(in_order(root)),
+            {name: snapshot(value) for name, (_, value) in given.items()},
+            document.sources_of(root),
+            versions(),
+            *self.asked_by,
+        )
+
+    def _number(self, nodes: Iterable[Behaviour]) -> tuple[Node, ...]:
+        """Give nodes their numbers; return what is told of them."""
+        numbers, found = self.teller.numbers, []
+        for node in nodes:
+            if node not in numbers:
+                numbers[node] = len(numbers) + 1
+                parent = None if node.parent is None else numbers.get(node.parent)
+                found.append(describe(node, numbers[node], parent))
+        return tuple(found)
+
+    def _tell_added(self) -> None:
+        if self.teller.is_heard and (new := self._number(in_order(self.tree.root))):
+            self.stream.add(NodesAdded, new)
+
+    def _tell_of(self, node: Behaviour) -> None:
+        """Tell the status that a node has now; on the ticking thread, as its tick returns."""
+        if not self.teller.is_heard:
+            return
+        self.teller.claim(node)
+        status, more = node.status, dict[str, object]()
+        if status is Status.FAILURE:
+            self.teller.all_written()
+            more["by_itself"] = bool(getattr(node, "refused", False))
+        elif status is Status.SUCCESS:
+            more["warning"] = str(getattr(node, "warning", ""))
+        self.teller.tell(NodeChanged, node, status, node.feedback_message, **more)
+
+    def _tell_end(self) -> None:
+        """Tell that the tree has finished, to the observers too."""
+        if self.teller.is_heard:
+            if not self._began:  # it could not be set up
+                self._tell_began()
+            self.teller.all_written()
+            success = self._status is Status.SUCCESS
+            outputs = document.tree_outputs(self.tree.root) if success else {}
+            self.stream.add(
+                TreeFinished,
+                self._status,
+                {name: snapshot(each, fields=_ALL, size=_ALL) for name, each in outputs.items()},
+                "" if self._error is None else where_raised(self._error),
+                tuple(self.goals.unaccounted),
+            )
+        self._tell_observers()
+
+    def _tell_observers(self) -> None:
+        """Call the observers with what has happened; forget the goals that are over."""
+        self.goals.forget()
+        for event in self._observed.take() if self._observed is not None else ():
+            self._emit(event)
 
     def _emit(self, event: Event) -> None:
         for observer in list(self._observers):
@@ -381,3 +486,10 @@ class TickLoop:
         if not isinstance(error, Exception):
             self._error = self._error or error
             self._wake()
+
+
+def where_raised(error: BaseException) -> str:
+    """Return one line about what ended a run, with the place in the user's code."""
+    cause = error.__cause__ or error
+    frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
+    return f"{error} ({frames[-1].filename}:{frames[-1].lineno})" if frames else str(error)

@@ -44,6 +44,8 @@ class VirtualHost:
         """Return the virtual time."""
         return self._timeline.now
 
+    wall = steady
+
     def new_goal_id(self) -> bytes:
         """Return the next 16 bytes of the seed."""
         return self.randomness.randbytes(16)

@@ -101,6 +101,8 @@ class ActionEndpoint:
         now = self.heard_at = self.watch.heard_at = self._host.steady()
         handle.replies.spoke(self.watch, now)
         self.tell(handle, Event.FEEDBACK, feedback)
+        if handle.begun_in is not None:
+            handle.begun_in.feedback(handle, feedback)
         if handle.keeps_feedback and handle.goal.outcome is None:
             handle.feedback.append(feedback)
             wake([handle])

@@ -201,6 +201,8 @@ class Run:
     tell: Callable[[GoalHandle | None], None]
     """Takes note, on any thread and under the lock, of a goal of its that has a new state, outcome
     or end; of None: there is reason to tick."""
+    feedback: Callable[[GoalHandle, Any], None] = lambda handle, message: None
+    """Takes note, likewise, of feedback of a goal of its."""
 
 
 begun_in: ContextVar[Run | None] = ContextVar("begun_in", default=None)

@@ -126,5 +126,8 @@ class Host(Protocol):
     def steady(self) -> float:
         """Return seconds that only ever go forward."""
 
+    def wall(self) -> float:
+        """Return seconds since 1970 on the computer's clock."""
+
     def new_goal_id(self) -> bytes:
         """Return 16 bytes that no goal has had."""

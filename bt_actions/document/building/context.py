@@ -133,6 +133,10 @@ class Condition:
         """The condition as it was written."""
         return self.expression.text
 
+    def seen(self, given: Any) -> dict[str, object]:
+        """What stood for the names in it."""
+        return self.expression.seen(_roots(self.root, given), self.read)
+
     def __call__(self, given: Any) -> bool:
         """Whether it holds; raises ExpressionError."""
         return self.expression.holds(_roots(self.root, given), self.read)

@@ -10,7 +10,9 @@ import re
 from collections import deque
 from collections.abc import Mapping
 
-from py_trees.blackboard import Blackboard
+from py_trees.blackboard import Blackboard, KeyMetaData
+
+from bt_actions.behaviours.variables import write
 
 __all__ = ["Scope"]
 
@@ -82,12 +84,13 @@ class Scope:
 
     def write(self, name: str, value: object) -> None:
         """Give a variable a value."""
-        Blackboard.set(self.key(name), value)
+        self.write_all({name: value})
 
     def write_all(self, values: Mapping[str, object]) -> None:
         """Give several variables their values."""
-        for name, value in values.items():
-            self.write(name, value)
+        write({self.key(name): value for name, value in values.items()})
+        for name in values:
+            Blackboard.metadata.setdefault(self.key(name), KeyMetaData())
 
     def clear(self, name: str) -> None:
         """Take a variable's value away, if it has one."""
