@@ -196,7 +196,8 @@ def _built(
         except TooManyErrors:
             raise DocumentError(_errors(workspace)) from None
         _refuse(workspace)  # a class of one's own may fail when it is made
-    setattr(root, LOADED, Loaded(document, scope, {str(path): text for path, text in workspace.files.items()}))
+    sources = {str(path): text for path, text in workspace.files.items()}
+    setattr(root, LOADED, Loaded(document, scope, sources))
     return root
 
 

@@ -7,6 +7,7 @@ from bt_actions.events.kinds import (
     EventsLost,
     FeedbackCame,
     GoalChanged,
+    GoalReport,
     Logged,
     Moment,
     Node,
@@ -20,7 +21,6 @@ from bt_actions.events.kinds import (
     ServerSeen,
     StopWanted,
     TreeFinished,
-    GoalReport,
     VariableWritten,
 )
 from bt_actions.events.snapshot import Cut, Value
@@ -34,6 +34,7 @@ __all__ = [
     "EventsLost",
     "FeedbackCame",
     "GoalChanged",
+    "GoalReport",
     "Logged",
     "Moment",
     "Node",
@@ -47,7 +48,6 @@ __all__ = [
     "ServerSeen",
     "StopWanted",
     "TreeFinished",
-    "GoalReport",
     "Value",
     "VariableWritten",
     "WireError",

@@ -219,6 +219,8 @@ class StopWanted(Event):
     """A signal, ``--timeout``, ``client``, ``halt``, ``interrupt()`` and the like."""
     why: str
     """In words, to follow the status: ``interrupted by SIGINT``."""
+    leaves: bool = False
+    """Whether goals that are being drained are waited for no longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,6 +232,8 @@ class TreeFinished(Event):
     """Of a success, whole: they are data for the caller."""
     error: str = ""
     """What a behaviour raised, with its place; or ""."""
+    unusable: bool = False
+    """Whether the tree cannot be set up as it is given, whatever the world does."""
     unaccounted: tuple[GoalReport, ...] = ()
 
 
@@ -240,6 +244,8 @@ class RunEnded(Event):
     exit_code: int
     cause: str = ""
     """Why it did not end by itself, or ""."""
+    error: str = ""
+    """Why the caller's wish could not be met at all, or ""."""
     unaccounted: tuple[str, ...] = ()
     """A line for each goal whose end is not known; also of those that were left."""
     world: str = ""

@@ -14,7 +14,7 @@ from bt_actions.utilities.plain_data import field_of, plain
 
 if TYPE_CHECKING:
     Value: TypeAlias = (
-        "None | bool | int | float | str | bytes | tuple[Value, ...] | dict[str, Value] | Cut"
+        "bool | int | float | str | bytes | tuple[Value, ...] | dict[str, Value] | Cut | None"
     )
 else:
     Value = object  # wire.py asks for the hints of events

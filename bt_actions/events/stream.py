@@ -120,4 +120,3 @@ class Stream:
         steady, wall, ros = (each - before for each, before in zip(now, last, strict=True))
         jumps = [("wall", wall - steady)] if abs(wall - steady) > JUMP else []
         return [*jumps, ("ros", ros)] if ros < 0.0 else jumps
-

@@ -61,7 +61,7 @@ def from_plain(data: object) -> Event:
     try:
         given = dict(data)  # type: ignore[call-overload]
         kind = KINDS[given.pop("kind")]
-        readers = _readers(kind)
+        readers: dict[str, Reader] = _readers(kind)  # type: ignore[arg-type]  # a class is hashable
         return kind(**{name: readers[name](value) for name, value in given.items()})
     except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise WireError(f"no event: {type(error).__name__} {error}") from error

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.behaviours.kinds import action_of
 from bt_actions.behaviours.variables import Var
 from bt_actions.goals.policy import Retry, Timeouts
-from bt_actions.render.look import action_of
 
 if TYPE_CHECKING:
     from bt_actions.document.reading.tree import Document, TreeNode

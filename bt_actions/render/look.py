@@ -33,6 +33,7 @@ DOWN_UP_TO = 16
 
 _LABEL_WIDTH = 28
 
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """One node of a tree in reading order."""

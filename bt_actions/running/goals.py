@@ -114,9 +114,7 @@ class RunGoals:
         if goal.outcome is not None:
             self._tell_feedback(handle, told)
         said = goal.state.shown, goal.outcome, goal.end, goal.reason, goal.server
-        self._teller.tell(
-            GoalChanged, handle.owner, goal.id.hex(), handle.attempt, *said, **values
-        )
+        self._teller.tell(GoalChanged, handle.owner, goal.id.hex(), handle.attempt, *said, **values)
 
     def _feedback(self, handle: GoalHandle, message: Any) -> None:
         told = self._handles.get(handle)

@@ -462,6 +462,7 @@ class TickLoop:
                 self._status,
                 {name: snapshot(each, fields=_ALL, size=_ALL) for name, each in outputs.items()},
                 "" if self._error is None else where_raised(self._error),
+                isinstance(self._error, UnusableTree),
                 tuple(self.goals.unaccounted),
             )
         self._tell_observers()

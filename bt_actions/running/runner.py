@@ -20,7 +20,7 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import wiring
-from bt_actions.events import Observer, GoalReport
+from bt_actions.events import GoalReport, Observer
 from bt_actions.events.stream import Stream
 from bt_actions.running.loop import TickLoop, TreeError, check_seconds
 from bt_actions.running.threads import StartedRun, WakeUp

@@ -10,7 +10,8 @@ import enum
 from dataclasses import dataclass
 
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.report import Report, Row
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import State
 
 __all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]
 
@@ -92,7 +93,7 @@ class RunOutcome:
 
 
 def outcome_of(
-    report: Report,
+    state: State,
     *,
     succeeded: bool,
     ending: Ending | None = None,
@@ -113,7 +114,7 @@ def outcome_of(
     elif ending is not None:
         code, lines = ending.value[0], [ending.value[1]]
     else:
-        code, lines = _failure(report)
+        code, lines = _failure(state)
     left = list(unaccounted or ())
     if left:
         code = Code.UNKNOWN if succeeded else code
@@ -123,37 +124,36 @@ def outcome_of(
         "\n".join(lines)[:_MOST_TEXT],
         outputs,
         tuple(left),
-        tuple(_action(report, row) for row in report.rows),
+        tuple(_action(state, action) for action in state.actions),
     )
 
 
-def _failure(report: Report) -> tuple[int, list[str]]:
+def _failure(state: State) -> tuple[int, list[str]]:
     """The first action that is to blame, and the chain, it first."""
-    culprits = report.culprits()
-    chain = sorted(culprits, key=lambda each: each.row is None)
+    chain = sorted(state.failures, key=lambda each: each.action is None)
     code: int = Code.TREE_FAILED
     for each in chain:
-        if each.row is not None and each.row.outcome is not None:
-            code = Code.ACTION_FAILED + OUTCOMES[each.row.outcome]
+        if each.action is not None and each.action.outcome is not None:
+            code = Code.ACTION_FAILED + OUTCOMES[each.action.outcome]
             break
     lines = []
     for each in chain:
-        said = each.message
-        if each.row is not None and each.row.outcome is not None:
-            said = f"{each.row.outcome}: {each.row.reason or said}"
+        said, action = each.message, each.action
+        if action is not None and action.outcome is not None:
+            said = f"{action.outcome}: {action.reason or said}"
         place = f" ({each.place})" if each.place else ""
         lines.append(f"{SEPARATOR.join(each.path)}: {said or 'failed'}{place}")
     return code, lines or ["the tree failed"]
 
 
-def _action(report: Report, row: Row) -> ActionOutcome:
+def _action(state: State, action: ActionStory) -> ActionOutcome:
     return ActionOutcome(
-        SEPARATOR.join(row.path),
-        row.server,
-        row.attempts,
-        0 if row.outcome is None else OUTCOMES[row.outcome],
-        ENDS[End.UNKNOWN if row.end is None else row.end],
-        row.reason,
-        row.seconds(report.now),
-        row.place,
+        SEPARATOR.join(action.path),
+        action.server,
+        action.attempts,
+        0 if action.outcome is None else OUTCOMES[action.outcome],
+        ENDS[End.UNKNOWN if action.end is None else action.end],
+        action.reason,
+        action.seconds(state.latest),
+        action.node.place,
     )

@@ -60,6 +60,8 @@ class ActionStory:
     attempts: int = 0
     """Goals wished for in all visits."""
     visits: int = 0
+    failed: int = 0
+    """Visits that ended in FAILURE."""
     outcome: Outcome | None = None
     """Of the latest attempt; None while it is under way."""
     end: End | None = None

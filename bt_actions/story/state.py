@@ -7,7 +7,7 @@ All that is shown or decided of a run reads from here: terminal, `--json`, table
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from py_trees.common import Status
@@ -31,6 +31,8 @@ from bt_actions.events.kinds import (
     TreeFinished,
     VariableWritten,
 )
+from bt_actions.events.snapshot import Value
+from bt_actions.goals.policy import End
 from bt_actions.story.actions import ActionStory, GoalStory
 from bt_actions.utilities.places import told_apart
 
@@ -113,6 +115,8 @@ class State:
         self.ended: RunEnded | None = None
         self.stop: StopWanted | None = None
         """What asked the run to end; the first counts."""
+        self.left = False
+        """Whether goals that are being drained are waited for no longer."""
         self.paused = False
         self.lost = 0
         """Events that this reader was too slow for."""
@@ -155,6 +159,7 @@ class State:
                 self.root = event.nodes[0].id
             case StopWanted():
                 self.stop = self.stop or event
+                self.left |= event.leaves
             case Paused():
                 self.paused = event.paused
             case EventsLost():
@@ -205,6 +210,8 @@ class State:
 
     def _failure(self, story: NodeStory, event: NodeChanged) -> Failure:
         action = self._actions.get(event.node)
+        if action is not None:
+            action.failed += 1
         return Failure(
             story.node,
             event.at,
@@ -272,6 +279,11 @@ class State:
         return self.finished.status if self.finished is not None else Status.INVALID
 
     @property
+    def outputs(self) -> Mapping[str, Value]:
+        """What the tree gave its outputs; only once it has succeeded."""
+        return self.finished.outputs if self.finished is not None else {}
+
+    @property
     def decided(self) -> bool:
         """Whether the tree has come to its end, be it that goals of it have not."""
         return self.status_of(self.root) in OVER
@@ -286,12 +298,17 @@ class State:
         """When the run began, in seconds on the steady clock."""
         if self.began is not None:
             return self.began.at.steady
+        return self.latest
+
+    @property
+    def latest(self) -> float:
+        """When the latest event happened, in seconds on the steady clock."""
         return self.now.steady if self.now is not None else 0.0
 
-    def elapsed(self, now: float | None = None) -> float:
-        """Return the seconds from the run's beginning to `now`, or to the latest event."""
-        latest = self.now.steady if self.now is not None else self.started
-        return max(0.0, (latest if now is None else now) - self.started)
+    @property
+    def elapsed(self) -> float:
+        """The seconds from the run's beginning to the latest event."""
+        return max(0.0, self.latest - self.started)
 
     def status_of(self, node: int) -> Status:
         """Return the status that a node was last told with."""
@@ -304,6 +321,15 @@ class State:
         while parent is not None and parent in self.nodes:
             yield self.nodes[parent]
             parent = self.nodes[parent].node.parent
+
+    def in_order(self) -> list[int]:
+        """Return all nodes, each before its children."""
+        waiting, found = [self.root], list[int]()
+        while waiting:
+            node = waiting.pop()
+            found.append(node)
+            waiting.extend(reversed(self.nodes[node].children))
+        return found
 
     def path(self, node: int) -> tuple[str, ...]:
         """Return the names from the root down to a node."""
@@ -328,6 +354,23 @@ class State:
             and not any(self.nodes[child].status is Status.RUNNING for child in each.children)
         ]
         return sorted(leaves, key=lambda each: -sum(1 for _ in self.above(each.node.id)))
+
+    @property
+    def unaccounted(self) -> list[str]:
+        """A line for each goal whose end is not known, now that nothing more is waited for."""
+        last = {key: goal.latest for action in self.actions for key, goal in action.goals.items()}
+        told = self.finished.unaccounted if self.finished is not None else ()
+        lines = {
+            goal.goal_id: f"{goal.name} on {goal.server}, goal {goal.goal_id}"
+            + (f": {goal.reason}" if goal.reason else "")
+            for goal in told
+            if goal.goal_id not in last or last[goal.goal_id].end in (None, End.UNKNOWN)
+        }
+        for action in self.live if self.left else ():
+            for goal_id, state in action.live.items():
+                where = f"{self.called(action.node.id)} on {action.server}, goal {goal_id}"
+                lines.setdefault(goal_id, f"{where}, {state.lower()} when left")
+        return list(lines.values())
 
     @property
     def failures(self) -> list[Failure]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from bt_actions.cli.arguments.options import add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.arguments.values import goal_fields, nested
-from bt_actions.cli.exits import BadInput, Exit
+from bt_actions.cli.exits import BadInput
 from bt_actions.cli.streams.results import keep_results_apart
 from bt_actions.cli.streams.writing import note
 
@@ -73,17 +73,15 @@ def run(args: argparse.Namespace) -> int:
 
     rejection = Rejected(leaf, goal_name)
     with Session(leaf, namespace=args.namespace, name=name) as session:
-        view: View = CallView(session.report, leaf, sys.stdout, feedback=True)
+        view: View = CallView(session.state, sys.stdout, feedback=True)
         if args.json:
-            view = as_json = session.json_view(CallJsonView)
-            as_json.rejection = rejection
+            view = session.json_view(CallJsonView)
         elif args.quiet:
-            view = QuietView(session.report, sys.stdout)
-        code = session.run(view, timeout=args.timeout)
-    if code is not Exit.FAILURE or not rejection.happened:
-        return code
-    note(f"bt-actions call: {rejection.text}")
-    return rejection.exit_code
+            view = QuietView(session.state, sys.stdout)
+        code = session.run(view, timeout=args.timeout, judge=rejection.judge)
+    if session.state.ended is not None and session.state.ended.error:
+        note(f"bt-actions call: {session.state.ended.error}")
+    return code
 
 
 def _leaf(tree: str, server: str, inputs: dict[str, object], goal_name: str) -> RunTree:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
-if TYPE_CHECKING:
-    from bt_actions.behaviours.action import ActionBehaviour
-    from bt_actions.cli.views.words import Closing
-    from bt_actions.events import Event
-    from bt_actions.running.report import Report, Row
+from bt_actions.events import Event, GoalChanged, StopWanted
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import State
+from bt_actions.story.words import (
+    CLEAN_UP,
+    feedback_text,
+    goal_text,
+    result_lines,
+    stood_still,
+    stopping_text,
+)
 
 
 class GoalView:
@@ -16,11 +23,8 @@ class GoalView:
 
     fileno = -1
 
-    def __init__(
-        self, report: Report, leaf: ActionBehaviour, out: TextIO, *, feedback: bool
-    ) -> None:
-        self._report = report
-        self._leaf = leaf
+    def __init__(self, state: State, out: TextIO, *, feedback: bool) -> None:
+        self._state = state
         self._out = out
         self._feedback = feedback
         self._last = ""
@@ -30,20 +34,19 @@ class GoalView:
 
     def event(self, event: Event) -> None:
         """Write where the goal stands, when that has changed."""
-        from bt_actions.cli.views.words import goal_text
-        from bt_actions.events import GoalChanged
-
-        if not isinstance(event, GoalChanged):
+        if isinstance(event, StopWanted):
+            self._line(stopping_text(self._state))
+        if not isinstance(event, GoalChanged) or event.outcome is not None:
             return
-        text = goal_text(self._report.row(event.behaviour))
-        if event.outcome is None and text != self._last:
+        text = goal_text(self._state.action(event.node))
+        if text != self._last:
             self._last = text
             self._line(text)
 
-    def frame(self) -> None:
+    def frame(self, now: float) -> None:
         """Show the latest feedback."""
-        for row in self._report.live if self._feedback else ():
-            text = self.feedback_text(row)
+        for action in self._state.live if self._feedback else ():
+            text = self.feedback_text(action)
             if text and text != self._last_feedback:
                 self._last_feedback = text
                 self._show_feedback(text)
@@ -52,40 +55,35 @@ class GoalView:
         """Write `text` on a line of its own."""
         self._line(text)
 
-    def finish(self, closing: Closing) -> None:
+    def finish(self) -> None:
         """Write the result and the outcome."""
-        from bt_actions.cli.views.words import CLEAN_UP, goal_text, stood_still
-        from bt_actions.goals.policy import Outcome
-
-        for line in self.result_lines():
-            self._line(line)
-        for row in self._report.rows:
-            if closing.cause and row.outcome is Outcome.CANCELED:
-                row.reason = closing.cause  # here is no tree that could have interrupted it
-            self._line(f"{goal_text(row)}, after {row.seconds(self._report.now):.2f} s")
-        if closing.error:
-            self._line(closing.error)
-        if self._report.servers_gone:
-            self._line(stood_still(self._report))
-        if self._report.unaccounted:
+        state, ended = self._state, self._state.ended
+        assert ended is not None
+        for action in state.actions:
+            for line in self.result_lines(action):
+                self._line(line)
+        for action in state.actions:
+            if ended.cause and action.outcome is Outcome.CANCELED:
+                action.reason = ended.cause  # here is no tree that could have interrupted it
+            self._line(f"{goal_text(action)}, after {action.seconds(state.latest):.2f} s")
+        if state.finished is not None and state.finished.error:
+            self._line(state.finished.error)
+        if state.servers_gone:
+            self._line(stood_still(state))
+        if ended.unaccounted:
             self._line(CLEAN_UP)
-        for line in self._report.unaccounted:
+        for line in ended.unaccounted:
             self._line(f"not accounted for: {line}")
 
-    def feedback_text(self, row: Row) -> str:
+    def feedback_text(self, action: ActionStory) -> str:
         """Return the latest feedback on one line."""
-        from bt_actions.cli.views.words import feedback_text
+        return feedback_text(action)
 
-        return feedback_text(row)
-
-    def result_lines(self) -> list[str]:
+    def result_lines(self, action: ActionStory) -> list[str]:
         """Return what the goal's result says."""
-        from bt_actions.cli.views.words import result_lines
-        from bt_actions.goals.policy import End
-
-        if self._leaf.end not in (End.SUCCEEDED, End.ABORTED):
+        if action.end not in (End.SUCCEEDED, End.ABORTED):
             return []  # only these have a result of their own
-        return result_lines(self._leaf.result)
+        return result_lines(action)
 
     def close(self) -> None:
         """Leave the line that feedback was drawn on."""

@@ -1,4 +1,4 @@
-"""What watches a run: told every event after the report has taken it in, on the main thread.
+"""What watches a run: told every event after the state has taken it in, on the main thread.
 
 A view only writes; it decides nothing.
 """
@@ -6,8 +6,6 @@ A view only writes; it decides nothing.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
-
-from bt_actions.cli.views.words import Closing
 
 if TYPE_CHECKING:
     from bt_actions.events import Event
@@ -23,13 +21,13 @@ class View(Protocol):
     def event(self, event: Event) -> None:
         """Show one event."""
 
-    def frame(self) -> None:
-        """Show what changes without an event; called about ten times a second."""
+    def frame(self, now: float) -> None:
+        """Show what changes without an event, `now` on the steady clock; ten times a second."""
 
     def say(self, text: str) -> None:
         """Tell the user something about the run itself."""
 
-    def finish(self, closing: Closing) -> None:
+    def finish(self) -> None:
         """Show how it ended; nothing is shown after it."""
 
     def close(self) -> None:

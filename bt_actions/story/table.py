@@ -1,47 +1,52 @@
-"""A run's actions as a table, and why its tree failed, as lines. Looks at the report alone."""
+"""A run's actions as a table, and why its tree failed, as lines."""
 
 from __future__ import annotations
 
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.report import Report, Row
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import State
 from bt_actions.utilities.plain_text import clean
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
 
 
-def table(report: Report, width: int | None = None) -> list[str]:
+def table(state: State, width: int | None = None) -> list[str]:
     """Return the table of actions as lines; names are cut so that lines fit into `width`."""
     body = [
         (
-            report.called(row.behaviour),
-            row.server,
-            _tries(row),
-            verdict(row),
-            f"{row.seconds(report.now):.2f} s",
+            state.called(action.node.id),
+            action.server,
+            _tries(action),
+            verdict(action),
+            f"{action.seconds(state.latest):.2f} s{' in all' if action.visits > 1 else ''}",
         )
-        for row in report.rows
+        for action in state.actions
     ]
     return columns(body, width) if body else []
 
 
-def _tries(row: Row) -> str:
-    return f"{row.attempts}" if row.visits <= 1 else f"{row.attempts} in {row.visits}"
+def _tries(action: ActionStory) -> str:
+    if action.visits <= 1:
+        return f"{action.attempts}"
+    return f"{action.attempts} in {action.visits} visits"
 
 
-def verdict(row: Row) -> str:
+def verdict(action: ActionStory) -> str:
     """Return the outcome for the table: where the goal stands while there is none.
 
     The end is told where the goal may still be running, or run again, and where the robot did what
     nobody waited for.
     """
-    if row.outcome is None:
-        return row.state
-    surprise = row.outcome not in STOOD and row.end in (End.SUCCEEDED, End.ABORTED)
-    gone = row.end is End.SERVER_GONE and row.outcome is not Outcome.SERVER_LOST
-    told = f", end {row.end}" if surprise or gone or row.end is End.UNKNOWN else ""
-    late = row.outcome is Outcome.SUCCEEDED and row.reason.startswith("late:")
-    return f"{row.outcome}{told}{', late' if late else ''}"
+    if action.outcome is None:
+        return action.state
+    surprise = action.outcome not in STOOD and action.end in (End.SUCCEEDED, End.ABORTED)
+    gone = action.end is End.SERVER_GONE and action.outcome is not Outcome.SERVER_LOST
+    told = f", end {action.end}" if surprise or gone or action.end is End.UNKNOWN else ""
+    late = action.outcome is Outcome.SUCCEEDED and action.reason.startswith("late:")
+    failed = f", {action.failed} of {action.visits} visits failed"
+    some = failed if action.visits > 1 and action.failed else ""
+    return f"{action.outcome}{told}{', late' if late else ''}{some}"
 
 
 def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
@@ -66,19 +71,20 @@ def _cut(cell: str, size: int) -> str:
     return cell if len(cell) <= size else cell[: size - 2] + ".."
 
 
-def summary(report: Report) -> list[str]:
+def summary(state: State) -> list[str]:
     """Return why the tree failed: for each leaf its path, attempts, outcome, reason and place."""
     lines: list[str] = []
-    for culprit in report.culprits():
-        lines.append(" / ".join(culprit.path))
-        row = culprit.row
-        if row is None or row.outcome is None:
-            lines.append(f"  failed{_because(culprit.message)}")
+    for failure in state.failures:
+        lines.append(" / ".join(failure.path))
+        action = failure.action
+        if action is None or action.outcome is None:
+            lines.append(f"  failed{_because(failure.message)}")
         else:
-            tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
-            lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
-        if culprit.place:
-            lines.append(f"  {culprit.place}")
+            tries = "1 attempt" if action.attempt == 1 else f"{action.attempt} attempts"
+            reason = _because(action.reason or failure.message)
+            lines.append(f"  {action.outcome} after {tries}{reason}")
+        if failure.place:
+            lines.append(f"  {failure.place}")
     return lines
 
 

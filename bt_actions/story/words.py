@@ -1,0 +1,230 @@
+"""What the views say in words: where a goal stands, what a message holds, how a run ended.
+
+Pure functions of the state; nothing here writes anything.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from py_trees.common import Status
+
+from bt_actions.events.kinds import Moment, RunEnded
+from bt_actions.events.snapshot import Cut, Value
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import NodeStory, State
+from bt_actions.story.table import summary, table
+from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import shorten
+
+_USUAL_ENDS = {
+    Outcome.SUCCEEDED: End.SUCCEEDED,
+    Outcome.UNEXPECTED_RESULT: End.SUCCEEDED,
+    Outcome.ABORTED: End.ABORTED,
+    Outcome.CANCELED: End.CANCELED,
+    Outcome.CANCELED_BY_OTHER: End.CANCELED,
+    Outcome.REJECTED: End.NEVER_STARTED,
+    Outcome.SERVER_UNAVAILABLE: End.NEVER_STARTED,
+    Outcome.SERVER_AMBIGUOUS: End.NEVER_STARTED,
+    Outcome.SERVER_BUSY: End.NEVER_STARTED,
+    Outcome.INVALID_GOAL: End.NEVER_STARTED,
+    Outcome.SERVER_LOST: End.SERVER_GONE,
+}
+"""Ends that go without saying."""
+Constants = Mapping[str, Value]
+"""By field the names of numbers."""
+_NOTHING = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
+MOST = 3
+"""Of many actions that are waited for, or many items of a list, how many are shown."""
+MANY = 20
+"""Items of a list that is shown whole."""
+LONG = 300
+"""Characters of a value; longer ones are cut."""
+CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
+
+
+def last_words(state: State, width: int | None = None) -> list[str]:
+    """Return the table, the verdict, how long it took, and last what went wrong."""
+    ended = state.ended or _NOTHING
+    lines = ["", *table(state, width)] if state.actions else []
+    outputs = [clean(f"{name}: {brief(value)}") for name, value in state.outputs.items()]
+    lines += ["", *outputs] if outputs else []
+    lines += ["", ended.world] if ended.world else []
+    word = state.status.value if state.status is not Status.INVALID else "STOPPED"
+    cause = f", {ended.cause}" if ended.cause else ""
+    cause += ", but not as it should be" if ended.complaint and word == "SUCCESS" else ""
+    lines += ["", f"{word} after {state.elapsed:.2f} s{cause}"]
+    wrong = troubles(state)
+    return [*lines, *(["", *wrong] if wrong else [])]
+
+
+def brief(value: object) -> str:
+    """Return a value as people read it, short however large it is; a text without quotes."""
+    if not isinstance(value, str):
+        return shorten(value, LONG)
+    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
+
+
+def troubles(state: State) -> list[str]:
+    """Return what went wrong, the gravest last; empty when nothing did."""
+    ended = state.ended or _NOTHING
+    warned = [f"{' / '.join(each.path)}: {each.message}" for each in state.warnings]
+    lines = [f"warning: {clean(line)}" for line in warned] + summary(state)
+    if state.servers_gone and not ended.world:
+        lines.append(stood_still(state))
+    error = state.finished.error if state.finished is not None else ""
+    lines += [line for line in (ended.complaint, error) if line]
+    if ended.unaccounted and not ended.world:  # of a simulation, which ends with us
+        lines.append(CLEAN_UP)
+    lines += [f"not accounted for: {line}" for line in ended.unaccounted]
+    return lines
+
+
+def stood_still(state: State) -> str:
+    """Say what to do about servers that went away with a goal."""
+    servers = " ".join(sorted({each.server for each in state.actions if each.left_at_server}))
+    return (
+        "A server that only stood still, or was cut off, may go on with its goal; once it is back,"
+        f" `bt-actions cleanup {servers}` cancels that."
+    )
+
+
+def goal_text(action: ActionStory) -> str:
+    """Say where the latest goal of an action stands."""
+    attempt = f" (attempt {action.attempt})" if action.attempt > 1 else ""
+    if action.outcome is None:
+        words = {
+            "QUEUED": "waiting for its turn on",
+            "WAITING_FOR_SERVER": "waiting for the server",
+            "SENDING": "sending a goal to",
+            "EXECUTING": "executing on",
+            "CANCELING": "canceling on",
+        }
+        return f"{words.get(action.state, action.state.lower())} {action.server}{attempt}"
+    text = f"{action.outcome}{attempt}"
+    if action.end is End.UNKNOWN:
+        text += ", end not known" if not action.live else ", end not known yet"
+    elif action.in_doubt:
+        text += ", not started as far as its server knows"
+    elif action.end is not None and action.end is not _USUAL_ENDS.get(action.outcome):
+        text += f", ended {action.end}"
+    return text + (
+        f": {action.reason}" if action.reason and action.outcome is not Outcome.SUCCEEDED else ""
+    )
+
+
+def stopping_text(state: State) -> str:
+    """Say that the run is asked to end, and what is waited for."""
+    assert state.stop is not None
+    again = "Ctrl-C again leaves without waiting"
+    live = len(state.live)
+    if live:
+        goals = "1 goal" if live == 1 else f"{live} goals"
+        return f"{state.stop.why}: canceling {goals}; {again}"
+    waiting = waiting_text(state)
+    return f"{state.stop.why}: {waiting}; {again}" if waiting else state.stop.why
+
+
+def doing_text(story: NodeStory, state: State) -> str:
+    """Say what a running leaf does: of an action its goal's state, the attempt and feedback."""
+    if not state.acts(story.node.id):
+        return story.message
+    action = state.action(story.node.id)
+    tries = f", attempt {action.attempt} of {action.of}" if action.attempt > 1 else ""
+    feedback = feedback_text(action)
+    said = action.state.lower().replace("_", " ")
+    return f"{said}{tries}{f': {feedback}' if feedback else ''}"
+
+
+def waiting_text(state: State) -> str:
+    """Say for what a run waits whose tree has ended; "" where it is over."""
+    actions = [action for action in state.actions if action.waited_for]
+    if actions:
+        goals = sum(action.waited_for for action in actions)
+        count = "1 goal" if goals == 1 else f"{goals} goals"
+        return f"waiting to know the end of {count}: {_where(state, actions)}"
+    actions = [action for action in state.actions if action.left_at_server]
+    if actions:
+        what = "looking out for a server that went away, to cancel its goal if it is back"
+        return f"{what}: {_where(state, actions)}"
+    return ""
+
+
+def _where(state: State, actions: list[ActionStory]) -> str:
+    which = ", ".join(f"{state.called(each.node.id)} on {each.server}" for each in actions[:MOST])
+    return f"{which} and {len(actions) - MOST} more" if len(actions) > MOST else which
+
+
+def feedback_text(action: ActionStory) -> str:
+    """Return the latest feedback of an action on one line: its plain fields."""
+    came = action.latest.feedback if action.latest is not None else None
+    return "" if came is None else fields_text(came.feedback, constants_of(action, "feedback"))
+
+
+def constants_of(action: ActionStory, message: str) -> Constants:
+    """Return the constants of `goal`, `result` or `feedback`: their names by field and number."""
+    constants = action.node.settings.get("constants")
+    found = constants.get(message) if isinstance(constants, dict) else None
+    return found if isinstance(found, dict) else {}
+
+
+def fields_text(message: Value, constants: Constants, most: int = 4) -> str:
+    """Return the first scalar fields of a message: names, values, constants by their name."""
+    parts: list[str] = []
+    for field, value in opened(message).items():
+        if isinstance(value, float):
+            parts.append(f"{field} {value:.2f}" if math.isfinite(value) else f"{field} {value}")
+        elif isinstance(value, bool | str):
+            parts.append(f"{field} {brief(value)}")
+        elif isinstance(value, int):
+            parts.append(f"{field} {_constant(constants, field, value)}")
+    return ", ".join(parts[:most])
+
+
+def opened(message: Value) -> dict[str, Value]:
+    """Return the fields of a message that are known."""
+    if isinstance(message, Cut):
+        message = message.head
+    return message if isinstance(message, dict) else {}
+
+
+def result_lines(action: ActionStory) -> list[str]:
+    """Return the result of an action as lines of YAML; of long values the beginning."""
+    result = action.latest.result if action.latest is not None else None
+    if result is None:
+        return []
+    import yaml
+
+    constants = constants_of(action, "result")
+    text = yaml.safe_dump(_short(result), sort_keys=False, allow_unicode=True)
+    lines = []
+    for line in text.splitlines():
+        field, _, written = line.partition(": ")
+        name = _constant(constants, field, int(written)) if written.isdecimal() else written
+        lines.append(f"  {line}" + (f"  # {name}" if name != written else ""))
+    return lines
+
+
+def _short(data: Value) -> object:
+    """Return plain data with the first items of long lists, and the beginning of long texts."""
+    more = data.more if isinstance(data, Cut) else 0
+    data = data.head if isinstance(data, Cut) else data
+    if isinstance(data, dict):
+        short: dict[str, object] = {key: _short(value) for key, value in data.items()}
+        return short | ({"…": f"{more} more"} if more else {})
+    if isinstance(data, bytes):
+        data = tuple(data)
+    if isinstance(data, tuple):
+        size = len(data) + more
+        rest = [f"… {size} items"] if size > MANY else []
+        return [_short(item) for item in (data[:MOST] if rest else data)] + rest
+    return brief(data) if isinstance(data, str) else data
+
+
+def _constant(constants: Constants, field: str, value: int) -> str:
+    """The constant FIELD_X of the message's type that has `value`, as X; else the number."""
+    named = constants.get(field)
+    name = named.get(str(value)) if isinstance(named, dict) else None
+    return name if isinstance(name, str) else str(value)
