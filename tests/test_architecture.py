@@ -24,6 +24,7 @@ ROOMS = [
     {"ros"},
     {"traffic"},
     {"messages", "expressions", "servers"},
+    {"story"},
     {"events"},
     {"goals"},
     {"utilities"},

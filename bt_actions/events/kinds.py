@@ -158,7 +158,8 @@ class VariableWritten(Event):
     """A variable has another value: at most five a second, the last before a failure always."""
 
     name: str
-    """The blackboard's key."""
+    """As the tree has it; behind the name and number of the subtree that has it (``recover_1/x``).
+    Of a variable of the user's own, the blackboard's key."""
     value: Value
     node: int | None
     """Who wrote it, where that is known."""

@@ -6,6 +6,7 @@ and needs to know nothing of runs or readers.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from contextvars import ContextVar
 from typing import Any, Protocol
@@ -14,6 +15,8 @@ from bt_actions.events.kinds import Event, VariableWritten
 from bt_actions.events.snapshot import Value, snapshot
 from bt_actions.events.stream import Stream
 
+_OF_LOAD = re.compile(r"^/bt/\w+/\d+/")
+"""What the blackboard's key of a tree's variable begins with, another at each load."""
 OFTEN = 0.2
 """Seconds between two events of one goal's feedback, and of one variable."""
 
@@ -55,7 +58,7 @@ class Teller:
     def wrote(self, key: str, value: object) -> None:
         """Take note of what a variable holds from now on; `claim` says who wrote it."""
         if self.stream.is_read:
-            self._written[key] = snapshot(value)
+            self._written[_OF_LOAD.sub("", key)] = snapshot(value)
 
     def claim(self, node: object) -> None:
         """What was written since the last claim, `node` has written."""

@@ -23,6 +23,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions import document
 from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.variables import overhear, overhear_less
 from bt_actions.events import (
     Event,
     Node,
@@ -50,6 +51,8 @@ from bt_actions.wiring import backend_of
 _ALL = sys.maxsize
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
+SLOW = 0.05
+"""Seconds for one event from which on an observer is said to be slow."""
 LONGEST_WAIT = 3600.0
 """Seconds, at most, between two looks at the tree, whatever the heartbeat is."""
 
@@ -110,9 +113,11 @@ class TickLoop:
         self.stream = Stream(self._moment)
         self.teller = Teller(self.stream, self._traffic.host.steady)
         self._observers: list[Observer] = []
+        self._slow: list[Observer] = []
+        """Those of which that was said."""
         self._observed: Reader | None = None
-        self._began = False
-        """Whether this run was told of."""
+        self._began = self._overhears = False
+        """Whether this run was told of, and what clients of the blackboard write is."""
         self.asked_by = "", ""
         """The id of the RunTree goal that the runs answer, and that of its caller's run."""
         self.goals = RunGoals(
@@ -168,8 +173,12 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
+        self._run_id = self._traffic.host.new_goal_id().hex()
         self._visitor = ChangeVisitor(self._set_up_missing, self._after_each, self._tell_of)
         self._began = False
+        self._overhears = self.teller.is_heard
+        if self._overhears:
+            overhear()
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)
 
@@ -202,6 +211,9 @@ class TickLoop:
         self._error, self._status = error, Status.INVALID
 
     def _rest(self) -> None:
+        if self._overhears:
+            self._overhears = False
+            overhear_less()
         with self._traffic.host.lock:
             self._stop_wanted = self._abandoned = self._pause_wanted = False
             self.goals.run_goes_on = False
@@ -413,7 +425,7 @@ class TickLoop:
         given = document.given_inputs(root)
         self.stream.add(
             RunBegan,
-            self._backend.traffic.host.new_goal_id().hex(),
+            self._run_id,
             document.tree_name(root),
             self._number(in_order(root)),
             {name: snapshot(value) for name, (_, value) in given.items()},
@@ -474,12 +486,20 @@ class TickLoop:
             self._emit(event)
 
     def _emit(self, event: Event) -> None:
+        steady = self._traffic.host.steady
         for observer in list(self._observers):
+            began = steady()
             try:
                 observer(event)
             except BaseException as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
                 self._raised("an observer raised and was removed", error)
+            if (took := steady() - began) > SLOW and observer not in self._slow:
+                self._slow.append(observer)
+                self._log.warning(
+                    f"an observer has taken {took:.2f} s for one event; the tree waits for it: "
+                    "read `runner.stream` on a thread of your own instead"
+                )
 
     def _raised(self, what: str, error: BaseException) -> None:
         """Log it, and end the run where it is meant to end the program, as SystemExit is."""

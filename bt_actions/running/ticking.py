@@ -82,7 +82,7 @@ class ChangeVisitor(VisitorBase):
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of what was visited: anything, for a tree that shows nothing
         self._known: dict[Behaviour, Status] = {}
-        self._live = set[Behaviour]()  # told of as RUNNING
+        self._live: dict[Behaviour, None] = {}  # told of as RUNNING
 
     def initialise(self) -> None:
         """Begin a tick (py_trees calls this)."""
@@ -112,10 +112,10 @@ class ChangeVisitor(VisitorBase):
                 raise Misbehaviour(behaviour, what)
             visited.append(behaviour)
             if status is not running:
-                live.discard(behaviour)
+                live.pop(behaviour, None)
                 tell(behaviour)
             elif behaviour not in live:
-                live.add(behaviour)
+                live[behaviour] = None
                 tell(behaviour)
             if wrong := after_each():
                 raise Misbehaviour(behaviour, wrong)
@@ -147,7 +147,7 @@ class ChangeVisitor(VisitorBase):
 
     def _tell_stopped(self) -> None:
         for node in [each for each in self._live if each.status is not Status.RUNNING]:
-            self._live.discard(node)
+            del self._live[node]
             self._tell(node)
 
     def _changes(self, nodes: list[Behaviour]) -> dict[Behaviour, Status]:

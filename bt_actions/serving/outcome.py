@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
+from bt_actions.story.why import why
 
 __all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]
 
@@ -136,14 +137,7 @@ def _failure(state: State) -> tuple[int, list[str]]:
         if each.action is not None and each.action.outcome is not None:
             code = Code.ACTION_FAILED + OUTCOMES[each.action.outcome]
             break
-    lines = []
-    for each in chain:
-        said, action = each.message, each.action
-        if action is not None and action.outcome is not None:
-            said = f"{action.outcome}: {action.reason or said}"
-        place = f" ({each.place})" if each.place else ""
-        lines.append(f"{SEPARATOR.join(each.path)}: {said or 'failed'}{place}")
-    return code, lines or ["the tree failed"]
+    return code, why(state) or ["the tree failed"]
 
 
 def _action(state: State, action: ActionStory) -> ActionOutcome:
