@@ -5,7 +5,6 @@ from __future__ import annotations
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
-from bt_actions.utilities.plain_text import clean
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
@@ -69,24 +68,3 @@ def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None
 
 def _cut(cell: str, size: int) -> str:
     return cell if len(cell) <= size else cell[: size - 2] + ".."
-
-
-def summary(state: State) -> list[str]:
-    """Return why the tree failed: for each leaf its path, attempts, outcome, reason and place."""
-    lines: list[str] = []
-    for failure in state.failures:
-        lines.append(" / ".join(failure.path))
-        action = failure.action
-        if action is None or action.outcome is None:
-            lines.append(f"  failed{_because(failure.message)}")
-        else:
-            tries = "1 attempt" if action.attempt == 1 else f"{action.attempt} attempts"
-            reason = _because(action.reason or failure.message)
-            lines.append(f"  {action.outcome} after {tries}{reason}")
-        if failure.place:
-            lines.append(f"  {failure.place}")
-    return lines
-
-
-def _because(reason: str) -> str:
-    return f": {clean(reason)}" if reason else ""

@@ -5,9 +5,6 @@ Pure functions of the state; nothing here writes anything.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-
 from py_trees.common import Status
 
 from bt_actions.events.kinds import Moment, RunEnded
@@ -15,9 +12,10 @@ from bt_actions.events.snapshot import Cut, Value
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import NodeStory, State
-from bt_actions.story.table import summary, table
+from bt_actions.story.table import table
+from bt_actions.story.values import brief, constants_of, feedback_text, named
+from bt_actions.story.why import why
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import shorten
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -33,15 +31,11 @@ _USUAL_ENDS = {
     Outcome.SERVER_LOST: End.SERVER_GONE,
 }
 """Ends that go without saying."""
-Constants = Mapping[str, Value]
-"""By field the names of numbers."""
 _NOTHING = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
 MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
 MANY = 20
 """Items of a list that is shown whole."""
-LONG = 300
-"""Characters of a value; longer ones are cut."""
 CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
 
 
@@ -60,26 +54,25 @@ def last_words(state: State, width: int | None = None) -> list[str]:
     return [*lines, *(["", *wrong] if wrong else [])]
 
 
-def brief(value: object) -> str:
-    """Return a value as people read it, short however large it is; a text without quotes."""
-    if not isinstance(value, str):
-        return shorten(value, LONG)
-    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
-
-
 def troubles(state: State) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     ended = state.ended or _NOTHING
     warned = [f"{' / '.join(each.path)}: {each.message}" for each in state.warnings]
-    lines = [f"warning: {clean(line)}" for line in warned] + summary(state)
+    lines = [f"warning: {clean(line)}" for line in warned] + why(state)
     if state.servers_gone and not ended.world:
         lines.append(stood_still(state))
-    error = state.finished.error if state.finished is not None else ""
-    lines += [line for line in (ended.complaint, error) if line]
+    lines += [line for line in (ended.complaint, error_text(state)) if line]
     if ended.unaccounted and not ended.world:  # of a simulation, which ends with us
         lines.append(CLEAN_UP)
     lines += [f"not accounted for: {line}" for line in ended.unaccounted]
     return lines
+
+
+def error_text(state: State) -> str:
+    """Say what a behaviour raised, or else what of the run no failure of its tree says."""
+    if state.finished is not None and (state.finished.error or state.failures):
+        return state.finished.error
+    return state.ended.error if state.ended is not None else ""
 
 
 def stood_still(state: State) -> str:
@@ -157,39 +150,6 @@ def _where(state: State, actions: list[ActionStory]) -> str:
     return f"{which} and {len(actions) - MOST} more" if len(actions) > MOST else which
 
 
-def feedback_text(action: ActionStory) -> str:
-    """Return the latest feedback of an action on one line: its plain fields."""
-    came = action.latest.feedback if action.latest is not None else None
-    return "" if came is None else fields_text(came.feedback, constants_of(action, "feedback"))
-
-
-def constants_of(action: ActionStory, message: str) -> Constants:
-    """Return the constants of `goal`, `result` or `feedback`: their names by field and number."""
-    constants = action.node.settings.get("constants")
-    found = constants.get(message) if isinstance(constants, dict) else None
-    return found if isinstance(found, dict) else {}
-
-
-def fields_text(message: Value, constants: Constants, most: int = 4) -> str:
-    """Return the first scalar fields of a message: names, values, constants by their name."""
-    parts: list[str] = []
-    for field, value in opened(message).items():
-        if isinstance(value, float):
-            parts.append(f"{field} {value:.2f}" if math.isfinite(value) else f"{field} {value}")
-        elif isinstance(value, bool | str):
-            parts.append(f"{field} {brief(value)}")
-        elif isinstance(value, int):
-            parts.append(f"{field} {_constant(constants, field, value)}")
-    return ", ".join(parts[:most])
-
-
-def opened(message: Value) -> dict[str, Value]:
-    """Return the fields of a message that are known."""
-    if isinstance(message, Cut):
-        message = message.head
-    return message if isinstance(message, dict) else {}
-
-
 def result_lines(action: ActionStory) -> list[str]:
     """Return the result of an action as lines of YAML; of long values the beginning."""
     result = action.latest.result if action.latest is not None else None
@@ -202,7 +162,7 @@ def result_lines(action: ActionStory) -> list[str]:
     lines = []
     for line in text.splitlines():
         field, _, written = line.partition(": ")
-        name = _constant(constants, field, int(written)) if written.isdecimal() else written
+        name = named(constants, field, int(written)) if written.isdecimal() else written
         lines.append(f"  {line}" + (f"  # {name}" if name != written else ""))
     return lines
 
@@ -221,10 +181,3 @@ def _short(data: Value) -> object:
         rest = [f"… {size} items"] if size > MANY else []
         return [_short(item) for item in (data[:MOST] if rest else data)] + rest
     return brief(data) if isinstance(data, str) else data
-
-
-def _constant(constants: Constants, field: str, value: int) -> str:
-    """The constant FIELD_X of the message's type that has `value`, as X; else the number."""
-    named = constants.get(field)
-    name = named.get(str(value)) if isinstance(named, dict) else None
-    return name if isinstance(name, str) else str(value)

@@ -79,8 +79,9 @@ def run(args: argparse.Namespace) -> int:
         elif args.quiet:
             view = QuietView(session.state, sys.stdout)
         code = session.run(view, timeout=args.timeout, judge=rejection.judge)
-    if session.state.ended is not None and session.state.ended.error:
-        note(f"bt-actions call: {session.state.ended.error}")
+    ended = session.state.ended
+    if ended is not None and ended.error and rejection.happened:
+        note(f"bt-actions call: {ended.error}")
     return code
 
 

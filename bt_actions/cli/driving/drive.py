@@ -241,7 +241,8 @@ class Drive:
 
         `world` and `complaint` are what the simulation says in the end.
         """
-        raised = self._state.finished is None and self._error is not None
+        told = self._state.finished is not None and bool(self._state.finished.error)
+        raised = self._error is not None and not told
         code, error = judge(code_of(self._state, raised=raised, complaint=complaint))
         if raised and self._error is not None:
             error = where_raised(self._error)

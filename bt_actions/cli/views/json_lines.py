@@ -20,6 +20,7 @@ from bt_actions.events import (
 from bt_actions.events.kinds import FeedbackCame
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import Failure, State
+from bt_actions.story.why import why
 from bt_actions.story.words import stopping_text
 from bt_actions.utilities.plain_text import as_json
 
@@ -114,6 +115,7 @@ class JsonView:
             "outputs": plain(state.outputs),
             "actions": [self._action(each) for each in state.actions],
             "failures": [self._failure(each) for each in state.failures],
+            "why": why(state),
             "dealt_with": [
                 self._failure(each) | {"by": each.by.id if each.by is not None else None}
                 for each in state.dealt_with

@@ -18,8 +18,9 @@ from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWant
 from bt_actions.events.kinds import NodesAdded
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import OVER, NodeStory, State
+from bt_actions.story.values import feedback_text
 from bt_actions.story.waiting import due_of
-from bt_actions.story.words import feedback_text, goal_text, last_words, stopping_text
+from bt_actions.story.words import goal_text, last_words, stopping_text
 from bt_actions.utilities.plain_text import clean
 
 _STYLES = {

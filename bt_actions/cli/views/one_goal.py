@@ -8,9 +8,10 @@ from bt_actions.events import Event, GoalChanged, StopWanted
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
+from bt_actions.story.values import feedback_text
 from bt_actions.story.words import (
     CLEAN_UP,
-    feedback_text,
+    error_text,
     goal_text,
     result_lines,
     stood_still,
@@ -66,8 +67,8 @@ class GoalView:
             if ended.cause and action.outcome is Outcome.CANCELED:
                 action.reason = ended.cause  # here is no tree that could have interrupted it
             self._line(f"{goal_text(action)}, after {action.seconds(state.latest):.2f} s")
-        if state.finished is not None and state.finished.error:
-            self._line(state.finished.error)
+        if error := error_text(state):
+            self._line(error)
         if state.servers_gone:
             self._line(stood_still(state))
         if ended.unaccounted:

@@ -11,7 +11,7 @@ from bt_actions.cli.views.json_lines import JsonView, plain
 from bt_actions.cli.views.one_goal import GoalView
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.table import columns
-from bt_actions.story.words import brief, opened
+from bt_actions.story.values import brief, opened
 from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
 
