@@ -687,6 +687,28 @@ class TestEvents:
             (("root",), Status.SUCCESS),
         ]
 
+    def test_tell_the_moment_at_which_it_happened_beside_a_leaf_that_sleeps(
+        self, journal: Journal, name: str, node: Any
+    ) -> None:
+        class Sleeps(py_trees.behaviours.Running):
+            def update(self) -> Status:
+                if journal.count("accepted"):
+                    journal.wait_for("succeeded")
+                    time.sleep(0.6)  # what is looked at: nothing may be told late for it
+                    return Status.SUCCESS
+                return Status.RUNNING
+
+        events: list[Event] = []
+        leaf = MoveRobot("m", 0.2, action_name=name)
+        with TreeRunner(together(leaf, Sleeps("sleeps")), node=node) as runner:
+            runner.observe(events.append)
+            assert runner.run(timeout=20.0) is Status.SUCCESS
+        told = {e.state: e.at.steady for e in events if isinstance(e, GoalChanged)}
+        at_server = {str(entry.event): entry.t for entry in journal.entries() if entry.goal}
+        assert told["EXECUTING"] == pytest.approx(at_server["accepted"], abs=0.3)
+        assert told["DONE"] == pytest.approx(at_server["succeeded"], abs=0.3)
+        print("late by", told["DONE"] - at_server["succeeded"], told["EXECUTING"] - at_server["accepted"])
+
     def test_an_observer_is_called_on_the_ticking_thread(
         self, journal: Journal, name: str, node: Any
     ) -> None:

@@ -88,7 +88,7 @@ def _doing(state: State, story: NodeStory, now: float) -> str:
 
 
 def _told(failure: Failure, state: State) -> Iterator[str]:
-    """Yield the cause: where, when, in which item; each attempt; the place, and who passed it on."""
+    """Yield when, where and in which item it failed; each attempt; who passed it on."""
     items = "".join(f", {_item(*each)}" for each in failure.items)
     yield clean(f"{_clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
     yield from _attempts(failure)

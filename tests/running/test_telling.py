@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -87,7 +88,7 @@ class TestGoals:
         runner.run()
         times = [e.at.steady for e in events_of(runner, FeedbackCame)]
         assert 14 <= len(times) <= 17
-        gaps = [after - before for before, after in zip(times[:-1], times[1:-1], strict=False)]
+        gaps = [after - before for before, after in itertools.pairwise(times[:-1])]
         assert min(gaps) >= 0.2 - 1e-9
         (end,) = [e.at for e in events_of(runner, GoalChanged) if e.state == "DONE"]
         last = events_of(runner, FeedbackCame)[-1]

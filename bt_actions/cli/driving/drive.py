@@ -7,8 +7,6 @@ The tree ticks on its own threads. Here is decided what ends a run from outside 
 from __future__ import annotations
 
 import contextlib
-import functools
-import math
 import os
 import stat
 import sys
@@ -20,6 +18,7 @@ from typing import Protocol
 
 from py_trees.common import Status
 
+from bt_actions.cli.driving.feed import Feed
 from bt_actions.cli.driving.signals import SAME_WISH, Signals
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.streams.patient_output import PatientOutput
@@ -31,7 +30,6 @@ from bt_actions.events import RunEnded, StopWanted
 from bt_actions.events.stream import Stream
 from bt_actions.running.loop import where_raised
 from bt_actions.story.state import State
-from bt_actions.story.words import waiting_text
 
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
@@ -39,8 +37,6 @@ PATIENCE_WHEN_LEFT = 1.0
 """Seconds for the output to be written where the user did not wait for the goals."""
 NEARLY_OVER = 1.0
 """Seconds for a run with no goal left to wait for to be over, where the user will not wait."""
-SOON = 1.0
-"""Seconds after the end of the tree for which nothing is said of goals that have not ended."""
 _LOOK = 0.02
 """Seconds between two looks for signals while only the output is waited for."""
 
@@ -79,8 +75,8 @@ class Drive:
         self._runner = runner
         self._tick_to_end = tick_to_end
         self._output = output
+        self._feed = Feed(state, view, self._show)
         self._state = state
-        self._view = view
         self._signals = signals
         self._timeout = timeout
         self._deadline: float | None = None
@@ -92,8 +88,6 @@ class Drive:
         """When the run was first asked to end."""
         self.abandoned = False
         """The user did not wait for the goals to end: threads are still running."""
-        self._waits_since: float | None = None
-        """When the tree was first seen to have ended; NaN once it is said what is waited for."""
         self._lost = False
         """Whether something could not be shown."""
         self._watched = _pipe_of_stdout()
@@ -107,25 +101,23 @@ class Drive:
         thread.start()
         drawn = began - FRAME
         while not self.abandoned:
-            finished = self._finished.is_set()  # asked before the queue is emptied
+            finished, now = self._finished.is_set(), self._clock()  # before the queue is emptied
             self._take_events()
             if finished:
                 thread.join()
                 break
-            now = self._clock()
             if self._stopped_at is not None or self._state.finished is not None:
                 deadline = None  # there is nothing left to end
             if deadline is not None and now >= deadline:
                 self._end(Exit.TIMEOUT, f"--timeout {self._timeout:g} s expired")
-            self._say_what_is_waited_for(now)
             if now - drawn >= FRAME:
-                self._show(functools.partial(self._view.frame, now))
+                self._feed.frame(now)
                 drawn = now
             wait = max(0.0, drawn + FRAME - now)
             if deadline is not None:
                 wait = min(wait, max(0.0, deadline - now))
             received, ready = self._signals.wait(
-                wait, readable=self._view.fileno, writable=self._watched
+                wait, readable=self._feed.view.fileno, writable=self._watched
             )
             self._take_events()  # what happened before the signal
             for signal in received:
@@ -147,25 +139,13 @@ class Drive:
     def _take_events(self) -> None:
         while events := self._events.take():
             for event in events:
-                self._state.observe(event)
-                self._show(functools.partial(self._view.event, event))
+                self._feed.event(event)
 
     def _signalled(self, signal: Signal) -> None:
         if self._stopped_at is None:
             self._end(Exit[signal.name], f"interrupted by {signal.name}")
         elif self._clock() - self._stopped_at > SAME_WISH:
             self.abandoned = True
-
-    def _say_what_is_waited_for(self, now: float) -> None:
-        """Say once why a tree that has ended is not over."""
-        over = self._state.finished is not None or self._stopped_at is not None
-        if over or not self._state.decided:
-            return
-        if self._waits_since is None:
-            self._waits_since = now
-        if now - self._waits_since >= SOON and (text := waiting_text(self._state)):
-            self._waits_since = math.nan
-            self._show(lambda: self._view.say(f"{text}; Ctrl-C twice leaves without waiting"))
 
     def _end(self, code: Exit, cause: str) -> None:
         """End the run from outside; the first reason stands."""
@@ -182,8 +162,8 @@ class Drive:
             self._nobody_reads()
         except Exception as error:  # noqa: BLE001 - a full disk, a bug: no reason to drop a goal
             with contextlib.suppress(Exception):
-                self._view.close()
-            self._view = QuietView(self._state, sys.stderr)
+                self._feed.view.close()
+            self._feed.view = QuietView(self._state, sys.stderr)
             self._lost = True
             if isinstance(error, OSError):
                 discard_stdout()
@@ -256,7 +236,7 @@ class Drive:
             complaint,
         )
         self._take_events()
-        self._show(self._view.finish)
+        self._show(self._feed.view.finish)
         self._await_readers()
         if self._lost and code is Exit.SUCCESS:
             note("bt-actions: the tree has succeeded; exit code 1, as that could not be shown")

@@ -34,6 +34,9 @@ class JsonView:
         self._state = state
         self._out = out
 
+    def due(self, now: float) -> None:
+        """Nothing is written for that it lasts."""
+
     def event(self, event: Event) -> None:
         """Write `event` as an object, where it has a view here."""
         match event:

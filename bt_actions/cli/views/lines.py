@@ -50,7 +50,6 @@ class LineView:
 
     def event(self, event: Event) -> None:
         """Write a line when `event` changes what was written before."""
-        self.frame(event.at.steady)
         match event:
             case RunBegan():
                 self._nodes.clear()
@@ -67,6 +66,9 @@ class LineView:
                     self._release(key)
 
     def frame(self, now: float) -> None:
+        """Nothing changes without an event but what is due."""
+
+    def due(self, now: float) -> None:
         """Write what has lasted long enough."""
         for key, (since, text) in list(self._passing.items()):
             if now - since >= LASTING:
@@ -160,6 +162,9 @@ class QuietView:
     def __init__(self, state: State, out: TextIO) -> None:
         self._state = state
         self._out = out
+
+    def due(self, now: float) -> None:
+        """Show nothing."""
 
     def event(self, event: Event) -> None:
         """Show nothing."""

@@ -90,6 +90,9 @@ class LiveView:
         """What to wait for besides events: standard error's lines."""
         return self._stderr.fileno
 
+    def due(self, now: float) -> None:
+        """Nothing is let by for that it lasts."""
+
     def event(self, event: Event) -> None:
         """Take in one event; let finished work scroll by."""
         match event:

@@ -33,6 +33,9 @@ class GoalView:
         self._in_place = out.isatty() and feedback
         self._drawn = False
 
+    def due(self, now: float) -> None:
+        """Nothing is written for that it lasts."""
+
     def event(self, event: Event) -> None:
         """Write where the goal stands, when that has changed."""
         if isinstance(event, StopWanted):

@@ -18,6 +18,9 @@ class View(Protocol):
     def fileno(self) -> int:
         """A file descriptor whose data the view passes on at its next frame, or -1."""
 
+    def due(self, now: float) -> None:
+        """Show what is shown because it has lasted until `now`, on the steady clock."""
+
     def event(self, event: Event) -> None:
         """Show one event."""
 
