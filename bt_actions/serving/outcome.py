@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
-from bt_actions.story.why import why
+from bt_actions.story.why import causes
 
-__all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]
+__all__ = ["ENDS", "OUTCOMES", "Code", "Ending", "RunOutcome", "outcome_of"]
 
 SEPARATOR = " / "
 """Between the names of a path."""
@@ -59,20 +59,6 @@ class Ending(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class ActionOutcome:
-    """What became of one action; see ActionReport.msg."""
-
-    path: str
-    server: str
-    attempts: int
-    outcome: int
-    end: int
-    reason: str
-    duration: float
-    place: str
-
-
-@dataclass(frozen=True, slots=True)
 class RunOutcome:
     """What a RunTree goal is answered with; see RunTree.action."""
 
@@ -80,7 +66,9 @@ class RunOutcome:
     message: str = ""
     outputs: str = "{}"
     unaccounted: tuple[str, ...] = ()
-    actions: tuple[ActionOutcome, ...] = ()
+    actions: tuple[ActionStory, ...] = ()
+    at: float = 0.0
+    """When the run ended, in seconds on the steady clock."""
 
     @property
     def settled(self) -> bool:
@@ -125,7 +113,8 @@ def outcome_of(
         "\n".join(lines)[:_MOST_TEXT],
         outputs,
         tuple(left),
-        tuple(_action(state, action) for action in state.actions),
+        tuple(state.actions),
+        state.latest,
     )
 
 
@@ -137,17 +126,4 @@ def _failure(state: State) -> tuple[int, list[str]]:
         if each.action is not None and each.action.outcome is not None:
             code = Code.ACTION_FAILED + OUTCOMES[each.action.outcome]
             break
-    return code, why(state) or ["the tree failed"]
-
-
-def _action(state: State, action: ActionStory) -> ActionOutcome:
-    return ActionOutcome(
-        SEPARATOR.join(action.path),
-        action.server,
-        action.attempts,
-        0 if action.outcome is None else OUTCOMES[action.outcome],
-        ENDS[End.UNKNOWN if action.end is None else action.end],
-        action.reason,
-        action.seconds(state.latest),
-        action.node.place,
-    )
+    return code, causes(state) or ["the tree failed"]

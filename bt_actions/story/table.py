@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
-from bt_actions.story.state import State
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
 
 
-def table(state: State, width: int | None = None) -> list[str]:
-    """Return the table of actions as lines; names are cut so that lines fit into `width`."""
+def table(
+    actions: Iterable[ActionStory],
+    names: Callable[[ActionStory], str],
+    now: float,
+    width: int | None = None,
+) -> list[str]:
+    """Return actions as lines under a head, each as it stands at `now` on the steady clock.
+
+    Names, which `names` gives, are cut so that lines fit into `width`.
+    """
     body = [
         (
-            state.called(action.node.id),
+            names(action),
             action.server,
             _tries(action),
             verdict(action),
-            f"{action.seconds(state.latest):.2f} s{' in all' if action.visits > 1 else ''}",
+            f"{action.seconds(now):.2f} s{' in all' if action.visits > 1 else ''}",
         )
-        for action in state.actions
+        for action in actions
     ]
-    return columns(body, width) if body else []
+    return _columns(body, width) if body else []
 
 
 def _tries(action: ActionStory) -> str:
@@ -48,7 +57,7 @@ def verdict(action: ActionStory) -> str:
     return f"{action.outcome}{told}{', late' if late else ''}{some}"
 
 
-def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
+def _columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
     """Return name, server, tries, verdict and duration of actions as lines, under a head."""
     head = ("action", "server", "attempts", "outcome", "duration")
     widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]

@@ -24,6 +24,8 @@ LONG = 80
 """Characters of one value."""
 ATTEMPTS = 3
 """Attempts of one failure that have a line of their own: the last ones."""
+BELOW = 5
+"""Lines of a run below a RunTree leaf."""
 _WAITS = {
     "QUEUED": "waits for its turn on",
     "WAITING_FOR_SERVER": "waits for the server",
@@ -52,6 +54,19 @@ def why(state: State, now: float | None = None) -> list[str]:
             break
         lines += cause
     return lines + dealt
+
+
+def causes(state: State) -> list[str]:
+    """Return why the run has failed, a line for each cause: for who gets one text of it all."""
+    lines = []
+    for failure in state.failures:
+        said = failure.message or "failed"
+        if failure.action is not None and failure.attempts:
+            last = failure.attempts[-1]
+            said = f"{last.outcome}: {last.reason or failure.message}"
+        place = f" ({failure.place})" if failure.place else ""
+        lines.append(f"{' / '.join(failure.path)}: {said}{place}")
+    return lines
 
 
 # While it runs
@@ -103,6 +118,11 @@ def _attempts(failure: Failure) -> Iterator[str]:
     goals, action = failure.attempts, failure.action
     if action is None or not goals:
         yield clean(f"  failed{f': {failure.message}' if failure.message else ''}")
+        return
+    below = opened(goals[-1].result).get("error_msg") if action.node.action == "RunTree" else ""
+    if isinstance(below, str) and below:
+        yield clean(f"  {goals[-1].outcome}: the run at {action.server} has failed:")
+        yield from (f"    {clean(line)}" for line in below.splitlines()[:BELOW])
         return
     if len(goals) > ATTEMPTS:
         yield f"  {len(goals)} attempts, the last {ATTEMPTS}:"

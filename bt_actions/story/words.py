@@ -42,7 +42,7 @@ CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its ser
 def last_words(state: State, width: int | None = None) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     ended = state.ended or _NOTHING
-    lines = ["", *table(state, width)] if state.actions else []
+    lines = ["", *action_table(state, width)] if state.actions else []
     outputs = [clean(f"{name}: {brief(value)}") for name, value in state.outputs.items()]
     lines += ["", *outputs] if outputs else []
     lines += ["", ended.world] if ended.world else []
@@ -52,6 +52,11 @@ def last_words(state: State, width: int | None = None) -> list[str]:
     lines += ["", f"{word} after {state.elapsed:.2f} s{cause}"]
     wrong = troubles(state)
     return [*lines, *(["", *wrong] if wrong else [])]
+
+
+def action_table(state: State, width: int | None = None) -> list[str]:
+    """Return the table of the actions of a run."""
+    return table(state.actions, lambda each: state.called(each.node.id), state.latest, width)
 
 
 def troubles(state: State) -> list[str]:

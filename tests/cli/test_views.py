@@ -15,6 +15,7 @@ import pytest
 from py_trees.common import Status
 from rich.console import Console
 
+from bt_actions.cli.driving.feed import Feed
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LASTING, LineView
@@ -48,9 +49,9 @@ def story(root: FakeNode) -> Story:
 
 
 def feed(state: State, view: View, *events: Event) -> None:
+    feeding = Feed(state, view)
     for event in events:
-        state.observe(event)
-        view.event(event)
+        feeding.event(event)
 
 
 def finish(state: State, view: View, exit_code: int = 0, **more: Any) -> None:
@@ -69,10 +70,12 @@ class Lines:
     def __init__(self, *events: Event, verbose: bool = False) -> None:
         self.state, self.out = State(), io.StringIO()
         self.view = LineView(self.state, self.out, verbose=verbose)
+        self.feeding = Feed(self.state, self.view)
         self.feed(*events)
 
     def feed(self, *events: Event) -> None:
-        feed(self.state, self.view, *events)
+        for event in events:
+            self.feeding.event(event)
 
     @property
     def said(self) -> list[str]:
@@ -187,7 +190,7 @@ def test_a_goal_that_waits_gets_a_line_when_it_waits_for_a_second(
 ) -> None:
     lines = Lines(story.began, story.node(leaves[0], Status.RUNNING), story.goal(leaves[0], state))
     for waited in (0.5, 0.9, LASTING, 5.0):
-        lines.view.frame(story.time + waited)
+        lines.feeding.frame(story.time + waited)
         assert len(lines.said) == (waited >= LASTING)
     assert lines.out.getvalue().splitlines() == [
         f"    2.00 s  goal     Deliver / Work / Step 0: {words} move_robot"
@@ -205,7 +208,7 @@ def test_what_lasted_has_its_line_before_the_event_that_ends_it_also_where_nothi
     events += [story.goal(leaves[0], "EXECUTING"), story.node(leaves[0], Status.RUNNING)]
     drawn, stored = Lines(*events[:2]), Lines(*events)
     for tenth in range(1, 50):
-        drawn.view.frame(events[1].at.steady + tenth / 10)
+        drawn.feeding.frame(events[1].at.steady + tenth / 10)
     drawn.feed(*events[2:])
     assert drawn.out.getvalue() == stored.out.getvalue()
     assert stored.out.getvalue().splitlines() == [
@@ -689,3 +692,17 @@ def test_choosing_what_to_show_costs_the_same_in_a_tree_of_100000_nodes() -> Non
         "50005",
     ]
     assert hidden == len(nodes) - 7
+
+
+def test_why_a_tree_that_has_ended_is_not_over_is_said_once_also_where_nothing_is_drawn(
+    root: FakeNode, leaves: list[FakeNode], story: Story
+) -> None:
+    late = {"outcome": Outcome.ACCEPT_TIMEOUT, "end": End.UNKNOWN}
+    lines = Lines(story.began, story.goal(leaves[0], "CANCELING", **late))
+    lines.feed(story.node(root, Status.FAILURE))
+    lines.feeding.frame(story.time + 0.5)
+    said = "waiting to know the end of 1 goal: Step 0 on move_robot; Ctrl-C twice leaves"
+    assert said not in lines.out.getvalue()
+    story.time += 5.0
+    lines.feed(story.finish(Status.FAILURE))
+    assert lines.out.getvalue().count(said) == 1

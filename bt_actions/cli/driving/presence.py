@@ -16,7 +16,7 @@ from bt_actions.document import given_inputs
 from bt_actions.events import Event, RunBegan
 from bt_actions.story.state import State
 from bt_actions.story.values import brief
-from bt_actions.story.why import why
+from bt_actions.story.why import causes
 from bt_actions.utilities.plain_text import clean, in_words
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Presence:
             self._rosout.close()
             return
         state, name = self._state, self._state.tree
-        failed = "\n".join(why(state)) if error is None else in_words(error)
+        failed = "\n".join(causes(state)) if error is None else in_words(error)
         if failed:
             self._rosout.say("error", f"{name}: {failed}")
         word = state.status.value if state.status is not Status.INVALID else "STOPPED"

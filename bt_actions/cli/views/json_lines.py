@@ -116,7 +116,7 @@ class JsonView:
             "error": error or None,
             "duration": round(state.elapsed, 3),
             "outputs": plain(state.outputs),
-            "actions": [self._action(each) for each in state.actions],
+            "actions": [action_data(each, state.latest) for each in state.actions],
             "failures": [self._failure(each) for each in state.failures],
             "why": why(state),
             "dealt_with": [
@@ -172,25 +172,27 @@ class JsonView:
             ],
         }
 
-    def _action(self, action: ActionStory) -> dict[str, object]:
-        return {
-            "id": action.node.id,
-            "name": action.node.name,
-            "path": list(action.path),
-            "server": action.server,
-            "attempts": action.attempts,
-            "visits": action.visits,
-            "outcome": action.outcome,
-            "end": action.end,
-            "reason": action.reason,
-            "duration": round(action.seconds(self._state.latest), 3),
-            "place": action.node.place or None,
-        }
-
     def _write(self, data: dict[str, object]) -> None:
         line = as_json(data, ascii_only=not _is_utf8(self._out))
         self._out.write(line + "\n")
         self._out.flush()
+
+
+def action_data(action: ActionStory, now: float) -> dict[str, object]:
+    """Return what became of an action, as it stands at `now` on the steady clock."""
+    return {
+        "id": action.node.id,
+        "name": action.node.name,
+        "path": list(action.path),
+        "server": action.server,
+        "attempts": action.attempts,
+        "visits": action.visits,
+        "outcome": action.outcome,
+        "end": action.end,
+        "reason": action.reason,
+        "duration": round(action.seconds(now), 3),
+        "place": action.node.place or None,
+    }
 
 
 def plain(value: Value | Mapping[str, Value]) -> Any:

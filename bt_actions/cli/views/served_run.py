@@ -7,10 +7,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.exits import Exit
-from bt_actions.cli.views.json_lines import JsonView, plain
+from bt_actions.cli.views.json_lines import JsonView, action_data, plain
 from bt_actions.cli.views.one_goal import GoalView
+from bt_actions.events import Node
 from bt_actions.story.actions import ActionStory
-from bt_actions.story.table import columns
+from bt_actions.story.table import table
 from bt_actions.story.values import brief, opened
 from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
@@ -76,19 +77,10 @@ class CallView(GoalView):
         result = _result(action)
         if not result:
             return []
-        actions = [_action(each) for each in _listed(result.get("actions"))]
-        names = told_apart(tuple(each["path"].split(" / ")) for each in actions)
-        body = [
-            (
-                names[tuple(each["path"].split(" / "))],
-                str(each["server"]),
-                str(each["attempts"]),
-                str(each["outcome"]),
-                f"{each['duration']:.2f} s",
-            )
-            for each in actions
-        ]
-        lines = ["", *columns(body)] if body else []
+        actions = _actions(result)
+        names = told_apart(each.path for each in actions)
+        rows = table(actions, lambda each: names[each.path], 0.0)
+        lines = ["", *rows] if rows else []
         outputs = [clean(f"{name}: {brief(value)}") for name, value in _outputs(result).items()]
         lines += ["", *outputs] if outputs else []
         said = [clean(line) for line in str(result.get("error_msg", "")).splitlines()]
@@ -102,7 +94,7 @@ class CallJsonView(JsonView):
         finished = super()._finished()
         for result in filter(None, map(_result, self._state.actions)):
             finished["outputs"] = _outputs(result)
-            finished["actions"] = [_action(each) for each in _listed(result.get("actions"))]
+            finished["actions"] = [action_data(each, 0.0) for each in _actions(result)]
             finished["error_code"] = result.get("error_code")
         return finished
 
@@ -130,20 +122,29 @@ def _outputs(result: dict[str, Value]) -> dict[str, object]:
     return outputs if isinstance(outputs, dict) else {}
 
 
-def _action(report: dict[str, Any]) -> dict[str, Any]:
-    """An ActionReport as `run --json` has it."""
-    from bt_actions.serving.outcome import ENDS, OUTCOMES
+def _actions(result: dict[str, Value]) -> list[ActionStory]:
+    """The ActionReports of a result as what became of actions here."""
+    from bt_actions.serving.outcome import ENDS, OUTCOMES, SEPARATOR
 
-    outcomes = {number: str(outcome) for outcome, number in OUTCOMES.items()}
-    ends = {number: str(end) for end, number in ENDS.items()}
-    duration = report["duration"]
-    return {
-        "path": clean(report["path"]),
-        "server": clean(report["server"]),
-        "attempts": report["attempts"],
-        "outcome": outcomes.get(report["outcome"]),
-        "end": ends.get(report["end"]),
-        "reason": clean(report["reason"]),
-        "duration": round(duration["sec"] + duration["nanosec"] / 1e9, 3),
-        "place": clean(report["place"]) or None,
-    }
+    outcomes = {number: outcome for outcome, number in OUTCOMES.items()}
+    ends = {number: end for end, number in ENDS.items()}
+    found = []
+    for number, report in enumerate(_listed(result.get("actions")), 1):
+        path = tuple(clean(report["path"]).split(SEPARATOR))
+        node = Node(number, None, path[-1], "action", clean(report["place"]))
+        duration = report["duration"]
+        seconds = duration["sec"] + duration["nanosec"] / 1e9
+        found.append(
+            ActionStory(
+                node,
+                path,
+                clean(report["server"]),
+                attempts=report["attempts"],
+                outcome=outcomes.get(report["outcome"]),
+                end=ends.get(report["end"]),
+                reason=clean(report["reason"]),
+                counted=seconds,
+                duration=seconds,
+            )
+        )
+    return found
