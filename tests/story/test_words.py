@@ -14,9 +14,9 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.describing import describe
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
-from bt_actions.story.table import table, verdict
+from bt_actions.story.table import verdict
 from bt_actions.story.values import constants_of, feedback_text, fields_text
-from bt_actions.story.words import goal_text, last_words, result_lines
+from bt_actions.story.words import action_table, goal_text, last_words, result_lines
 from tests.support.told_trees import FakeAction, FakeNode, Story
 
 NOWHERE = Moment(0, 0.0, 0.0, 0.0)
@@ -105,7 +105,11 @@ def test_of_many_visits_the_table_tells_how_many_and_which_failed(
 ) -> None:
     visits = [story.succeed(leaf, 1), story.succeed(leaf, 2), story.succeed(leaf, 3)]
     state = story.told(*(event for events in visits for event in events))
-    assert table(state)[1].split("  ")[-3:] == ["3 in 3 visits", "SUCCEEDED", "6.00 s in all"]
+    assert action_table(state)[1].split("  ")[-3:] == [
+        "3 in 3 visits",
+        "SUCCEEDED",
+        "6.00 s in all",
+    ]
     assert goal_text(state.actions[0]) == "SUCCEEDED"
     visits[0] = story.fail(leaf, "a fault", 1)
     state = story.told(*(event for events in visits for event in events))
@@ -133,14 +137,14 @@ def test_the_table_has_a_line_for_each_action_and_fits_the_width() -> None:
     leaves = [FakeAction("A name that is long " * 3, server="/r1/" + "x" * 30), FakeAction("b")]
     story = Story(FakeNode("root", leaves), step=1.0)
     state = story.told(*story.succeed(leaves[0]), *story.succeed(leaves[1]))
-    assert len(table(state)) == 3
-    assert table(state)[2].split() == ["b", "move_robot", "1", "SUCCEEDED", "2.00", "s"]
+    assert len(action_table(state)) == 3
+    assert action_table(state)[2].split() == ["b", "move_robot", "1", "SUCCEEDED", "2.00", "s"]
     for width in (40, 60, 80):
-        assert max(len(line) for line in table(state, width)) <= max(width, 55)
+        assert max(len(line) for line in action_table(state, width)) <= max(width, 55)
 
 
 def test_actions_that_were_never_tried_are_not_in_the_table(story: Story) -> None:
-    assert table(story.told(story.finish(Status.FAILURE))) == []
+    assert action_table(story.told(story.finish(Status.FAILURE))) == []
 
 
 # Messages
