@@ -255,6 +255,7 @@ def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
         "not accounted for: Move on move_robot, goal Move-1-1, executing when left",
     ]
     assert "  CANCELED, end UNKNOWN  " in run.out.getvalue()
+    assert run.out.getvalue().count("Ctrl-C again leaves without waiting") == 1
 
 
 def test_a_second_signal_after_the_end_of_all_goals_leaves_none_unknown(story: Story) -> None:

@@ -113,6 +113,22 @@ def test_a_check_that_succeeds_again_and_again_has_one_line_in_each_round_of_a_l
     assert lines.said[2:] == ["FAILURE  Again / Check: no"]
 
 
+def test_a_round_of_one_loop_tells_nothing_anew_of_what_is_outside_of_it() -> None:
+    loop = FakeNode("Again", [FakeNode("Inner", kind="check")], "repeat")
+    other = FakeNode("Other", kind="check")
+    story = Story(FakeNode("Both", [loop, other], "parallel"))
+    screen, drawn, succeeds = Screen(24), State(), Status.SUCCESS
+    view = LiveView(drawn, screen.console)
+    events: list[Event] = [story.began]
+    for number in range(3):
+        events.append(story.round(loop, number))
+        events += [story.node(node, succeeds) for node in (loop.children[0], other)]
+    assert Lines(*events).said.count("SUCCESS  Both / Other") == 1
+    feed(drawn, view, *events)
+    view.close()
+    assert screen.lines() == ["✓ Inner", "✓ Other", "✓ Inner", "✓ Inner"]
+
+
 def test_a_leaf_that_was_stopped_is_told_of_anew(leaves: list[FakeNode], story: Story) -> None:
     recover = story.root.children[1]
     lines = Lines(story.began)

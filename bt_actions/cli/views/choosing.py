@@ -64,15 +64,24 @@ def branches(state: State, running: list[int], position: dict[int, int]) -> list
 
 def fork_of(chains: list[list[int]]) -> dict[int, int]:
     """Return for each tip the lowest node above it where its branch leaves another one."""
-    below = Counter(node for chain in chains for node in chain)
+    branches_at = Counter(node for chain in chains for node in chain)
     forks: dict[int, int] = {}
     for chain in chains:
         for node, above in itertools.pairwise(chain):
-            if below[node] < below[above]:
+            if branches_at[node] < branches_at[above]:
                 if node != chain[0]:
                     forks[chain[0]] = node
                 break
     return forks
+
+
+def below(state: State, node: int) -> Iterator[int]:
+    """Yield all nodes below one."""
+    waiting = list(state.nodes[node].children)
+    while waiting:
+        child = waiting.pop()
+        waiting += state.nodes[child].children
+        yield child
 
 
 def _around(nodes: list[int], at: int, most: int) -> Iterator[int]:

@@ -89,7 +89,7 @@ class JsonView:
             case RoundBegan():
                 self._of(event, event.node, "round", round=event.number, of=event.of,
                          item=plain(event.item))  # fmt: skip
-            case StopWanted():
+            case StopWanted(leaves=False):
                 self.say(stopping_text(self._state))
 
     def frame(self, now: float) -> None:

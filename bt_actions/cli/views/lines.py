@@ -6,6 +6,7 @@ from typing import TextIO
 
 from py_trees.common import Status
 
+from bt_actions.cli.views.choosing import below
 from bt_actions.events import (
     Event,
     GoalChanged,
@@ -58,8 +59,9 @@ class LineView:
             case GoalChanged():
                 self._goal(event)
             case RoundBegan():
-                self._forget_below(event.node)
-            case StopWanted():
+                for node in below(self._state, event.node):
+                    self._nodes.pop(node, None)
+            case StopWanted(leaves=False):
                 self._write(stopping_text(self._state))
             case TreeFinished():
                 for key in list(self._held):
@@ -115,14 +117,6 @@ class LineView:
         """Write the lines of a leaf that were held back."""
         for at, text in self._held.pop(key, ()):
             self._goal_line(at, key, text)
-
-    def _forget_below(self, node: int) -> None:
-        """Tell all below a loop anew."""
-        waiting = list(self._state.nodes[node].children)
-        while waiting:
-            child = waiting.pop()
-            self._nodes.pop(child, None)
-            waiting += self._state.nodes[child].children
 
     def say(self, text: str) -> None:
         """Write `text` on a line of its own."""

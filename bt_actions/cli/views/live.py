@@ -13,7 +13,7 @@ from rich.live import Live
 from rich.text import Text
 
 from bt_actions.cli.streams.stderr import CaughtStderr
-from bt_actions.cli.views.choosing import branches, choose, fork_of
+from bt_actions.cli.views.choosing import below, branches, choose, fork_of
 from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWanted
 from bt_actions.events.kinds import NodesAdded
 from bt_actions.story.actions import ActionStory
@@ -101,8 +101,9 @@ class LiveView:
             case NodeChanged():
                 self._node_changed(event)
             case RoundBegan():
-                self._last.clear()
-            case StopWanted():
+                for node in below(self._state, event.node):
+                    self._last.pop(node, None)
+            case StopWanted(leaves=False):
                 self.say(stopping_text(self._state))
 
     def _node_changed(self, event: NodeChanged) -> None:

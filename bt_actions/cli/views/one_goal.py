@@ -38,7 +38,7 @@ class GoalView:
 
     def event(self, event: Event) -> None:
         """Write where the goal stands, when that has changed."""
-        if isinstance(event, StopWanted):
+        if isinstance(event, StopWanted) and not event.leaves:
             self._line(stopping_text(self._state))
         if not isinstance(event, GoalChanged) or event.outcome is not None:
             return
