@@ -234,7 +234,7 @@ class State:
             story.pending = []
 
     def _deal_with(self, failures: list[Failure], by: int | None) -> None:
-        if by is None:
+        if by is None or self.nodes[by].node.kind == "invert":  # to which it is no failure
             return
         for failure in failures:
             failure.by = self.nodes[by].node
