@@ -11,7 +11,7 @@ import typing
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bt_actions.events import Event, Moment, RunEnded, WireError, from_line, to_line, wire
@@ -28,6 +28,8 @@ from bt_actions.events.snapshot import Cut, Value
 from bt_actions.goals.policy import Outcome
 
 AT = Moment(1, 2.0, 3.0, 4.0)
+PATIENT: Any = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+"""For a busy machine."""
 TEXTS = st.text(st.characters(exclude_categories=()), max_size=8)  # lone surrogates, too
 KEYS = TEXTS | st.sampled_from(["$", "$int", "$float", "$bytes", "$cut", "$map", "$$"])
 NUMBERS = st.sampled_from([2**53 - 1, 2**53, 2**53 + 1, 2**63 - 1, -(2**63), 2**64 - 1, 2**200])
@@ -63,7 +65,7 @@ def of(hint: Any) -> st.SearchStrategy[Any]:
 
 
 @pytest.mark.parametrize("kind", wire.KINDS.values(), ids=list(wire.KINDS))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60, **PATIENT)
 @given(data=st.data())
 def test_an_event_that_was_read_equals_the_one_that_was_written(
     kind: type[Event], data: st.DataObject
@@ -173,7 +175,7 @@ JSON: st.SearchStrategy[Any] = st.recursive(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300, **PATIENT)
 @given(data=st.data())
 def test_whatever_stands_in_a_field_it_is_an_event_or_a_wire_error(data: st.DataObject) -> None:
     kind = data.draw(st.sampled_from(list(wire.KINDS.values())))
