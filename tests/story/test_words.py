@@ -114,6 +114,7 @@ def test_of_many_visits_the_table_tells_how_many_and_which_failed(
     visits[0] = story.fail(leaf, "a fault", 1)
     state = story.told(*(event for events in visits for event in events))
     assert verdict(state.actions[0]) == "SUCCEEDED, 1 of 3 visits failed"
+    assert verdict(action_of(story, *story.fail(leaf, "a fault"))) == "ABORTED"
 
 
 def test_an_end_that_nobody_waited_for_is_told(leaf: FakeNode, story: Story) -> None:
