@@ -20,9 +20,11 @@ else:
     Value = object  # wire.py asks for the hints of events
 
 FIELDS = 1000
-"""Scalars in one snapshot,"""
+"""Values in one snapshot, those that hold others included,"""
 SIZE = 64_000
 """and their size: the characters of a text, the bytes of bytes, 8 for anything else."""
+WIDE = 64
+"""Bytes of a whole number; a greater one is a text of its size."""
 DEEP = 30
 """Levels; a value that holds itself ends there."""
 
@@ -46,10 +48,10 @@ class _Snapshot:
         self._fields, self._size = fields, size
 
     def of(self, value: object, depth: int) -> Value:
+        self._fields -= 1
         if value is None or type(value) in (bool, int, float):
-            self._fields -= 1
             self._size -= 8
-            return value  # type: ignore[return-value]
+            return _bounded(value)  # type: ignore[arg-type]
         try:
             return self._of(value, depth)
         except Exception:  # noqa: BLE001 - a value's own methods may raise anything
@@ -76,7 +78,6 @@ class _Snapshot:
         return self._text(f"<{type(value).__name__}>")
 
     def _text(self, text: str | bytes) -> str | bytes | Cut:
-        self._fields -= 1
         room = max(0, self._size)
         self._size -= len(text)
         return text if len(text) <= room else Cut(text[:room], len(text) - room)
@@ -97,7 +98,7 @@ class _Snapshot:
     def _mapping(self, items: Iterable[tuple[str, object]], count: int, depth: int) -> Value:
         kept: dict[str, Value] = {}
         for seen, (name, item) in enumerate(items):
-            if self._full:
+            if self._full or len(name) > self._size:
                 return Cut(kept, count - seen)
             self._size -= len(name)
             kept[name] = self.of(_byte(item), depth + 1)
@@ -106,6 +107,13 @@ class _Snapshot:
     @property
     def _full(self) -> bool:
         return self._fields <= 0 or self._size <= 0
+
+
+def _bounded(value: bool | int | float | None) -> Value:
+    """A number, or how large it is."""
+    if isinstance(value, int) and value.bit_length() > 8 * WIDE:
+        return f"<a number of {value.bit_length()} bits>"
+    return value
 
 
 def _byte(item: object) -> object:

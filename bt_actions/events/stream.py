@@ -55,11 +55,10 @@ class Reader:
         if len(self._events) >= self._room and isinstance(event, SPARED):
             self._lost += 1
             return
-        if self._lost:
-            self._events.append(EventsLost(event.at, self._lost))
-            self._lost = 0
-        self._events.append(event)
-        if len(self._events) == 1:
+        new = [EventsLost(event.at, self._lost), event] if self._lost else [event]
+        self._lost = 0
+        self._events.extend(new)
+        if len(self._events) <= len(new):  # looked at last: the reader takes without the lock
             self._poke()
 
 

@@ -15,7 +15,7 @@ import json
 import math
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -63,7 +63,14 @@ def from_plain(data: object) -> Event:
         kind = KINDS[given.pop("kind")]
         readers: dict[str, Reader] = _readers(kind)  # type: ignore[arg-type]  # a class is hashable
         return kind(**{name: readers[name](value) for name, value in given.items()})
-    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+    ) as error:
         raise WireError(f"no event: {type(error).__name__} {error}") from error
 
 
@@ -136,6 +143,8 @@ def _reader(hint: Any) -> Reader:
     if origin is tuple and len(inner) == 2 and inner[1] is Ellipsis:
         read = _reader(inner[0])
         return lambda data: tuple(read(each) for each in data)
+    if origin is Mapping:
+        return lambda data: _mapping(data, inner[1])
     if hint in (bool, int, float, str):
         return lambda data: _plain(data, hint)
     return _value
@@ -146,3 +155,10 @@ def _plain(data: Any, wanted: type) -> Any:
     if type(value) is not wanted:
         raise WireError(f"{wanted.__name__} is needed, not {type(value).__name__}")
     return value
+
+
+def _mapping(data: Any, of: Any) -> dict[str, Any]:
+    found: dict[str, Any] = _plain(data, dict)
+    if of is str and not all(isinstance(each, str) for each in found.values()):
+        raise WireError("texts are needed")
+    return found

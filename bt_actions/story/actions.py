@@ -73,7 +73,8 @@ class ActionStory:
     duration: float = 0.0
     """Seconds from the first wish to the last outcome of each visit, summed up."""
     goals: dict[str, GoalStory] = field(default_factory=dict)
-    """By id: those of the latest visit, and older ones of which more may come."""
+    """By id: those of the latest visit, and older ones of which more may come, or nobody knows the
+    end."""
     latest: GoalStory | None = None
 
     @property
@@ -106,6 +107,12 @@ class ActionStory:
             for each in self.open
             if each.state not in UNSENT and each.end in (None, End.UNKNOWN)
         }
+
+    @property
+    def given_up(self) -> list[GoalChanged]:
+        """Of each goal whose end nobody will tell any more, the latest."""
+        changes = [goal.latest for goal in self.goals.values()]
+        return [each for each in changes if each.state == DONE and each.end is End.UNKNOWN]
 
     @property
     def left_at_server(self) -> bool:
@@ -145,8 +152,8 @@ class ActionStory:
 
     def _begin(self, event: GoalChanged) -> GoalStory:
         if event.attempt <= 1:
-            open_now = {each.goal_id for each in self.open}
-            self.goals = {key: goal for key, goal in self.goals.items() if key in open_now}
+            kept = {each.goal_id for each in (*self.open, *self.given_up)}
+            self.goals = {key: goal for key, goal in self.goals.items() if key in kept}
             self.visits += 1
             self.begun, self.counted = event.at.steady, self.duration
         self.attempts += 1

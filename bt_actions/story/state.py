@@ -366,10 +366,12 @@ class State:
             for goal in told
             if goal.goal_id not in last or last[goal.goal_id].end in (None, End.UNKNOWN)
         }
-        for action in self.live if self.left else ():
+        for action in self.actions if self.left else ():
+            where = f"{self.called(action.node.id)} on {action.server}, goal"
+            for each in action.given_up:
+                lines.setdefault(each.goal_id, f"{where} {each.goal_id}: {each.reason}")
             for goal_id, state in action.live.items():
-                where = f"{self.called(action.node.id)} on {action.server}, goal {goal_id}"
-                lines.setdefault(goal_id, f"{where}, {state.lower()} when left")
+                lines.setdefault(goal_id, f"{where} {goal_id}, {state.lower()} when left")
         return list(lines.values())
 
     @property
