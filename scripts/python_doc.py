@@ -77,7 +77,9 @@ with TreeRunner(root) as runner:
     runner.run()
 print(tree_outputs(root)["final_pose"])
 ```"""
-EVENTS = [getattr(events, name) for name in events.__all__ if isinstance(getattr(events, name), type)]
+EVENTS = [
+    getattr(events, name) for name in events.__all__ if isinstance(getattr(events, name), type)
+]
 EVENTS_HEAD = """\
 ## Events
 

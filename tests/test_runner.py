@@ -707,7 +707,6 @@ class TestEvents:
         at_server = {str(entry.event): entry.t for entry in journal.entries() if entry.goal}
         assert told["EXECUTING"] == pytest.approx(at_server["accepted"], abs=0.3)
         assert told["DONE"] == pytest.approx(at_server["succeeded"], abs=0.3)
-        print("late by", told["DONE"] - at_server["succeeded"], told["EXECUTING"] - at_server["accepted"])
 
     def test_an_observer_is_called_on_the_ticking_thread(
         self, journal: Journal, name: str, node: Any

@@ -84,8 +84,8 @@ class Teller:
         self._told[key] = now, value
         self.stream.add(VariableWritten, key, value, node)
 
-    def begin(self) -> None:
-        """Begin a run: nodes get numbers anew, and every variable is told."""
+    def forget(self) -> None:
+        """Begin anew: nodes get numbers again, and every variable is told."""
         self.numbers = {}
         self._written.clear()
         self._waiting.clear()

@@ -8,12 +8,10 @@ thread, no wait, no ROS: a thread steps it, or a test in virtual time.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import sys
-import traceback
 import weakref
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from numbers import Real
 from typing import Any
 
@@ -21,25 +19,12 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Duration, Status
 from py_trees.trees import BehaviourTree
 
-from bt_actions import document
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.variables import overhear, overhear_less
-from bt_actions.events import (
-    Event,
-    Node,
-    NodeChanged,
-    NodesAdded,
-    Observer,
-    Paused,
-    RunBegan,
-    TreeFinished,
-)
-from bt_actions.events.snapshot import snapshot
-from bt_actions.events.stream import Reader, Stream
-from bt_actions.events.teller import Teller
+from bt_actions.events import Event, Observer, Paused
+from bt_actions.events.stream import Reader
 from bt_actions.messages.interfaces import TwoTypes
-from bt_actions.running.describing import describe, in_order, versions
 from bt_actions.running.goals import RunGoals
+from bt_actions.running.telling import TreeError, TreeTeller, UnusableTree
 from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain, drain
@@ -48,21 +33,12 @@ from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
 from bt_actions.wiring import backend_of
 
-_ALL = sys.maxsize
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
 SLOW = 0.05
 """Seconds for one event from which on an observer is said to be slow."""
 LONGEST_WAIT = 3600.0
 """Seconds, at most, between two looks at the tree, whatever the heartbeat is."""
-
-
-class TreeError(Exception):
-    """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
-
-
-class UnusableTree(TreeError):
-    """The tree cannot be set up as it is given, whatever the world does."""
 
 
 def check_seconds(timeout: float | None) -> None:
@@ -110,16 +86,11 @@ class TickLoop:
         self._traffic, self._node, self._wake = self._backend.traffic, node, wake
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
-        self.stream = Stream(self._moment)
-        self.teller = Teller(self.stream, self._traffic.host.steady)
+        self.teller = TreeTeller(tree, self._backend)
         self._observers: list[Observer] = []
         self._slow: list[Observer] = []
         """Those of which that was said."""
         self._observed: Reader | None = None
-        self._began = self._overhears = False
-        """Whether this run was told of, and what clients of the blackboard write is."""
-        self.asked_by = "", ""
-        """The id of the RunTree goal that the runs answer, and that of its caller's run."""
         self.goals = RunGoals(
             self.teller,
             wake,
@@ -134,7 +105,7 @@ class TickLoop:
         self._stop_wanted = self._abandoned = self._pause_wanted = self._paused = False
         self._timeout: float | None = None
         self._deadline = math.inf
-        self._now = self._ros = 0.0
+        self._now = 0.0
         self._burst = 0
         self._status = Status.INVALID
         self._error: BaseException | None = None
@@ -145,7 +116,7 @@ class TickLoop:
         """Call `callback` with each event, in the step; one that raises is removed."""
         self._observers.append(callback)
         if self._observed is None:
-            self._observed = self.stream.reader(room=sys.maxsize)
+            self._observed = self.teller.stream.reader(room=sys.maxsize)
 
     # What anybody may ask for, on any thread
 
@@ -173,12 +144,8 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
-        self._run_id = self._traffic.host.new_goal_id().hex()
-        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each, self._tell_of)
-        self._began = False
-        self._overhears = self.teller.is_heard
-        if self._overhears:
-            overhear()
+        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each, self.teller.changed)
+        self.teller.begin()
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)
 
@@ -211,9 +178,7 @@ class TickLoop:
         self._error, self._status = error, Status.INVALID
 
     def _rest(self) -> None:
-        if self._overhears:
-            self._overhears = False
-            overhear_less()
+        self.teller.rest()
         with self._traffic.host.lock:
             self._stop_wanted = self._abandoned = self._pause_wanted = False
             self.goals.run_goes_on = False
@@ -226,7 +191,7 @@ class TickLoop:
             self.tree.visitors.append(self._visitor)
             self._guarded(self._set_up_missing)
             self._ready()
-            self._tell_began()
+            self.teller.began()
         self._check()
         if self.is_to_end(self._now):
             return None
@@ -271,8 +236,7 @@ class TickLoop:
             self._left.update(self._nodes - now)
             self._visitor.forget_others(now)
             self._nodes, self._with_children, self._doing = now, found, "tick"
-            if self._began:
-                self._tell_added()
+            self.teller.added()
 
     def _is_as_found(self) -> bool:
         """Whether the tree is as it was set up; takes about 10 ns a behaviour."""
@@ -317,7 +281,7 @@ class TickLoop:
         """Whether the tree is paused; carries a change of that over to goals not sent yet."""
         if self._pause_wanted != self._paused:
             self._paused = self._pause_wanted
-            self.stream.add(Paused, self._paused)
+            self.teller.stream.add(Paused, self._paused)
             self._traffic.pause(self.goals.not_over, self._paused)
         return self._paused
 
@@ -370,7 +334,8 @@ class TickLoop:
             return step
         self._visitor.stopped()
         self._log.flush()  # who tells of the end tells it last
-        self._tell_end()
+        self.teller.finished(self._status, self._error, self.goals.unaccounted)
+        self._tell_observers()
         timed_out = self._status is Status.INVALID and not self._stop_wanted
         self._rest()
         self.raise_what_ended_it()
@@ -409,76 +374,6 @@ class TickLoop:
 
     # Who is told
 
-    def _moment(self) -> tuple[float, float, float]:
-        host, ros = self._traffic.host, 0.0
-        with contextlib.suppress(Exception):  # the node is destroyed
-            ros = self._ros = self._backend.stamp() * 1e-9
-        return host.steady(), host.wall(), ros or self._ros
-
-    def _tell_began(self) -> None:
-        """Tell that this run begins, with all its nodes."""
-        self._began = True
-        teller, root = self.teller, self.tree.root
-        teller.begin()
-        if not teller.is_heard:
-            return
-        given = document.given_inputs(root)
-        self.stream.add(
-            RunBegan,
-            self._run_id,
-            document.tree_name(root),
-            self._number(in_order(root)),
-            {name: snapshot(value) for name, (_, value) in given.items()},
-            document.sources_of(root),
-            versions(),
-            *self.asked_by,
-        )
-
-    def _number(self, nodes: Iterable[Behaviour]) -> tuple[Node, ...]:
-        """Give nodes their numbers; return what is told of them."""
-        numbers, found = self.teller.numbers, []
-        for node in nodes:
-            if node not in numbers:
-                numbers[node] = len(numbers) + 1
-                parent = None if node.parent is None else numbers.get(node.parent)
-                found.append(describe(node, numbers[node], parent))
-        return tuple(found)
-
-    def _tell_added(self) -> None:
-        if self.teller.is_heard and (new := self._number(in_order(self.tree.root))):
-            self.stream.add(NodesAdded, new)
-
-    def _tell_of(self, node: Behaviour) -> None:
-        """Tell the status that a node has now; on the ticking thread, as its tick returns."""
-        if not self.teller.is_heard:
-            return
-        self.teller.claim(node)
-        status, more = node.status, dict[str, object]()
-        if status is Status.FAILURE:
-            self.teller.all_written()
-            more["by_itself"] = bool(getattr(node, "refused", False))
-        elif status is Status.SUCCESS:
-            more["warning"] = str(getattr(node, "warning", ""))
-        self.teller.tell(NodeChanged, node, status, node.feedback_message, **more)
-
-    def _tell_end(self) -> None:
-        """Tell that the tree has finished, to the observers too."""
-        if self.teller.is_heard:
-            if not self._began:  # it could not be set up
-                self._tell_began()
-            self.teller.all_written()
-            success = self._status is Status.SUCCESS
-            outputs = document.tree_outputs(self.tree.root) if success else {}
-            self.stream.add(
-                TreeFinished,
-                self._status,
-                {name: snapshot(each, fields=_ALL, size=_ALL) for name, each in outputs.items()},
-                "" if self._error is None else where_raised(self._error),
-                isinstance(self._error, UnusableTree),
-                tuple(self.goals.unaccounted),
-            )
-        self._tell_observers()
-
     def _tell_observers(self) -> None:
         """Call the observers with what has happened; forget the goals that are over."""
         self.goals.forget()
@@ -507,10 +402,3 @@ class TickLoop:
         if not isinstance(error, Exception):
             self._error = self._error or error
             self._wake()
-
-
-def where_raised(error: BaseException) -> str:
-    """Return one line about what ended a run, with the place in the user's code."""
-    cause = error.__cause__ or error
-    frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
-    return f"{error} ({frames[-1].filename}:{frames[-1].lineno})" if frames else str(error)

@@ -22,7 +22,8 @@ from py_trees.trees import BehaviourTree
 from bt_actions import wiring
 from bt_actions.events import GoalReport, Observer
 from bt_actions.events.stream import Stream
-from bt_actions.running.loop import TickLoop, TreeError, check_seconds
+from bt_actions.running.loop import TickLoop, check_seconds
+from bt_actions.running.telling import TreeError
 from bt_actions.running.threads import StartedRun, WakeUp
 from bt_actions.utilities.places import path_of, root_of
 from bt_actions.utilities.plain_text import raised
@@ -125,7 +126,7 @@ class TreeRunner:
     @property
     def stream(self) -> Stream:
         """The events of all runs, for readers on threads of their own."""
-        return self._loop.stream
+        return self._loop.teller.stream
 
     @property
     def running(self) -> bool:

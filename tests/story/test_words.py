@@ -11,7 +11,7 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Cut, Event, Moment, RunEnded
 from bt_actions.events.snapshot import snapshot
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.describing import describe
+from bt_actions.running.telling import describe
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
 from bt_actions.story.table import verdict

@@ -28,7 +28,7 @@ from bt_actions.cli.views.lines import QuietView
 from bt_actions.cli.views.view import View
 from bt_actions.events import RunEnded, StopWanted
 from bt_actions.events.stream import Stream
-from bt_actions.running.loop import where_raised
+from bt_actions.running.telling import where_raised
 from bt_actions.story.state import State
 
 FRAME = 0.1
