@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_actions.expressions.expression import MAX_LENGTH, Expression, ExpressionError
+from bt_actions.expressions.expression import MAX_LENGTH, Expression
+from bt_actions.expressions.text import ExpressionError
 
 RESULT = SimpleNamespace(
     stalled=True,

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Leaf, Limited
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.units import parse_duration
 

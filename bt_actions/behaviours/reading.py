@@ -13,7 +13,8 @@ from typing import Any
 from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.variables import key, read
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.variables import Var, resolve
-from bt_actions.expressions.expression import ExpressionError
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
 from bt_actions.messages.interfaces import RUN_TREE

@@ -9,7 +9,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected, Limited
 from bt_actions.behaviours.topics import LOOKS
-from bt_actions.expressions.expression import ExpressionError
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.goals.policy import Retry
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface

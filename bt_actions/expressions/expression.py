@@ -16,8 +16,6 @@ from bt_actions.expressions.form import Failed, Form
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.expressions.values import reason, show
 
-__all__ = ["MAX_LENGTH", "Expression", "ExpressionError"]
-
 MAX_LENGTH = 2000
 """Characters in one expression."""
 _NAME = re.compile(r"\$([A-Za-z]\w*)", re.ASCII)

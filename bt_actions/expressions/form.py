@@ -25,8 +25,6 @@ from bt_actions.expressions.values import (
 )
 from bt_actions.utilities.plain_data import plain
 
-__all__ = ["Failed", "Form"]
-
 _MAX_DEPTH = 60
 _INFINITE = float("inf")
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}

@@ -15,8 +15,6 @@ from typing import Any
 from bt_actions.expressions.values import number, show
 from bt_actions.utilities.plain_data import of_float32, plain, scalar, shortest
 
-__all__ = ["ARGUMENTS", "FUNCTIONS", "KNOWN", "instead_of", "listed"]
-
 KNOWN = "known"
 """The function that asks for a value and does not read it: `form.py` has its code."""
 _DIGITS = 15

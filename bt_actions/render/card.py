@@ -21,8 +21,6 @@ from bt_actions.render.look import action_of
 if TYPE_CHECKING:
     from bt_actions.document.reading.tree import Document, TreeNode
 
-__all__ = ["Line", "Table", "describe", "interface_of", "tables"]
-
 Kind = Literal["action", "srv", "msg"]
 _PARTS = {"action": ("Goal", "Result", "Feedback"), "srv": ("Request", "Response")}
 _OURS = ("py_trees", "bt_actions")

@@ -19,18 +19,6 @@ from py_trees.decorators import Decorator
 from bt_actions.behaviours.parallel import Parallel as OwnParallel
 from bt_actions.utilities.plain_text import clean
 
-__all__ = [
-    "DOWN_UP_TO",
-    "Row",
-    "action_of",
-    "direction_of",
-    "kind",
-    "label",
-    "left_out",
-    "look",
-    "rows",
-]
-
 DOWN_UP_TO = 16
 """Leaves up to which a picture grows down, as py_trees draws; a wider one grows to the right."""
 

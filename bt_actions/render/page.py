@@ -31,8 +31,6 @@ from bt_actions.render.outline import text
 from bt_actions.render.written import document_of, node_of, own_text
 from bt_actions.utilities.plain_text import clean
 
-__all__ = ["MOST_NODES", "OPEN_UP_TO", "page"]
-
 MOST_NODES = 20_000
 """Nodes of the largest tree that a page is made of."""
 OPEN_UP_TO = 40

@@ -16,8 +16,6 @@ from bt_actions.document.findings import LOADED, NODE
 if TYPE_CHECKING:
     from bt_actions.document.reading.tree import Document, TreeNode
 
-__all__ = ["document_of", "node_of", "own_text"]
-
 _MOST_CHARACTERS = 4000
 _FAR = 1 << 30
 _Position = tuple[int, int]

@@ -16,8 +16,6 @@ from bt_actions.serving.rejections import REJECTIONS
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
 
-__all__ = ["NotControlled", "control", "trees_in_sight", "why_rejected"]
-
 _COMMANDS = {
     "pause": ControlTree.Request.PAUSE,
     "resume": ControlTree.Request.RESUME,

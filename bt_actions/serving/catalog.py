@@ -23,8 +23,6 @@ from bt_actions.utilities.patience import Patience
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = ["Catalog", "Entry", "State"]
-
 _SUFFIXES = (".yaml", ".yml")
 _LONGEST_NAME = 60
 """Characters of a name that nobody knows in what is said of it."""

@@ -11,8 +11,6 @@ from bt_actions.serving.goal import Goal
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
 
-__all__ = ["Control", "Step"]
-
 ECHO = 200
 """Characters of the caller's own words in what is said of it."""
 

@@ -13,8 +13,6 @@ from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.serving.catalog import State
 from bt_actions.serving.outcome import RunOutcome
 
-__all__ = ["Diagnostics", "Standing", "judge"]
-
 PERIOD = 1.0
 """Seconds."""
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR

@@ -8,8 +8,6 @@ from typing import Any
 from bt_actions.serving.messages import feedback
 from bt_actions.serving.run import Run
 
-__all__ = ["FASTEST", "Goal"]
-
 FASTEST, SLOWEST = 0.1, 1.0
 """Seconds between two messages of feedback: where something has changed, and where nothing has."""
 

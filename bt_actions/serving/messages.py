@@ -16,8 +16,6 @@ from bt_actions.serving.run import Run
 from bt_actions.serving.story import warnings_of
 from bt_actions.utilities.plain_text import as_json
 
-__all__ = ["feedback", "finding", "info", "result"]
-
 
 def result(outcome: RunOutcome) -> RunTree.Result:
     """What a goal is answered with."""

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 
-__all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]
-
 SEPARATOR = " / "
 """Between the names of a path."""
 _MOST_TEXT = 4000

@@ -15,8 +15,6 @@ from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import data_of
 from bt_actions.utilities.plain_text import clean
 
-__all__ = ["MAX_BYTES", "Refused", "inputs_of"]
-
 MAX_BYTES = 256 * 1024
 """Of a goal's `inputs`, in UTF-8."""
 _LONGEST = 1000

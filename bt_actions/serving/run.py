@@ -24,8 +24,6 @@ from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
 from bt_actions.utilities.places import path_of
 from bt_actions.utilities.plain_text import as_json
 
-__all__ = ["Leaf", "Run"]
-
 SHOWN = 3
 """Running leaves that are told of."""
 

@@ -40,8 +40,6 @@ from bt_actions.serving.turns import Policy, Turns
 from bt_actions.serving.underway import Underway
 from bt_actions.utilities.plain_text import clean, in_words
 
-__all__ = ["TreeServer"]
-
 RESULT_TIMEOUT = 60
 """Seconds for which an ended goal's result can be asked for; each one kept makes a goal slower."""
 _LAST_WORDS = 2.0

@@ -11,8 +11,6 @@ from bt_actions.serving.requests import Said
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["SAME_NAME", "begins", "ends", "warnings_of"]
-
 SAME_NAME = "SAME_NAME"
 _LONG = 60
 """Characters of an input's value,"""

@@ -9,8 +9,6 @@ import enum
 from collections import deque
 from typing import Generic, TypeVar
 
-__all__ = ["Policy", "Turns"]
-
 T = TypeVar("T")
 
 

@@ -18,8 +18,6 @@ from bt_actions.recovery.ledger import directory
 from bt_actions.ros.log import log
 from bt_actions.utilities.whole_file import replace_file
 
-__all__ = ["Underway", "left_underway"]
-
 _SUFFIX = ".underway"
 _PREFIX = 12
 """Bytes that all goal ids of a process begin with."""

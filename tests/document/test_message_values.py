@@ -9,7 +9,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.document import check_source, source_of
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]

@@ -33,8 +33,6 @@ from bt_actions.document.reading.writes import writes_of
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["BUILDERS", "build"]
-
 
 def build(
     document: Document,

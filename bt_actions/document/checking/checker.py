@@ -36,7 +36,8 @@ from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.reading.writes import Write, writes_of
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.messages.conversion import ANGLE, examine
 from bt_actions.messages.fields import FieldType, Message, describe
 from bt_actions.messages.interfaces import DURATION, interface_name
@@ -44,9 +45,6 @@ from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
     from bt_actions.document.language.classes import Python
-
-__all__ = ["Checker"]
-
 
 Types = MappingType[str, FieldType | None]
 _PARTS = {"action": ("goal", "Goal", "Result"), "srv": ("request", "Request", "Response")}

@@ -19,8 +19,6 @@ from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import span_of
 
-__all__ = ["find_missing"]
-
 _READ_FIRST = {
     "action": "goal", "run_tree": "inputs", "service": "request", "publish": "message",
     "set": "set", "wait": "wait", "check": "check", "while": "while", "subtree": "with",

@@ -16,8 +16,6 @@ LOADED = "_bt_actions_loaded"
 """The attribute of a behaviour that has the node it was made from, and that of a loaded root which
 has its document. Not such as a user's own class may have."""
 
-__all__ = ["LOADED", "NODE", "DocumentError", "Finding", "Place", "Related", "Severity", "Span"]
-
 
 class Place(NamedTuple):
     """A position in a file; line and column count from 1."""

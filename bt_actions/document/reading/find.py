@@ -10,8 +10,6 @@ from pathlib import Path
 from bt_actions.document.yaml.source import broken_link
 from bt_actions.utilities.suggest import closest, did_you_mean, listing
 
-__all__ = ["TreeNotFoundError", "find_tree", "installed_trees", "tree_folder", "tree_folders"]
-
 _SUFFIXES = (".yaml", ".yml")
 _MOST = 4
 """Folders that a message names."""
