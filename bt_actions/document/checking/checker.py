@@ -160,7 +160,6 @@ class Checker:
         infer_variables(writers, self)
 
     def action_class(self, declared: Declared) -> type | None:
-        """The class of the action that a name stands for."""
         name = declared.name
         if name not in self._classes:
             text, at = declared.values.get("type"), declared.written("type")
@@ -331,7 +330,6 @@ class Checker:
     def infer(
         self, expression: Expression, roots: Types, reader: object
     ) -> tuple[FieldType | None, list[Wrong]]:
-        """The type of an expression, and what is wrong with it."""
         variable = self._types_at(reader) if self._items else self.variables.get
         kinds = map(variable, expression.variables)
         noted = _noted(expression.form, self.types, *roots.values(), *kinds)

@@ -70,6 +70,7 @@ class Finding:
 
     @property
     def place(self) -> Place:
+        """File, line and column."""
         return Place(self.file, self.line, self.column)
 
     def headline(self) -> str:
