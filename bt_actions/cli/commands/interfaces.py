@@ -103,8 +103,8 @@ def run(args: argparse.Namespace) -> int:
         except (PackageError, OSError) as error:  # a folder that cannot be written, a full disk
             raise BadInput(f"interfaces build: {error}") from error
         return Exit.SUCCESS
+    from bt_actions.messages.definition import all_interfaces, definition, full_name
     from bt_actions.messages.interfaces import UnknownInterface
-    from bt_actions.packages.definition import all_interfaces, definition, full_name
 
     if args.action == "show":
         try:
