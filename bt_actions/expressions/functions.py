@@ -12,7 +12,7 @@ from collections.abc import Callable, Sized
 from types import MappingProxyType
 from typing import Any
 
-from bt_actions.expressions.values import number, show
+from bt_actions.expressions.values import LENGTHS, number, show
 from bt_actions.utilities.plain_data import of_float32, plain, scalar, shortest
 
 KNOWN = "known"
@@ -20,7 +20,7 @@ KNOWN = "known"
 _DIGITS = 15
 """Of a fraction, which a float64 can tell apart."""
 _CALLED = {
-    "len": "length size count",
+    "len": " ".join(LENGTHS),
     "str": "string tostring to_string text",
     "int": "integer toint to_int trunc truncate",
     "float": "double real tofloat to_float",

@@ -22,7 +22,7 @@ MAX_BITS = 256
 MAX_ITEMS = 10_000
 MAX_JOINED = 100_000
 """Items in a list that is joined of others."""
-LENGTHS = frozenset({"length", "size", "count"})
+LENGTHS = ("length", "size", "count")
 """What other languages call `len`."""
 
 

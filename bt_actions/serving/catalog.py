@@ -18,12 +18,12 @@ from functools import partial
 from pathlib import Path
 
 from bt_actions.document import DocumentError, Finding, Tree, open_tree
+from bt_actions.document.reading.find import is_tree_file
 from bt_actions.serving.requests import Refused, Said, inputs_of
 from bt_actions.utilities.patience import Patience
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import did_you_mean
 
-_SUFFIXES = (".yaml", ".yml")
 _LONGEST_NAME = 60
 """Characters of a name that nobody knows in what is said of it."""
 PATIENCE = 2.0
@@ -207,11 +207,7 @@ def _trees_in(folder: Path) -> list[Path]:
         files = sorted(folder.iterdir())
     except OSError:
         return []
-    return [
-        each
-        for each in files
-        if each.suffix in _SUFFIXES and each.name[0] != "." and clean(each.stem) == each.stem
-    ]
+    return [each for each in files if is_tree_file(each) and clean(each.stem) == each.stem]
 
 
 def _holds_no_tree(findings: Iterable[Finding]) -> bool:
