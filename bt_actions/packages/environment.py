@@ -127,7 +127,7 @@ def _run(command: list[str | Path]) -> None:
         )
 
 
-def here() -> Path:
+def own_prefix() -> Path:
     """This environment's prefix, where the wheels of ROS put headers and CMake's exports.
 
     Raises PackageError where ROS does not come from wheels.

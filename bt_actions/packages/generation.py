@@ -15,7 +15,7 @@ from pathlib import Path
 from bt_actions.packages import PackageError
 from bt_actions.packages.environment import Tools, cache, variables
 from bt_actions.packages.order import needs
-from bt_actions.packages.sources import Source
+from bt_actions.packages.sources import Package
 
 _REPAIR = Path(__file__).with_name("ros_wheels.cmake")
 _CMAKE_LISTS = """\
@@ -38,7 +38,7 @@ _COUNT = re.compile(r"\[(\d+)/(\d+)\]")
 
 
 def generate(
-    source: Source, prefixes: Sequence[Path], tools: Tools, work: Path, progress: Progress
+    source: Package, prefixes: Sequence[Path], tools: Tools, work: Path, progress: Progress
 ) -> Path:
     """Generate, compile and install `source` into a prefix in `work`, which is returned.
 

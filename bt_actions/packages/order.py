@@ -11,20 +11,20 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from bt_actions.packages import PackageError
-from bt_actions.packages.sources import Source, read_manifest, read_source
+from bt_actions.packages.sources import Package, read_manifest, read_package
 from bt_actions.utilities.suggest import what_it_has
 
 
-def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Source]:
+def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Package]:
     """The packages in `folders`, and those beside them that they need, each after what it uses.
 
     Raises PackageError for a package that cannot be read, is given twice, or uses what is nowhere,
     and for a circle.
     """
-    sources: dict[str, Source] = {}
+    sources: dict[str, Package] = {}
     waiting = [folder.resolve() for folder in folders]
     while waiting:
-        source = read_source(waiting.pop(0))
+        source = read_package(waiting.pop(0))
         other = sources.setdefault(source.name, source)
         if other is not source and other.folder != source.folder:
             raise PackageError(
@@ -48,7 +48,7 @@ def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Source]:
         raise PackageError(f"these packages use each other in a circle: {circle}") from error
 
 
-def needs(source: Source) -> list[str]:
+def needs(source: Package) -> list[str]:
     """The other packages whose messages its files use."""
     return sorted({used.partition("/")[0] for used in source.uses} - {source.name})
 
@@ -62,7 +62,7 @@ def messages_in(package: str, prefixes: Iterable[Path]) -> set[str]:
     return set()
 
 
-def _beside(source: Source, package: str) -> list[Path]:
+def _beside(source: Package, package: str) -> list[Path]:
     """The folder of a package that lies beside a source, if there is one."""
     for manifest in sorted(source.folder.parent.glob("*/package.xml")):
         try:
@@ -74,7 +74,7 @@ def _beside(source: Source, package: str) -> list[Path]:
     return []
 
 
-def _check_uses(source: Source, sources: dict[str, Source], prefixes: Sequence[Path]) -> None:
+def _check_uses(source: Package, sources: dict[str, Package], prefixes: Sequence[Path]) -> None:
     for used, place in source.uses.items():
         package, _, name = used.partition("/")
         built = sources.get(package)

@@ -25,7 +25,7 @@ _DEPENDS = {"depend", "build_depend", "exec_depend", "build_export_depend"}
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class Package:
     """A package that can be generated."""
 
     folder: Path
@@ -49,7 +49,7 @@ class Source:
         return f"{self.name} {self.version}"
 
 
-def read_source(folder: Path) -> Source:
+def read_package(folder: Path) -> Package:
     """Read the package in `folder`. Raises PackageError, which names the file and the line."""
     manifest = read_manifest(folder)
     name, version = _text(manifest, "name"), _text(manifest, "version")
@@ -74,7 +74,7 @@ def read_source(folder: Path) -> Source:
     except CycleError as error:
         circle = " holds ".join(reversed(error.args[1]))
         raise PackageError(f"{folder}: a message cannot hold itself: {circle}") from error
-    return Source(
+    return Package(
         folder=folder,
         name=name,
         version=version,

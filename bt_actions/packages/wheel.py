@@ -16,7 +16,7 @@ from pathlib import Path
 from bt_actions.packages import PackageError
 from bt_actions.packages.environment import Tools, variables
 from bt_actions.packages.order import needs
-from bt_actions.packages.sources import Source
+from bt_actions.packages.sources import Package
 
 GENERATOR = "bt-actions interfaces"
 """Who made a wheel, in its own words; wheels of others are never overwritten."""
@@ -27,7 +27,7 @@ _SHELL_SUFFIXES = {".bash", ".dsv", ".ps1", ".sh", ".zsh"}
 
 
 def pack(
-    source: Source, prefix: Path, tools: Tools, built: Iterable[Source], work: Path, out: Path
+    source: Package, prefix: Path, tools: Tools, built: Iterable[Package], work: Path, out: Path
 ) -> Path:
     """Write the wheel of `source`, which lies in `prefix`, into `out`; return its path."""
     root = work / "wheel"
@@ -67,7 +67,7 @@ def _tag() -> str:
     return f"{python}-{python}-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
 
 
-def _metadata(source: Source, tools: Tools, built: Iterable[Source]) -> str:
+def _metadata(source: Package, tools: Tools, built: Iterable[Package]) -> str:
     python = f"{sys.version_info.major}.{sys.version_info.minor}"
     lines = [
         "Metadata-Version: 2.1",
@@ -82,7 +82,7 @@ def _metadata(source: Source, tools: Tools, built: Iterable[Source]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _requirements(source: Source, tools: Tools, built: Iterable[Source]) -> Sequence[str]:
+def _requirements(source: Package, tools: Tools, built: Iterable[Package]) -> Sequence[str]:
     """What the wheel stands on, in the very version: the layout of a message is compiled in."""
     found = {each.name: each.version for each in built}
     for each in distributions(path=[*tools.site, *sys.path]):

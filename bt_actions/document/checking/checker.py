@@ -261,7 +261,7 @@ class Checker:
             if may_need_more and isinstance(item, (int, float)):
                 at = locate(node, path)
                 if isinstance(at, Scalar) and at.value == item:  # else it comes from a file
-                    return self._bare_number(at, item, wanted)
+                    return self._needs_unit_or_quotes(at, item, wanted)
             return item is BAD
 
         for problem in examine(kind, value, hole):
@@ -273,7 +273,7 @@ class Checker:
             meant = None if problem.at_key else marked_here(at, self.source, known)
             self.source.report(code, span_of(at), text, hint=_trap(at) or meant)
 
-    def _bare_number(self, at: Scalar, number: float, wanted: FieldType) -> bool:
+    def _needs_unit_or_quotes(self, at: Scalar, number: float, wanted: FieldType) -> bool:
         """Warn of a number that is likely to need a unit; report one in the place of a text."""
         if wanted == TEXT:
             self.source.report(

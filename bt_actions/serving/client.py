@@ -11,7 +11,7 @@ from bt_actions_interfaces.msg import Rejection, TreeInfo
 from bt_actions_interfaces.srv import ControlTree, ListTrees
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions.ros.serving.asking import Asker, answers, heard
+from bt_actions.ros.serving.questions import Asker, answers, heard
 from bt_actions.serving.rejections import REJECTIONS
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
