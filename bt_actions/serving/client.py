@@ -12,15 +12,10 @@ from bt_actions_interfaces.srv import ControlTree, ListTrees
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.ros.serving.questions import Asker, answers, heard
+from bt_actions.serving.control import COMMANDS
 from bt_actions.serving.rejections import REJECTIONS
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
-
-_COMMANDS = {
-    "pause": ControlTree.Request.PAUSE,
-    "resume": ControlTree.Request.RESUME,
-    "halt": ControlTree.Request.HALT,
-}
 
 
 class NotControlled(Exception):
@@ -57,7 +52,7 @@ def control(action: str, command: str, beginning: str) -> str:
         }
         goal_id = _chosen(action, runs, beginning)
         request = ControlTree.Request(
-            command=_COMMANDS[command],
+            command=COMMANDS[command],
             goal_id=UUID(uuid=list(bytes.fromhex(goal_id))),
             requested_by="bt-actions control",
         )
