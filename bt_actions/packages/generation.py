@@ -122,7 +122,7 @@ def _run(
 
 
 def _reason(log: Path) -> str:
-    """What a log gives as the reason: the first exception of Python, or error of a compiler."""
+    """Return the reason that a log gives: Python's first exception, or a compiler's first error."""
     lines = [line for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
     for number, line in enumerate(lines):
         after = lines[number + 1 :]

@@ -40,7 +40,7 @@ def check_names(sources: Iterable[Package]) -> None:
 
 
 def install(wheels: Iterable[Path]) -> None:
-    """Install `wheels` at once; a Ctrl-C waits for its end. Raises PackageError."""
+    """Install `wheels` at once; a Ctrl-C waits for the end. Raises PackageError."""
     command = [
         *installer(),
         "--quiet",
@@ -64,7 +64,7 @@ def install(wheels: Iterable[Path]) -> None:
 
 
 def left_behind(sources: Iterable[Package]) -> list[str]:
-    """Installed packages that were compiled against another build of one of `sources`."""
+    """Return the installed packages that were compiled against another build of `sources`."""
     built = {source.name for source in sources}
     return sorted(
         found.name

@@ -16,7 +16,7 @@ from bt_actions.utilities.suggest import what_it_has
 
 
 def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Package]:
-    """The packages in `folders`, and those beside them that they need, each after what it uses.
+    """Return the packages in `folders` and those beside them that they need, needed ones first.
 
     Raises PackageError for a package that cannot be read, is given twice, or uses what is nowhere,
     and for a circle.
@@ -49,12 +49,12 @@ def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Package]
 
 
 def needs(source: Package) -> list[str]:
-    """The other packages whose messages its files use."""
+    """Return the other packages whose messages its files use."""
     return sorted({used.partition("/")[0] for used in source.uses} - {source.name})
 
 
 def messages_in(package: str, prefixes: Iterable[Path]) -> set[str]:
-    """The messages of an installed package; none where it is not installed for building upon."""
+    """Return the messages of a package; none where nothing can be built upon it."""
     for prefix in prefixes:
         share = prefix / "share" / package
         if (share / "cmake").is_dir():
@@ -63,7 +63,7 @@ def messages_in(package: str, prefixes: Iterable[Path]) -> set[str]:
 
 
 def _beside(source: Package, package: str) -> list[Path]:
-    """The folder of a package that lies beside a source, if there is one."""
+    """Return the folder of a package that lies beside a source, if there is one."""
     for manifest in sorted(source.folder.parent.glob("*/package.xml")):
         try:
             name = read_manifest(manifest.parent).findtext("name") or ""

@@ -87,7 +87,7 @@ def read_package(folder: Path) -> Package:
 
 
 def read_manifest(folder: Path) -> ET.Element:
-    """The content of package.xml. Raises PackageError."""
+    """Return the content of package.xml. Raises PackageError."""
     path = folder / "package.xml"
     try:
         return ET.fromstring(path.read_bytes())  # nosec B314
@@ -105,7 +105,7 @@ def _text(manifest: ET.Element, tag: str) -> str:
 
 
 def _files(folder: Path) -> tuple[str, ...]:
-    """The files that CMakeLists.txt names; where it names none, as it lists folders: all."""
+    """Return the files that CMakeLists.txt names; all files where it names none."""
     there = {
         str(path.relative_to(folder))
         for kind in KINDS
@@ -130,7 +130,7 @@ def _files(folder: Path) -> tuple[str, ...]:
 
 
 def _uses(package: str, folder: Path, file: str) -> dict[str, str]:
-    """The messages of any package that a file uses, with their places. Raises PackageError."""
+    """Return the messages that a file uses, with their places. Raises PackageError."""
     path = folder / file
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", path.stem):
         raise PackageError(
@@ -170,7 +170,7 @@ def _uses(package: str, folder: Path, file: str) -> dict[str, str]:
 
 
 def _read_line(package: str, line: str, place: str) -> list[tuple[str | None, str]]:
-    """The field or constant of a line, if any: the message it uses, if any, and its name."""
+    """Return the names of a line's field or constants, each with the message that it uses."""
     from rosidl_adapter.parser import InvalidFieldDefinition, parse_message_string
 
     if line[:1].isspace() and line.strip() and not line.lstrip().startswith("#"):

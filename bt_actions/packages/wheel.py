@@ -62,7 +62,7 @@ def _is_wanted(path: Path) -> bool:
 
 
 def _tag() -> str:
-    """The extension files carry no ABI in their names: the wheel says for which Python they are."""
+    """Return the Python that a wheel is for: its extension files carry no ABI in their names."""
     python = f"cp{sys.version_info.major}{sys.version_info.minor}"
     return f"{python}-{python}-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
 
@@ -83,7 +83,7 @@ def _metadata(source: Package, tools: Tools, built: Iterable[Package]) -> str:
 
 
 def _requirements(source: Package, tools: Tools, built: Iterable[Package]) -> Sequence[str]:
-    """What the wheel stands on, in the very version: the layout of a message is compiled in."""
+    """Return what the wheel needs, in exact versions: the layout of messages is compiled in."""
     found = {each.name: each.version for each in built}
     for each in distributions(path=[*tools.site, *sys.path]):
         found.setdefault(each.name, each.version)
