@@ -102,7 +102,7 @@ class Catalog:
         """The folders that answer."""
 
     def entries(self) -> list[Entry]:
-        """All trees, by name."""
+        """Return all trees, by name."""
         with self._lock, self._patience:
             found = [self._entry(name, paths) for name, paths in sorted(self._files().items())]
             self._entries = {each.name: each for each in found if each is not None}
@@ -110,7 +110,7 @@ class Catalog:
             return list(self._entries.values())
 
     def find(self, name: str) -> Entry:
-        """The tree of this name, as it is now. Raises Refused."""
+        """Return the tree of this name, as it is now. Raises Refused."""
         with self._lock, self._patience:
             files = self._files()
             entry = self._entry(name, files.get(name, ()))
@@ -122,7 +122,7 @@ class Catalog:
             return entry
 
     def check(self, name: str, inputs: str) -> tuple[Entry, Tree, Mapping[str, object]]:
-        """What a goal would run: the tree as it is now, and the values of its inputs.
+        """Return the tree that a goal would run, as it is now, and the values of its inputs.
 
         Raises Refused, which says what is wrong.
         """
@@ -139,7 +139,7 @@ class Catalog:
         return entry, entry.tree, values
 
     def _files(self) -> dict[str, list[Path]]:
-        """The files of each name, in the order of the folders."""
+        """Return the files of each name, in the order of the folders."""
         self._there = []
         for folder in self.folders:
             with contextlib.suppress(TimeoutError):
@@ -154,13 +154,13 @@ class Catalog:
         return found
 
     def _same(self, file: Path, other: Path) -> bool:
-        """Whether a file is another by a second path, as far as anybody can tell."""
+        """Return whether a file is another by a second path, as far as anybody can tell."""
         with contextlib.suppress(OSError):  # TimeoutError is one
             return self._patience((file, other), partial(file.samefile, other))
         return False
 
     def _entry(self, name: str, files: Sequence[Path]) -> Entry | None:
-        """The entry of the first of some files that holds a tree, as it is now."""
+        """Return the entry of the first of some files that holds a tree, as it is now."""
         before = self._entries.get(name)
         for number, file in enumerate(files):
             known = before if before is not None and before.file == file else None
@@ -221,9 +221,9 @@ def _said(finding: Finding) -> Said:
 
 
 def _stamp(path: Path, *, before: int | None = None) -> _Stamp:
-    """What tells a file from what it was; None where it is not there, or not older than `before`.
+    """Return what identifies a version of a file; None where it is missing, or too new.
 
-    Which has been written just now may be written again without another time of change.
+    A file that is not older than `before` may change again without another time of change.
     """
     try:
         status = path.stat()
@@ -239,7 +239,7 @@ def _unchanged(stamps: Mapping[Path, _Stamp]) -> bool:
 
 
 def _digest(files: Mapping[Path, str]) -> str:
-    """Of all files that a version is made of, in the order of their names."""
+    """Return the digest of all files of a version, in the order of their names."""
     digest = hashlib.sha256()
     for path, text in sorted(files.items()):
         data = text.encode("utf-8", "surrogatepass") or _bytes(path)

@@ -80,13 +80,13 @@ def _chosen(action: str, runs: dict[str, str], beginning: str) -> str:
 
 
 def why_rejected(goal_name: str) -> Rejection | None:
-    """The first rejection of a goal of this name that any server in sight tells of."""
+    """Return the first rejection of a goal of this name that any server in sight tells of."""
     with contextlib.closing(heard(Rejection, REJECTIONS)) as rejections:
         return next((each for each in rejections if each.goal_name == goal_name), None)
 
 
 def trees_in_sight(namespace: str = "") -> dict[str, list[TreeInfo] | None]:
-    """The trees of each server below a namespace, by its node's name; None: it does not answer."""
+    """Return the trees of the servers below a namespace, by node; None: no answer."""
     return {
         service.removesuffix("/list_trees"): None if told is None else list(told.trees)
         for service, told in answers(ListTrees, namespace).items()

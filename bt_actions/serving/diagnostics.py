@@ -32,7 +32,7 @@ class Standing(NamedTuple):
 
 
 def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
-    """The level of a tree, and why; `refuses` says why its server accepts nothing."""
+    """Return the level of a tree, and why; `refuses` says why its server accepts nothing."""
     last, running = standing.last, standing.running
     if refuses:
         return ERROR, f"not serving: {refuses}"

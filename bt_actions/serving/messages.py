@@ -18,7 +18,7 @@ from bt_actions.utilities.plain_text import as_json
 
 
 def result(outcome: RunOutcome) -> RunTree.Result:
-    """What a goal is answered with."""
+    """Return the answer to a goal."""
     return RunTree.Result(
         error_code=outcome.code,
         error_msg=outcome.message,
@@ -29,7 +29,7 @@ def result(outcome: RunOutcome) -> RunTree.Result:
 
 
 def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
-    """How far a run is."""
+    """Return how far a run is."""
     return RunTree.Feedback(
         running=[RunningLeaf(**leaf._asdict()) for leaf in run.running()],
         leaves_ended=run.leaves_ended,
@@ -39,12 +39,12 @@ def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
 
 
 def finding(said: Said) -> Finding:
-    """One thing that is wrong."""
+    """Return one thing that is wrong."""
     return Finding(**said._asdict())
 
 
 def info(entry: Entry, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
-    """A tree that can be run, and the goals of it: the run of each, and whether that has begun."""
+    """Return a tree, and of each of its goals the run, and whether that has begun."""
     tree, goals = entry.tree, list(goals)
     return TreeInfo(
         name=entry.name,

@@ -126,7 +126,7 @@ def outcome_of(
 
 
 def _failure(report: Report) -> tuple[int, list[str]]:
-    """The first action that is to blame, and the chain, it first."""
+    """Return the first action that is to blame, and the chain of failures, first cause first."""
     culprits = report.culprits()
     chain = sorted(culprits, key=lambda each: each.row is None)
     code: int = Code.TREE_FAILED

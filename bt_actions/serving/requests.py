@@ -40,7 +40,7 @@ class Said(NamedTuple):
 
 
 def inputs_of(text: str) -> Mapping[str, object]:
-    """The mapping that a text holds, as YAML or JSON; empty for an empty one. Raises Refused."""
+    """Return the mapping that a text holds as YAML or JSON; an empty text is {}. Raises Refused."""
     data = text.encode("utf-8", "surrogatepass")
     if len(data) > MAX_BYTES:
         size = f"{len(data):,} bytes of inputs"

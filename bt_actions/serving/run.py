@@ -78,7 +78,7 @@ class Run:
         self._thread.start()
 
     def end(self, ending: Ending, *, abandon: bool = False) -> None:
-        """End it before its time: its goals are canceled and drained. Returns at once.
+        """End the run before its time: its goals are canceled and drained. Returns at once.
 
         With `abandon`, goals that are being drained are waited for no longer.
         """
@@ -88,11 +88,11 @@ class Run:
                 self._runner.interrupt(abandon=abandon)
 
     def pause(self) -> None:
-        """No new goal begins; those that run finish."""
+        """Begin no new goal; goals that run go on."""
         self._pause(True)
 
     def resume(self) -> None:
-        """Go on."""
+        """Begin goals again."""
         self._pause(False)
 
     def _pause(self, wanted: bool) -> None:
@@ -103,19 +103,19 @@ class Run:
                 (self._runner.pause if wanted else self._runner.resume)()
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait until all is over; whether it is."""
+        """Wait until the run is over, for so many seconds; return whether it is."""
         if self._thread.ident is not None:
             self._thread.join(timeout)
         return not self._thread.is_alive()
 
     def running(self) -> list[Leaf]:
-        """The leaves that run, deepest first; on any thread."""
+        """Return the leaves that run, deepest first; on any thread."""
         paths = [(path_of(leaf), leaf) for leaf in list(self._running)]
         paths.sort(key=lambda each: -len(each[0]))
         return [_leaf(path, leaf) for path, leaf in paths[:SHOWN]]
 
     def retrying(self) -> bool:
-        """Whether an action that runs is not at its first attempt; on any thread."""
+        """Return whether an action that runs is not at its first attempt; on any thread."""
         leaves = list(self._running)
         return any(isinstance(each, ActionBehaviour) and each.attempt > 1 for each in leaves)
 

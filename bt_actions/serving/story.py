@@ -41,7 +41,7 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
 
 
 def warnings_of(entry: Entry) -> list[Said]:
-    """What is wrong with the name of a tree: other files have it as well."""
+    """Return what is wrong with the name of a tree: other files have the same name."""
     return [
         Said(SAME_NAME, f"{entry.file} is served as {entry.name!r}, and {each} is not", str(each))
         for each in entry.hides
