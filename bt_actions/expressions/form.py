@@ -72,7 +72,7 @@ class Form:
         self.evaluate = self._compile(self.tree, 0)
 
     def span(self, node: ast.expr) -> tuple[int, int]:
-        """The columns of a node of `tree` in `text`."""
+        """Return the columns of a node of `tree` in `text`."""
         origin = self._source.origin
         end = len(origin) - 1
         start = origin[min(node.col_offset, end)]
@@ -80,13 +80,13 @@ class Form:
         return start, max(last + 1, start + 1)
 
     def number_of(self, node: ast.AST) -> int | None:
-        """Which variable in reading order a node of `tree` reads, or None."""
+        """Return the number, in reading order, of the variable that `node` reads, or None."""
         if isinstance(node, ast.Name) and node.col_offset in self._source.variables:
             return [*self.variables].index(node.col_offset)
         return None
 
     def constant_of(self, node: ast.AST) -> str | None:
-        """The dotted name of the constant that a node of `tree` stands for, or None."""
+        """Return the dotted name of the constant that a node of `tree` stands for, or None."""
         names: list[str] = []
         inner = node
         while isinstance(inner, ast.Attribute):
@@ -99,7 +99,7 @@ class Form:
         return ".".join([inner.id, *reversed(names)])
 
     def constant(self, name: str) -> object:
-        """The value of a constant by its dotted name. Raises ValueError."""
+        """Return the value of a constant by its dotted name. Raises ValueError."""
         assert self._constants is not None
         return self._constants(name)
 
@@ -208,7 +208,7 @@ class Form:
             raise self._refusal(node, f"{name}() takes {takes}, not {len(args)}")
 
     def _compile_known(self, node: ast.expr, part: Callable[[ast.expr], _Closure]) -> _Closure:
-        """A closure that tells whether a part has a value, and never fails."""
+        """Return a closure that tells whether a part has a value, and never fails."""
         if not isinstance(node, (ast.Name, ast.Attribute, ast.Subscript)):
             raise self._refusal(node, "known() asks for one value: known($name), known($a.b.0)")
         before = len(self.variables)
@@ -225,7 +225,7 @@ class Form:
         return known
 
     def _meant(self, function: ast.expr, args: list[ast.expr]) -> str | None:
-        """What to write for a function or a method of another language."""
+        """Return what to write for a function or a method of another language."""
         given = [self.text[slice(*self.span(arg))] for arg in args]
         match function:
             case ast.Name(id=name):
@@ -271,7 +271,7 @@ class Form:
         return compare
 
     def _guard(self, node: ast.expr, function: Callable[..., object], *parts: _Closure) -> _Closure:
-        """A closure that applies `function` and puts the place of `node` on what it raises."""
+        """Return a closure that applies `function`, and puts the place of `node` on its error."""
 
         def apply(roots: _Roots, variable: Variable, names: _Names) -> object:
             values = [part(roots, variable, names) for part in parts]

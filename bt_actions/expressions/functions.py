@@ -132,13 +132,13 @@ ARGUMENTS = MappingProxyType(
 
 
 def listed() -> str:
-    """The names of all functions, as a sentence lists them."""
+    """Return the names of all functions, as a sentence lists them."""
     *most, last = ARGUMENTS
     return f"{', '.join(most)} and {last}"
 
 
 def instead_of(name: str, owner: str | None, arguments: list[str]) -> str | None:
-    """What to write for a call of another language: ``length($x)``, ``$x.append(1)``.
+    """Return what to write for a call of another language: ``length($x)``, ``$x.append(1)``.
 
     `owner` is what stands before the dot of a method. None where nothing is known.
     """

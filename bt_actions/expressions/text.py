@@ -73,9 +73,9 @@ class Source(NamedTuple):
 
 
 def translate(text: str) -> Source:
-    """`$name` becomes `_name`, and the `.0` of `$name.0` becomes `[0]`, keeping the places.
+    """Make `$name` `_name`, and the `.0` of `$name.0` `[0]`, keeping the places.
 
-    So does a field that is a word of Python's: its first letter becomes `_`.
+    The first letter of a field that is a word of Python's becomes `_`.
     """
     for match in _RUN_ON.finditer(text):
         if match[1]:
@@ -129,7 +129,7 @@ def translate(text: str) -> Source:
 
 
 def foreign_in(text: str) -> ExpressionError | None:
-    """What is wrong with a text that holds a word of another language outside of its quotes."""
+    """Return the error for a word of another language, outside of quotes; or None."""
     for found in _FOREIGN.finditer(text):
         if found["equal"]:
             return ExpressionError(f"{found[0]!r}: write '{found[0][:2]}'", *found.span())
@@ -150,12 +150,12 @@ def _end_of_string(text: str, start: int) -> int:
 
 
 def _ascii(char: str) -> str:
-    """Python counts columns in UTF-8 bytes: inside a text, escape what is more than one byte."""
+    """Escape a character of a text that UTF-8 needs several bytes for: Python counts bytes."""
     return char if char.isascii() else f"\\U{ord(char):08x}"
 
 
 def _follows_value(text: str, index: int) -> bool:
-    """Whether the dot at `index` stands behind a name or an index, not inside a number."""
+    """Return whether the dot at `index` stands behind a name or an index, not inside a number."""
     start = index
     while start > 0 and (text[start - 1].isalnum() or text[start - 1] == "_"):
         start -= 1
