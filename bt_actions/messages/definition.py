@@ -15,12 +15,12 @@ _FIELD = re.compile(r"\s*([A-Za-z]\w*(?:/[A-Z]\w*)?)(?:<=\d+)?(?:\[[^\]]*\])?\s+
 
 
 def all_interfaces() -> list[str]:
-    """The full names of all installed actions, services and messages."""
+    """Return the full names of all installed actions, services and messages."""
     return sorted(name for kind in ("action", "srv", "msg") for name in installed(kind))
 
 
 def full_name(wanted: str) -> str:
-    """The interface that `Fetch`, `my_msgs/Fetch` or `my_msgs/action/Fetch` names.
+    """Return the interface that `Fetch`, `my_msgs/Fetch` or `my_msgs/action/Fetch` names.
 
     Raises UnknownInterface where there is none, or more than one.
     """
@@ -45,10 +45,10 @@ def full_name(wanted: str) -> str:
 
 
 def definition(name: str, *, all_comments: bool = False) -> Iterator[str]:
-    """The lines of an interface, given in full, each message in it below its field, indented.
+    """Yield the lines of an interface, each message in it below its field, indented.
 
-    Comments of messages in it are left out, unless `all_comments`. Raises UnknownInterface where
-    the file is not installed.
+    `name` is given in full. Comments of messages in it are left out, unless `all_comments`. Raises
+    UnknownInterface where the file is not installed.
     """
     package, kind, short = name.split("/")
     return _lines(package, kind, short, "", comments=True, below=all_comments)

@@ -81,7 +81,7 @@ class Listing(FieldType):
 
 @lru_cache(maxsize=4096)
 def describe(cls: type) -> Mapping[str, FieldType]:
-    """The fields of a message class in order, with their types."""
+    """Return the fields of a message class in order, with their types."""
     generated: Any = cls
     names = generated.get_fields_and_field_types()
     return {name: _type(slot) for name, slot in zip(names, generated.SLOT_TYPES, strict=True)}
@@ -95,7 +95,7 @@ def no_field(cls: type, name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def constants(cls: type) -> Mapping[str, object]:
-    """The constants that a message class declares; one that is a byte as a number."""
+    """Return the constants that a message class declares; a byte is a number."""
     # rosidl keeps them on the metaclass, as properties and in a private dictionary.
     return {
         name: scalar(getattr(cls, name))
