@@ -59,7 +59,7 @@ class Sent(Entry):
     """Where in the file its slot begins."""
 
     def strike(self) -> None:
-        """It need not be asked for any more; where that fails, it is."""
+        """Ask no more for this goal; where that cannot be written, it is asked for again."""
         self._write(_BLANK)
         with contextlib.suppress(OSError):
             if _is_blank(self.path):
@@ -91,7 +91,7 @@ class Ledger(Record):
         self._free: list[int] = []
 
     def __contains__(self, goal_id: bytes) -> bool:
-        """Whether a goal is on record."""
+        """Return whether a goal is on record."""
         return goal_id in self._slots
 
     def enter(self, goal_id: bytes, entry: Entry) -> None:

@@ -220,7 +220,7 @@ class Cleanup:
         return {left.call for left in self._left.values()} | self._wanted
 
     def _awaits(self, now: float) -> bool:
-        """Whether a goal may turn up yet at a server in sight."""
+        """Return whether a goal may turn up yet at a server in sight."""
         return any(
             left.awaited and left.call.servers and now < self._deadline + left.takes + AWAIT_LONGER
             for left in self._left.values()
@@ -315,7 +315,7 @@ class Cleanup:
             self._read_before.discard(Path(self._trouble.filename))
 
     def _turns_up(self, left: LeftBehind) -> None:
-        """A server has it: it tells the end in a status."""
+        """Take note that a server has a goal: the server tells the end in a status."""
         if left.awaited or left.nothing_left:
             left.awaited, left.nothing_left, left.asked_at = False, "", NEVER
             if left.end is End.UNKNOWN:
