@@ -48,10 +48,10 @@ class Table(NamedTuple):
 
 
 def tables(node: Behaviour, written: TreeNode | None, document: Document | None) -> Iterator[Table]:
-    """What `node` takes and gives, and what it does when things go wrong.
+    """Return what `node` takes and gives, and what it does when things go wrong.
 
-    `written` is what it was made from, where that is a document; `document` is the tree whose root
-    it is, or which it includes.
+    `written` is the node of the document, where there is one; `document` is the tree whose root
+    `node` is, or which it includes.
     """
     if document is not None:
         yield from _ports(document)
@@ -70,7 +70,7 @@ def tables(node: Behaviour, written: TreeNode | None, document: Document | None)
 
 
 def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str, Kind] | None:
-    """The interface that a node uses, for `describe`; None where it uses none."""
+    """Return the interface that a node uses, for `describe`; None where it uses none."""
     kind: Kind
     for attribute, kind in (("action_type", "action"), ("service_type", "srv")):
         found = getattr(node, attribute, None)
@@ -84,7 +84,7 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
 
 
 def describe(interface: type | str, kind: Kind) -> Iterator[Table]:
-    """The messages of an interface with their fields and constants, or why they cannot be told."""
+    """Return the fields and constants of an interface's messages, or why there are none to tell."""
     from bt_actions.messages import interfaces
 
     try:
@@ -174,7 +174,7 @@ def _seconds(seconds: float | None) -> str:
 
 
 def _condition(condition: Any) -> str:
-    """A condition as it was written, where it was written."""
+    """Return a condition as it was written, where it was written."""
     text = condition if isinstance(condition, str) else getattr(condition, "text", None)
     return _cut(text.strip()) if isinstance(text, str) else _function(condition)
 

@@ -67,7 +67,7 @@ def page(root: Behaviour, *, direction: str | None = None, depth: int | None = N
 
 
 def open_depth(nodes: Sequence[Row], most: int) -> int:
-    """The deepest level down to which there are at most `most` nodes; 1 at least."""
+    """Return the deepest level down to which there are at most `most` nodes; 1 at least."""
     levels = Counter(row.depth for row in nodes)
     shown, depth = 1, 0
     while levels[depth + 1] and shown + levels[depth + 1] <= most:
@@ -77,7 +77,7 @@ def open_depth(nodes: Sequence[Row], most: int) -> int:
 
 
 def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dict[str, object]:
-    """What the script draws. Tables are shared by number: nodes of one action say the same."""
+    """Return what the script draws. Nodes of one action share their tables, by number."""
     shared: dict[Table, int] = {}
     types: dict[object, list[Table]] = {}
     numbers: dict[int, int] = {}
