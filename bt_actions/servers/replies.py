@@ -72,13 +72,16 @@ class Replies:
             self._crowd = watch.gids
 
     def taken_over(self) -> None:
-        """Another node sees to the goal from now on, and has not seen its server yet."""
+        """Take note that another node sees to the goal now, and has not seen its server yet."""
         self._was_gone = True
         self._one_left_or_came = False
         self._crowd = self._in_sight = frozenset()
 
     def taken_by_two(self, servers: frozenset[GID], now: float) -> None:
-        """It has ended at one of these, which tells that again, and another one runs it."""
+        """Take note that the goal has ended at one of these, and runs at another.
+
+        The one at which it has ended tells the end again.
+        """
         self.sent_to, self._fresh_since = servers, now
         self._told_of_two = self._runs_anew = True
 
@@ -224,7 +227,7 @@ class Replies:
         return None
 
     def _note_changes(self, watch: ServerWatch, now: float) -> None:
-        """Who has left may have answered what was asked before; who is back was not asked."""
+        """Note which servers left, and may have answered before, and which are back, unasked."""
         crowd = watch.gids if _is_crowded(watch) else frozenset[GID]()
         left, came = self._crowd - watch.gids, (watch.gids - self._in_sight) & self.sent_to
         if left or (came and len(self.sent_to) > 1):
@@ -251,7 +254,7 @@ class Replies:
         self._ended, self._refused, self._denied_at = None, False, math.inf
 
     def _may_be_at_two(self, watch: ServerWatch) -> bool:
-        """Whether two of the servers that it was sent to are there, as far as is known."""
+        """Return whether two of the servers that it was sent to are there, as far as is known."""
         return _is_crowded(watch) and len(self.sent_to & watch.gids) > 1
 
 
