@@ -35,7 +35,7 @@ class Reading:
         when: Given | None,
         names: Names,
     ) -> None:
-        """Raises ValueError for what is neither a function nor an expression."""
+        """Compile; raises ValueError for what is neither a function nor an expression."""
         self._names = names
         self._written: list[tuple[str, Expression]] = []  # what was given as text
         self._expect = None if expect is None else self._function(expect, "expect")

@@ -51,7 +51,7 @@ class TopicValue(Connected[Subscription]):
         return backend.subscription(interface(message_type, "msg"), topic, qos, take)
 
     def read(self) -> object:
-        """The latest message. Raises ExpressionError when there is none, or it is too old."""
+        """Return the latest message. Raises ExpressionError where it is missing or too old."""
         if self._backend is None:
             raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
         topic = self._own.name
@@ -67,7 +67,7 @@ class TopicValue(Connected[Subscription]):
         return message
 
     def first_may_come(self) -> float:
-        """Seconds for which the first message may be on its way; 0 afterwards."""
+        """Return the seconds for which the first message may be on its way; 0 afterwards."""
         return 0.0 if self._own is None or self._newest else float(self._own.may_come())
 
 
@@ -229,5 +229,5 @@ class Publish(Connected[Publisher], Limited):
         return Status.SUCCESS
 
     def due_in(self) -> float | None:
-        """Seconds until it looks again for who listens."""
+        """Return the seconds until it looks again for listeners."""
         return LOOKS
