@@ -69,7 +69,7 @@ class Asking:
         self._denied_at, self.denied_since = now, min(now, self.denied_since)
 
     def denied_lately(self, now: float) -> bool:
-        """Whether the last answer was a denial, and is not old."""
+        """Return whether the last answer was a denial, and is not old."""
         return self.denied_since < math.inf and now - self._denied_at <= 2 * ASK_AGAIN
 
     def left_to_deny(self, now: float) -> float:
@@ -77,7 +77,7 @@ class Asking:
         return min(now, self.denied_since) + DENIED_FOR_GOOD - now
 
     def begin_anew(self, now: float) -> None:
-        """Whoever had it is to be asked again; of what was said, a late denial still counts."""
+        """Ask whoever has the goal again; of all answers, only a late denial still counts."""
         if not self.denied_lately(now):
             self.denied_since = math.inf
         self.unheard, self.answer = 0, None

@@ -230,4 +230,4 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
 @leads_to()
 def drop(goal: Facts) -> None:
-    """Nothing: it came too late, or twice, to mean anything."""
+    """Drop it: it came too late, or twice, to mean anything."""
