@@ -279,7 +279,7 @@ def test_a_condition_is_true_or_false_and_nothing_else() -> None:
 
 def test_it_tells_the_variables_it_reads_with_their_places() -> None:
     expression = Expression("$a.x + $list.0 > len($a)")
-    assert expression.names == {"a", "list"}
+    assert set(expression.variables) == {"a", "list"}
     assert expression.variable_spans == (("a", (0, 2)), ("list", (7, 12)), ("a", (21, 23)))
 
 

@@ -25,10 +25,10 @@ _form = lru_cache(maxsize=1024)(Form)
 class Expression:
     """An expression that was read and found well-formed.
 
-    `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `names` are
-    the variables it reads, without the dollar sign, `variables` the same in reading order;
-    `constants` the constants of messages; `tree` is its syntax tree, for type-checkers. Expressions
-    that differ by the names of their variables alone have one `form`, which is parsed once.
+    `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `variables` are
+    the variables it reads, without the dollar sign, in reading order; `tree` is its syntax tree,
+    for type-checkers. Expressions that differ by the names of their variables alone have one
+    `form`, which is parsed once.
     """
 
     __slots__ = ("form", "text", "variables")
@@ -71,14 +71,6 @@ class Expression:
     @property
     def roots(self) -> frozenset[str]:
         return self.form.roots
-
-    @property
-    def constants(self) -> list[str]:
-        return self.form.constants
-
-    @property
-    def names(self) -> frozenset[str]:
-        return frozenset(self.variables)
 
     @property
     def asked(self) -> frozenset[str]:

@@ -73,11 +73,8 @@ class Form:
 
     def span(self, node: ast.expr) -> tuple[int, int]:
         """Return the columns of a node of `tree` in `text`."""
-        origin = self._source.origin
-        end = len(origin) - 1
-        start = origin[min(node.col_offset, end)]
-        last = origin[min(max((node.end_col_offset or 1) - 1, 0), end)]
-        return start, max(last + 1, start + 1)
+        origin, end = self._source.origin, node.end_col_offset or 1
+        return origin[node.col_offset], origin[end - 1] + 1
 
     def number_of(self, node: ast.AST) -> int | None:
         """Return the number, in reading order, of the variable that `node` reads, or None."""
@@ -105,31 +102,19 @@ class Form:
 
     def _parse(self) -> ast.expr:
         source = self._source
-        stripped = source.text.lstrip()
-        offset = len(source.text) - len(stripped)
         try:
-            tree = ast.parse(stripped.rstrip(), mode="eval").body
+            tree = ast.parse(source.text.rstrip(), mode="eval").body
         except SyntaxError as error:
             if foreign := foreign_in(self.text):
                 raise foreign from None
             if percent := _PERCENT.search(self.text):
                 said = f"{percent[0]!r}: write {float(percent[1]) / 100:g}"
                 raise ExpressionError(said, *percent.span()) from None
-            column = source.origin[
-                min(
-                    offset + ((error.offset or 0) - 1 if error.offset else len(source.text)),
-                    len(source.origin) - 1,
-                )
-            ]
+            at = error.offset - 1 if error.offset else len(source.text)
+            column = source.origin[min(at, len(source.text))]
             raise ExpressionError(_syntax(self.text, column, error), column) from None
         except (RecursionError, MemoryError, ValueError):
             raise ExpressionError("nested too deep", 0, len(self.text)) from None
-        if offset:
-            for node in ast.walk(tree):
-                if hasattr(node, "col_offset"):
-                    node.col_offset += offset
-                if getattr(node, "end_col_offset", None) is not None:
-                    node.end_col_offset += offset  # type: ignore[attr-defined]
         for node in ast.walk(tree) if "._" in source.text else ():
             if isinstance(node, ast.Attribute):  # as it was written: `translate` may change it
                 end = self.span(node)[1]

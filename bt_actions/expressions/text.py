@@ -90,8 +90,8 @@ def translate(text: str) -> Source:
     out: list[str] = []
     origin: list[int] = []
     variables: set[int] = set()
-    done = 0
-    for piece in _PIECE.finditer(text):
+    done = len(text) - len(text.lstrip())  # Python would take spaces before it for a block
+    for piece in _PIECE.finditer(text, done):
         start, end = piece.span()
         out.append(text[done:start])
         origin.extend(range(done, start))

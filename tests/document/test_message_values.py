@@ -143,7 +143,7 @@ def test_a_constant_that_is_not_there_has_no_value() -> None:
         raise ValueError(f"no {name}")
 
     expression = Expression("A.B == 1", roots=(), constants=none_there)
-    assert expression.constants == ["A.B"]
+    assert expression.form.constants == ["A.B"]
     with pytest.raises(ExpressionError, match=r"no A\.B"):
         expression.evaluate({}, lambda name: name)
 
