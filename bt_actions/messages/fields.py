@@ -27,9 +27,6 @@ FLOATS = {"float32": 3.402823466e38, "float64": float("inf")}
 _NAMES = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
 
 
-_MESSAGES: dict[type, Message] = {}
-
-
 class FieldType:
     """What a value is."""
 
@@ -47,19 +44,11 @@ class Scalar(FieldType):
         return self.name if self.limit is None else f"{self.name}<={self.limit}"
 
 
+@dataclass(frozen=True, slots=True)
 class Message(FieldType):
-    """A message inside a message; there is one such object of each class."""
+    """A message inside a message."""
 
-    __slots__ = ("cls",)
     cls: type
-
-    def __new__(cls, of: type) -> Message:
-        made = _MESSAGES.get(of)
-        if made is None:
-            made = super().__new__(cls)
-            made.cls = of
-            made = _MESSAGES.setdefault(of, made)
-        return made
 
     def __str__(self) -> str:
         return short_name(self.cls)
