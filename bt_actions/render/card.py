@@ -10,19 +10,19 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from py_trees.behaviour import Behaviour
 
 from bt_actions.behaviours.variables import Var
 from bt_actions.goals.policy import Retry, Timeouts
+from bt_actions.messages import fields as ros_fields
+from bt_actions.messages.interfaces import PARTS, Kind, interface, interface_name, short_name
 from bt_actions.render.look import action_of
 
 if TYPE_CHECKING:
     from bt_actions.document.reading.tree import Document, TreeNode
 
-Kind = Literal["action", "srv", "msg"]
-_PARTS = {"action": ("Goal", "Result", "Feedback"), "srv": ("Request", "Response")}
 _OURS = ("py_trees", "bt_actions")
 _DEEPEST = 3
 """Levels of messages inside a message."""
@@ -83,19 +83,17 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
     return None
 
 
-def describe(interface: type | str, kind: Kind) -> Iterator[Table]:
+def describe(given: type | str, kind: Kind) -> Iterator[Table]:
     """Return the fields and constants of an interface's messages, or why there are none to tell."""
-    from bt_actions.messages import interfaces
-
     try:
-        found = interfaces.interface(interface, kind) if isinstance(interface, str) else interface
-        parts = [getattr(found, part, None) for part in _PARTS[kind]] if kind in _PARTS else [found]
-        for part in parts:
+        found = interface(given, kind)
+        parts = [getattr(found, part, None) for part, of in PARTS.items() if of == kind]
+        for part in parts or [found]:
             if isinstance(part, type) and hasattr(part, "get_fields_and_field_types"):
                 lines = tuple(islice(_fields(part, 0), _MOST_LINES + 1))
                 if len(lines) > _MOST_LINES:
                     lines = (*lines[:_MOST_LINES], Line("…", ""))
-                yield Table(interfaces.short_name(part), lines or (Line("no fields", ""),))
+                yield Table(short_name(part), lines or (Line("no fields", ""),))
     except (LookupError, ImportError) as error:
         yield Table("Type", (Line("cannot be read here", _cut(str(error))),))
 
@@ -104,7 +102,8 @@ def _action(node: Behaviour, *, from_python: bool) -> Iterator[Line]:
     action = action_of(node)
     assert action is not None
     yield Line("server", action[0])
-    yield Line("type", _type_name(getattr(node, "action_type", "")))
+    kind = getattr(node, "action_type", "")
+    yield Line("type", kind if isinstance(kind, str) else interface_name(kind))
     if from_python and hasattr(node, "goal"):
         yield Line("goal", _value(node.goal))
     expect = getattr(node, "expect", None)
@@ -149,8 +148,6 @@ def _ports(document: Document) -> Iterator[Table]:
 
 
 def _fields(message: type, depth: int) -> Iterator[Line]:
-    from bt_actions.messages import fields as ros_fields
-
     for name, kind in ros_fields.describe(message).items():
         if name == "structure_needs_at_least_one_member":  # what rosidl puts into an empty one
             continue
@@ -160,13 +157,6 @@ def _fields(message: type, depth: int) -> Iterator[Line]:
             yield from _fields(inner.cls, depth + 1)
     for name, value in ros_fields.constants(message).items():
         yield Line(name, f"= {value!r}", depth)
-
-
-def _type_name(found: type | str) -> str:
-    if isinstance(found, str):
-        return found
-    package, _, rest = found.__module__.partition(".")
-    return f"{package}/{rest.partition('.')[0]}/{found.__name__}".replace("//", "/")
 
 
 def _seconds(seconds: float | None) -> str:
