@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bt_actions.messages.interfaces import UnknownInterface, installed
-from bt_actions.utilities.suggest import did_you_mean
 
 _FIELD = re.compile(r"\s*([A-Za-z]\w*(?:/[A-Z]\w*)?)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w+")
 
@@ -17,31 +16,6 @@ _FIELD = re.compile(r"\s*([A-Za-z]\w*(?:/[A-Z]\w*)?)(?:<=\d+)?(?:\[[^\]]*\])?\s+
 def all_interfaces() -> list[str]:
     """Return the full names of all installed actions, services and messages."""
     return sorted(name for kind in ("action", "srv", "msg") for name in installed(kind))
-
-
-def full_name(wanted: str) -> str:
-    """Return the interface that `Fetch`, `my_msgs/Fetch` or `my_msgs/action/Fetch` names.
-
-    Raises UnknownInterface where there is none, or more than one.
-    """
-    names = all_interfaces()
-    package, _, short = wanted.rpartition("/")
-    found = [
-        name
-        for name in names
-        if name == wanted
-        or (name.rpartition("/")[2] == short and package in ("", name.partition("/")[0]))
-    ]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise UnknownInterface(
-            f"{wanted!r} is more than one type, name it in full: {', '.join(found)}"
-        )
-    known = {each for name in names for each in (name, name.rpartition("/")[2])}
-    raise UnknownInterface(
-        f"no installed package has the type {wanted!r}{did_you_mean(wanted, known)}"
-    )
 
 
 def definition(name: str, *, all_comments: bool = False) -> Iterator[str]:

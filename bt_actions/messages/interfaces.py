@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -80,17 +80,30 @@ def called(short: str, kind: Kind) -> type:
     """
     if "/" in short:
         return interface(short, kind)
-    names = installed(kind)
-    found = [name for name in names if name.rpartition("/")[2] == short]
+    return interface(full_name(short, installed(kind), _WORDS[kind]), kind)
+
+
+def full_name(wanted: str, names: Sequence[str], word: str) -> str:
+    """Return the one of `names` that `Fetch`, `my_msgs/Fetch` or the full name means.
+
+    Raises UnknownInterface where there is none, or more than one; `word` says of what kind.
+    """
+    package, _, short = wanted.rpartition("/")
+    found = [
+        name
+        for name in names
+        if name == wanted
+        or (name.rpartition("/")[2] == short and package in ("", name.partition("/")[0]))
+    ]
     if len(found) == 1:
-        return interface(found[0], kind)
-    word = _WORDS[kind]
+        return found[0]
     if found:
-        raise UnknownInterface(
-            f"{short!r} is more than one {word}, put the package before it: {', '.join(found)}"
-        )
-    near = did_you_mean(short, {name.rpartition("/")[2] for name in names})
-    raise UnknownInterface(f"no installed package has the {word} {short!r}{near}")
+        known = ", ".join(found)
+        raise UnknownInterface(f"{wanted!r} is more than one {word}, name it in full: {known}")
+    near = did_you_mean(
+        wanted, {each for name in names for each in (name, name.rpartition("/")[2])}
+    )
+    raise UnknownInterface(f"no installed package has the {word} {wanted!r}{near}")
 
 
 def installed(kind: Kind) -> list[str]:

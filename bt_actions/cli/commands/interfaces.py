@@ -103,12 +103,12 @@ def run(args: argparse.Namespace) -> int:
         except (PackageError, OSError) as error:  # a folder that cannot be written, a full disk
             raise BadInput(f"interfaces build: {error}") from error
         return Exit.SUCCESS
-    from bt_actions.messages.definition import all_interfaces, definition, full_name
-    from bt_actions.messages.interfaces import UnknownInterface
+    from bt_actions.messages.definition import all_interfaces, definition
+    from bt_actions.messages.interfaces import UnknownInterface, full_name
 
     if args.action == "show":
         try:
-            name = full_name(args.type)
+            name = full_name(args.type, all_interfaces(), "type")
             lines = list(definition(name, all_comments=args.all_comments))
         except UnknownInterface as error:
             raise BadInput(str(error)) from error
