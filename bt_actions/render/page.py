@@ -92,7 +92,7 @@ def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dic
             if interface not in types:
                 types[interface] = list(describe(*interface))
             said += types[interface]
-        shape, fill, font = look(node)
+        shape, fill = look(node)
         name, under = label(node)
         one: dict[str, object] = {
             "parent": numbers[id(node.parent)] if row.depth else -1,
@@ -106,7 +106,6 @@ def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dic
         }
         place = place_of(node)
         more = {
-            "font": font,
             "place": None if place is None else str(place),
             "yaml": None if source is None else own_text(source),
         }
