@@ -1,6 +1,6 @@
 """The build environment: CMake, Ninja and the generators of ROS, made once from pinned wheels.
 
-It lies in the cache of the user and is used by all environments of the same Python. Its name says
+Its folder lies in the user's cache, for all environments of the same Python. The folder's name says
 what it is made of, so that another list of pins makes another one; deleting it costs a download.
 """
 

@@ -100,7 +100,7 @@ def _run(
     log: Path,
     done: Callable[[str], None],
 ) -> bool:
-    """Run one step; tell how far it is. It ends with this process's Ctrl-C, and all it started."""
+    """Run one step; tell how far it is. A Ctrl-C ends the step and all that it started."""
     with (
         log.open("a", encoding="utf-8") as file,
         subprocess.Popen(

@@ -1,4 +1,4 @@
-"""Which packages are built, in which order, and on what each of them stands.
+"""The packages to build, in their order, and what each of them stands on.
 
 A type that is used is looked for among the packages that are built, then in the prefixes, then in
 packages that lie beside those that were named.

@@ -1,6 +1,6 @@
 """An interface package as it stands: its package.xml, its files, and the types they use.
 
-What cannot be generated is refused here, with its line: rosidl would say so in the middle of a
+Mistakes are refused here, with their lines: rosidl would tell of them in the middle of a
 long build, and in words of its own.
 """
 
@@ -34,11 +34,11 @@ class Package:
     description: str
     license: str
     files: tuple[str, ...]
-    """Such as "action/Fetch.action"."""
+    """Their paths in the folder: "action/Fetch.action"."""
     uses: dict[str, str]
     """The messages that the files use, "geometry_msgs/Pose", each with its first place."""
     depends: frozenset[str]
-    """What package.xml says that it depends on, interface packages or not."""
+    """The dependencies in package.xml, interface packages or not."""
 
     @property
     def messages(self) -> set[str]:

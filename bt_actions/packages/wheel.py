@@ -19,11 +19,11 @@ from bt_actions.packages.order import needs
 from bt_actions.packages.sources import Package
 
 GENERATOR = "bt-actions interfaces"
-"""Who made a wheel, in its own words; wheels of others are never overwritten."""
+"""The name of the maker in our wheels; wheels of others are never overwritten."""
 _RUNTIME = ("ros-rosidl-default-runtime", "ros-rosidl-generator-py", "ros-action-msgs")
 _SHELL = {"environment", "hook", "parent_prefix_path"}
 _SHELL_SUFFIXES = {".bash", ".dsv", ".ps1", ".sh", ".zsh"}
-"""What makes a shell's environment from a prefix; the wheels of ROS do so in Python."""
+"""Of scripts that make a shell's environment; the wheels of ROS do so in Python."""
 
 
 def pack(
