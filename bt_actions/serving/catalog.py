@@ -2,7 +2,7 @@
 
 A file that changed is read again when somebody asks. One that no longer checks keeps its last good
 version; so does one that cannot be read soon, which is not waited for again before it has been.
-What a tree includes, imports or reads must lie in the named folders, or be linked there.
+All files of a tree must lie in the named folders, or be linked there.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Entry:
     """The latest version that checks; None where there was none."""
     digest: str
     findings: tuple[Said, ...]
-    """What is wrong with the file as it is now."""
+    """The mistakes in the file as it is now."""
     stamps: Mapping[Path, _Stamp]
     hides: tuple[Path, ...] = ()
     """Files of the same name that are not served."""
@@ -97,7 +97,7 @@ class Catalog:
         self._lock = threading.Lock()
         self._entries: dict[str, Entry] = {}
         self._listed: dict[Path, list[Path]] = {}
-        """What each folder held when it was last looked into."""
+        """The files of each folder, as of the last look."""
         self._there: list[Path] = []
         """The folders that answer."""
 

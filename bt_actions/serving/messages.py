@@ -1,4 +1,4 @@
-"""What is told of trees and runs, as messages of bt_actions_interfaces. No node, no state."""
+"""Trees and runs as messages of bt_actions_interfaces. No node, no state."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ ENDS = {
 
 
 class Ending(enum.Enum):
-    """Who ended a run before its time, with the code and the words for it."""
+    """The ways to end a run before its time, with the code and the words of each."""
 
     CANCELED = (Code.CANCELED, "a client canceled it")
     REPLACED = (Code.REPLACED, "a newer goal replaced it")
@@ -56,7 +56,7 @@ class Ending(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class ActionOutcome:
-    """What became of one action; see ActionReport.msg."""
+    """The end of one action; see ActionReport.msg."""
 
     path: str
     server: str
@@ -70,7 +70,7 @@ class ActionOutcome:
 
 @dataclass(frozen=True, slots=True)
 class RunOutcome:
-    """What a RunTree goal is answered with; see RunTree.action."""
+    """The answer to a RunTree goal; see RunTree.action."""
 
     code: int
     message: str = ""

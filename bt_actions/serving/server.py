@@ -49,7 +49,7 @@ _LINGER = 0.25
 
 
 class _Admitted(NamedTuple):
-    """What a goal runs that its client has not been told of yet."""
+    """The tree and inputs of a goal that was admitted, before its client knows."""
 
     name: str
     file: str

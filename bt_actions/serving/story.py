@@ -1,4 +1,4 @@
-"""What is said of one goal, in the words of `bt-actions run`. Pure; no ROS, no state."""
+"""Lines about one goal, in the words of `bt-actions run`. Pure; no ROS, no state."""
 
 from __future__ import annotations
 

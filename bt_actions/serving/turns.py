@@ -1,6 +1,6 @@
-"""Whose turn it is: which goals run, which wait, and which are refused. Pure; no ROS, no thread.
+"""The goals that run, wait, and are refused. Pure; no ROS, no thread.
 
-Whoever uses it holds a lock around each call.
+The caller holds a lock around each call.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ T = TypeVar("T")
 
 
 class Policy(enum.StrEnum):
-    """What to do with a goal that comes while another runs."""
+    """The ways to treat a goal that comes while another runs."""
 
     REJECT = "reject"
     QUEUE = "queue"
-    """It waits; at most `most` do."""
+    """The newer goal waits; at most `most` do."""
     REPLACE = "replace"
     """The older one is halted, and the newer begins when all goals of the older have ended."""
     PARALLEL = "parallel"
-    """They run beside each other, at most `most`."""
+    """The goals run beside each other, at most `most`."""
 
 
 class Turns(Generic[T]):

@@ -1,4 +1,4 @@
-"""Which actions the trees of a server use at this moment, on record should it be killed. No ROS.
+"""The actions that a server's trees use at this moment, on record should it be killed. No ROS.
 
 A server that is started again cleans up there, before it accepts goals. Beside the ledger, in
 memory; a server that ends in good order leaves no file, but for goals whose end it does not know.
