@@ -2,7 +2,7 @@
 
 No ROS here. Evaluating calls nothing but what `functions.py` lists, reads no name that begins with
 an underscore, makes no large number and no large text, and raises nothing but
-`ExpressionError`. What stands in a text is parsed in `form.py`.
+`ExpressionError`. `form.py` parses the text.
 """
 
 from __future__ import annotations

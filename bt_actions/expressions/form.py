@@ -41,9 +41,9 @@ _INTERFACE = re.compile(r"[a-z]\w*(?:/(?:msg|srv|action))?/(?P<constant>[A-Z]\w*
 _PERCENT = re.compile(
     r"(?<![\w.$])(\d+(?:\.\d+)?) *(?:%|percent\b)(?= *(?:$|[)\],<>=!]|and\b|or\b))"
 )
-"""What is not the remainder of a division."""
+"""A percent sign that is not the remainder of a division."""
 _COMPARED = re.compile(r"(?:[=!]=|[\[,]) *\Z")
-"""What stands before a word that may be meant as a text."""
+"""The place before a word that may be meant as a text."""
 Variable = Callable[[str], object]
 _Roots = Mapping[str, object]
 _Names = tuple[str, ...]

@@ -28,7 +28,7 @@ _CALLED = {
     KNOWN: "exists exist defined isset is_set has is_known",
 }
 _FOREIGN = {word: name for name, words in _CALLED.items() for word in words.split()}
-"""What other languages call our functions."""
+"""Our functions by the names of other languages."""
 _JOINS = {"append": "[{}]", "push": "[{}]", "push_back": "[{}]", "extend": "{}", "concat": "{}"}
 """How other languages join lists, and what stands here behind a plus sign."""
 _WHOLE = re.compile(r"\s*[-+]?[0-9]{1,100}\s*", re.ASCII)

@@ -20,7 +20,7 @@ _FIELD = re.compile(rf"""'[^']*'|"[^"]*"|\.({"|".join(keyword.kwlist)})\b""")
 _FOREIGN = re.compile(
     r"""'[^']*'|"[^"]*"|(?P<equal>[!=]==)|(?<![\w.$])(?P<word>(?!and|or|not)(?i:and|or|not))\b"""
 )
-"""What other languages write, and Python cannot read."""
+"""Operators of other languages, which Python cannot read."""
 _NEGATED = re.compile(r"!\s*(\$?[\w.$\[\]]+)")
 _BAD_WORDS = {
     # of other languages, and of chats and word processors
@@ -53,7 +53,7 @@ _PIECE = re.compile(
     rf"""|(?P<wrong>['"$]|!(?!=)|{"|".join(map(re.escape, _BAD_WORDS))}|[^\x00-\x7F])""",
     re.ASCII,
 )
-"""What Python reads otherwise, or not at all, and numbers, whose dots are no indices."""
+"""Pieces that Python reads otherwise, or not at all, and numbers, whose dots are no indices."""
 
 
 class ExpressionError(ValueError):

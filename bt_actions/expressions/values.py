@@ -1,4 +1,4 @@
-"""What the parts of an expression do with values: fields, items, numbers, comparisons.
+"""The work of an expression's parts on values: fields, items, numbers, comparisons.
 
 No ROS here: a message is recognised by what it can do. A function here raises `ValueError` with
 a readable text, or whatever the value itself raises; `expression.py` turns both into its error
@@ -23,7 +23,7 @@ MAX_ITEMS = 10_000
 MAX_JOINED = 100_000
 """Items in a list that is joined of others."""
 LENGTHS = ("length", "size", "count")
-"""What other languages call `len`."""
+"""Names of `len` in other languages."""
 
 
 def number(value: object) -> int | float:
