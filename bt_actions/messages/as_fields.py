@@ -1,4 +1,4 @@
-"""What to write for a message that was given as a list of numbers, or as an angle:
+"""The fields to write for a message that was given as a list of numbers, or as an angle:
 ``{x: 1.0, y: 2.0, z: 0.0}``, ``{yaw: 90 deg}``."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What people write instead of a message's fields: times, durations, angles, constants by name.
+"""Short forms of a message's fields: times, durations, angles, constants by name.
 
 Each function leaves alone what it does not know, and raises ValueError with a readable text for
 what it knows and finds wrong.

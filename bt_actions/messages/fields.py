@@ -1,4 +1,4 @@
-"""What a ROS message consists of, as plain values: for filling one, and for checking a tree.
+"""The fields of ROS messages as plain values: for filling a message, and for checking a tree.
 
 Read from the classes that rosidl generates; imports no rclpy.
 """
@@ -28,7 +28,7 @@ _NAMES = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "flo
 
 
 class FieldType:
-    """What a value is."""
+    """The type of a value."""
 
     __slots__ = ()
 

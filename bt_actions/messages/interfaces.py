@@ -1,4 +1,4 @@
-"""Which actions, services and messages are installed, and their Python classes by name.
+"""The actions, services and messages that are installed, and their Python classes by name.
 
 Imports no rclpy, and imports a package only after seeing that it holds interfaces.
 """
