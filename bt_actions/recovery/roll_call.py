@@ -163,7 +163,7 @@ class LeftBehind:
     takes: float = DENIED_FOR_GOOD
     """Seconds for which it has to be denied until it will not turn up any more."""
     awaited: bool = False
-    """It was sent, and no server has shown it yet; one may."""
+    """The goal was sent, and no server has shown it yet; one may."""
     nothing_left: str = ""
     """Why none will, or its end is not told: it need not be awaited."""
     denials: Answers = field(default_factory=Answers)

@@ -44,7 +44,7 @@ CANCELS_A_TURN = 5
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """What a cleanup has seen."""
+    """The goals that a cleanup has seen."""
 
     left: list[LeftBehind]
     known: list[str]
@@ -56,7 +56,7 @@ class Swept:
     trouble: OSError | None
     """Why nobody can read what was sent and is not answered."""
     missing: list[str]
-    """Those of `unknown` that were looked for in vain."""
+    """The goals of `unknown` that were looked for in vain."""
     elsewhere: dict[bytes, str]
     """Unfinished goals of bt_actions processes on other machines, or in other containers, of which
     nobody here can tell whether they are alive: the action of each."""
