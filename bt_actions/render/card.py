@@ -1,4 +1,4 @@
-"""What there is to say about a node of a tree, as tables: policies, types, what it takes and gives.
+"""The card of a node, as tables: its policies, its types, its inputs and outputs.
 
 Most comes from the behaviour itself, so that a node made in Python has tables as well. Plain texts:
 escaping is the page's. Never ticks, sets up or changes a tree, and never imports rclpy.

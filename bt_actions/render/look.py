@@ -1,4 +1,4 @@
-"""What a node of a tree looks like, for every picture and page of it: words, shape, colours.
+"""The look of a node, for every picture and page of a tree: words, shape, colours.
 
 Shapes are py_trees' own (octagon: fallback, box: sequence, parallelogram: parallel, ellipse:
 decorators and leaves). Draws and lays out nothing, never changes a tree, imports no rclpy.
