@@ -1,4 +1,4 @@
-"""What is known of one action server, seen from outside: is it there, alone, and still the same?
+"""One action server, seen from outside: is it there, alone, and still the same?
 
 Fed with what discovery shows (readiness, and the GIDs of who reads goal requests) and with the
 answers to probes. No ROS, no thread, no clock of its own; it sends nothing: `wants_probe` says
@@ -36,7 +36,7 @@ counts as gone."""
 
 
 class Server(Enum):
-    """What answers under the name."""
+    """The servers that answer under a name."""
 
     ABSENT = "absent"
     READY = "ready"

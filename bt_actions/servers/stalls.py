@@ -47,7 +47,7 @@ class _Grace:
 
 
 class Stalls:
-    """What is to be borne with, after stalls, at any moment (seconds of the steady clock)."""
+    """The time to wait for, after stalls, at any moment (seconds of the steady clock)."""
 
     def __init__(
         self,
