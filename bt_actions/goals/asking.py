@@ -1,6 +1,6 @@
-"""What the server of one goal was asked, how often, and what it said: two small machines.
+"""The questions to the server of one goal, and its answers: two small machines.
 
-They count and remember. What is asked, and what follows from an answer, is decided in the steps
+The machines count and remember. The steps decide what to ask, and what follows from an answer
 (goals/steps). Seconds are those of the steady clock.
 """
 
@@ -42,7 +42,7 @@ class Asking:
     """Requests since anything was heard of the goal."""
     asked_at: float | None = None
     answer: int | None = None
-    """What was answered, a code of action_msgs/srv/CancelGoal."""
+    """The last answer, a code of action_msgs/srv/CancelGoal."""
     denied_since: float = math.inf
     """Every answer since then was: unknown goal."""
     in_vain: bool = False
