@@ -1,6 +1,6 @@
 """A py_trees leaf that sends a goal to a ROS action and stays RUNNING until it stands.
 
-It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
+The leaf keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
 goals/ decides what happens to the goal; here stand the visit to the leaf and its attempts.
 """
@@ -36,7 +36,7 @@ _PLAIN = {bool, int, float, str}
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What an action is doing at this moment."""
+    """The work of an action at this moment."""
 
     state: str
     """A goal's state, or IDLE before the first visit, BACKOFF between two attempts."""
@@ -209,7 +209,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         return backend.traffic.endpoint(self.action_type, self.action_name)
 
     def initialise(self) -> None:
-        """Begin a visit. What an earlier one left behind is drained beside it."""
+        """Begin a visit. Goals that an earlier visit left behind are drained beside it."""
         backend, _ = self._there()
         ActionBehaviour.terminate(self, Status.INVALID)  # where the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._reading.when)

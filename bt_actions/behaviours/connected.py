@@ -1,4 +1,4 @@
-"""What leaves have in common: the Backend of their node, time that runs out, and how they fail."""
+"""Common parts of leaves: the Backend of their node, time that runs out, and failure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a leaf makes of a result: whether it is as expected, and what of it is saved. No ROS.
+"""How a leaf reads a result: whether it is as expected, and what of it is saved. No ROS.
 
 Conditions and places may be given as functions of the result, or as text: there ``$x`` is a
 variable on the blackboard, and ``result`` what the server gave.

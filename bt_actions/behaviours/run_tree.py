@@ -1,6 +1,6 @@
 """The leaf that has a tree run by a server of trees, on this machine or another one. No ROS here.
 
-What a goal goes through is ActionBehaviour's. Here stand only what is sent and how a result of
+The life of a goal is ActionBehaviour's. Here stand only what is sent and how a result of
 RunTree is read; the server's half is bt_actions/serving/.
 """
 

@@ -23,7 +23,7 @@ KEPT = 100
 
 
 class TopicValue(Connected[Subscription]):
-    """A topic whose latest message a tree reads as a variable. It is in no tree itself."""
+    """A topic whose latest message a tree reads as a variable. The value itself is in no tree."""
 
     def __init__(
         self, name: str, message_type: type | str, topic: str, qos: str, max_age: float | None
@@ -187,7 +187,7 @@ class Publish(Connected[Publisher], Limited):
     """
 
     warning = ""
-    """What a SUCCESS does not say: that nobody listened."""
+    """The words beside a SUCCESS where nobody listened."""
 
     def __init__(
         self,
