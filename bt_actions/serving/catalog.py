@@ -216,8 +216,7 @@ def _holds_no_tree(findings: Iterable[Finding]) -> bool:
 
 def _said(finding: Finding) -> Said:
     hint = f" ({finding.hint})" if finding.hint else ""
-    place = f"{finding.file}:{finding.line}:{finding.column}"
-    return Said(finding.code, f"{finding.message}{hint}", place)
+    return Said(finding.code, f"{finding.message}{hint}", str(finding.place))
 
 
 def _stamp(path: Path, *, before: int | None = None) -> _Stamp:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from bt_actions_interfaces.srv import ControlTree
 
+from bt_actions.serving.rejections import ECHO
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
 
@@ -18,8 +19,6 @@ COMMANDS = {
     "resume": ControlTree.Request.RESUME,
     "halt": ControlTree.Request.HALT,
 }
-ECHO = 200
-"""Characters of the caller's own words in what is said of it."""
 
 
 class Control:
@@ -39,8 +38,8 @@ class Control:
     ) -> None:
         self._goals, self._say = goals, say
         self._does: dict[str, Callable[[Goal], None]] = {
-            "pause": lambda goal: goal.run.pause(),
-            "resume": lambda goal: goal.run.resume(),
+            "pause": lambda goal: goal.run.pause(True),
+            "resume": lambda goal: goal.run.pause(False),
             "halt": halt,
         }
 

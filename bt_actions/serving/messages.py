@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bt_actions_interfaces.action import RunTree
-from bt_actions_interfaces.msg import ActionReport, Finding, RunningLeaf, TreeInfo, TreeInput
+from bt_actions_interfaces.msg import ActionReport, Finding, TreeInfo, TreeInput
 from builtin_interfaces.msg import Duration
 from unique_identifier_msgs.msg import UUID
 
@@ -31,7 +31,7 @@ def result(outcome: RunOutcome) -> RunTree.Result:
 def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
     """Return how far a run is."""
     return RunTree.Feedback(
-        running=[RunningLeaf(**leaf._asdict()) for leaf in run.running()],
+        running=run.running(),
         leaves_ended=run.leaves_ended,
         paused=run.paused,
         waiting=not begun,
@@ -71,14 +71,7 @@ def info(entry: Entry, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
 
 
 def _action(each: ActionOutcome) -> ActionReport:
-    seconds = int(each.duration)
-    return ActionReport(
-        path=each.path,
-        server=each.server,
-        attempts=min(each.attempts, 65535),
-        outcome=each.outcome,
-        end=each.end,
-        reason=each.reason,
-        duration=Duration(sec=seconds, nanosec=int((each.duration - seconds) * 1e9)),
-        place=each.place,
-    )
+    whole, rest = divmod(each.duration, 1)
+    duration = Duration(sec=int(whole), nanosec=int(rest * 1e9))
+    few = {"attempts": min(each.attempts, 65535), "duration": duration}
+    return ActionReport(**each._asdict() | few)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
@@ -54,8 +55,7 @@ class Ending(enum.Enum):
     SERVER_ENDS = (Code.DEACTIVATED, "its server ends")
 
 
-@dataclass(frozen=True, slots=True)
-class ActionOutcome:
+class ActionOutcome(NamedTuple):
     """The end of one action; see ActionReport.msg."""
 
     path: str

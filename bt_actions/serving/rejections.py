@@ -12,7 +12,7 @@ from bt_actions.utilities.plain_text import clean
 
 REJECTIONS = 10
 ECHO = 200
-"""Characters of a goal's own words in what is said of it."""
+"""Characters of a client's own words in what is said of it."""
 
 
 class Rejections:

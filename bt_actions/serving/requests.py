@@ -58,8 +58,7 @@ def inputs_of(text: str) -> Mapping[str, object]:
         refuse_large(values)
     except DocumentError as error:
         first = error.findings[0]
-        place = f"{first.file}:{first.line}:{first.column}"
-        raise Refused(first.code, first.message, place) from None
+        raise Refused(first.code, first.message, str(first.place)) from None
     except (ValueError, RecursionError) as error:
         raise Refused("INPUTS", str(error), "inputs:1:1") from None
     assert isinstance(values, dict)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
+from bt_actions_interfaces.msg import RunningLeaf
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure
 from py_trees.common import Status
@@ -26,15 +27,6 @@ from bt_actions.utilities.plain_text import as_json
 
 SHOWN = 3
 """Running leaves that are told of."""
-
-
-class Leaf(NamedTuple):
-    """A leaf that runs; see RunningLeaf.msg."""
-
-    path: str
-    message: str
-    attempt: int
-    attempts: int
 
 
 class Run:
@@ -87,15 +79,8 @@ class Run:
             if self._runner is not None:
                 self._runner.interrupt(abandon=abandon)
 
-    def pause(self) -> None:
-        """Begin no new goal; goals that run go on."""
-        self._pause(True)
-
-    def resume(self) -> None:
-        """Begin goals again."""
-        self._pause(False)
-
-    def _pause(self, wanted: bool) -> None:
+    def pause(self, wanted: bool) -> None:
+        """Begin no new goal, or begin goals again; goals that run go on."""
         with self._lock:
             self.paused = wanted
             self.changes += 1
@@ -108,7 +93,7 @@ class Run:
             self._thread.join(timeout)
         return not self._thread.is_alive()
 
-    def running(self) -> list[Leaf]:
+    def running(self) -> list[RunningLeaf]:
         """Return the leaves that run, deepest first; on any thread."""
         paths = [(path_of(leaf), leaf) for leaf in list(self._running)]
         paths.sort(key=lambda each: -len(each[0]))
@@ -179,8 +164,8 @@ class Run:
         self.changes += 1
 
 
-def _leaf(path: tuple[str, ...], leaf: Behaviour) -> Leaf:
-    attempt, attempts = 0, 0
+def _leaf(path: tuple[str, ...], leaf: Behaviour) -> RunningLeaf:
+    told = RunningLeaf(path=SEPARATOR.join(path), message=leaf.feedback_message)
     if isinstance(leaf, ActionBehaviour):
-        attempt, attempts = leaf.attempt, leaf.retry.attempts
-    return Leaf(SEPARATOR.join(path), leaf.feedback_message, attempt, attempts)
+        told.attempt, told.attempts = leaf.attempt, leaf.retry.attempts
+    return told

@@ -22,7 +22,7 @@ _STOPPED = tuple(each.value[0] for each in Ending)
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
     """Say what begins: its file, its inputs and the caller's name for it."""
     given = {each.name: each.default for each in tree.inputs.values()} | dict(inputs)
-    words = ", ".join(f"{name}={_brief(value)}" for name, value in given.items())
+    words = ", ".join(f"{name}={shorten(value, _LONG)}" for name, value in given.items())
     if len(words) > _LONGEST:
         words = f"{words[: _LONGEST - 1]}…"
     called = f", called {goal_name!r}" if goal_name else ""
@@ -46,7 +46,3 @@ def warnings_of(entry: Entry) -> list[Said]:
         Said(SAME_NAME, f"{entry.file} is served as {entry.name!r}, and {each} is not", str(each))
         for each in entry.hides
     ]
-
-
-def _brief(value: object) -> str:
-    return shorten(value, _LONG)
