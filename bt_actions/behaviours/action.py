@@ -358,7 +358,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self, handle: GoalHandle, outcome: Outcome, reason: str, backend: Backend
     ) -> AttemptRecord:
         goal, begun, ended = handle.goal, handle.begun_at.ros, backend.now().ros
-        goal.message = None  # as large as the user's data
+        goal.forget_message()
         return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:

@@ -39,6 +39,7 @@ class Facts:
     message: Any = None
     """The goal message, until its leaf has the outcome: reasons tell of it, and no step depends
     on it."""
+    _fields_then = ""
 
     def __init__(
         self,
@@ -132,9 +133,17 @@ class Facts:
         fields = self.fields
         return f"; goal {fields}" if fields else ""
 
+    def forget_message(self) -> None:
+        """Keep of the message, which is as large as the user's data, what may still be told."""
+        if self.end is End.UNKNOWN:
+            self._fields_then = self.fields
+        self.message = None
+
     @property
     def fields(self) -> str:
         """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
+        if self.message is None:
+            return self._fields_then
         given = given_fields(self.message) or self.message  # one that gives none is told whole
         text = shorten(given, FIELDS_SHOWN) if given else ""
         return f"{text}}}" if text.endswith("…") else text

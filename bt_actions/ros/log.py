@@ -21,6 +21,7 @@ from rclpy.logging import get_logger
 
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
+from bt_actions.utilities.shorten import fit
 
 MOST = 10_000
 """Lines that wait to be written."""
@@ -57,9 +58,9 @@ class Log:
         self._logger.addHandler(_StandardError())
         self._logger.setLevel(logging.INFO)
         self._logger.propagate = False  # others' handlers may be added to this one
-        self.info = partial(self._put, self._logger.info)
-        self.warning = partial(self._put, self._logger.warning)
-        self.error = partial(self._put, self._logger.error)
+        self.info = lambda text: self._put(self._logger.info, fit(text))
+        self.warning = lambda text: self._put(self._logger.warning, fit(text))
+        self.error = lambda text: self._put(self._logger.error, fit(text))
         self._begin()
         atexit.register(self.flush)
         os.register_at_fork(after_in_child=self._begin)  # what waits is the parent's to write

@@ -21,7 +21,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions import wiring
 from bt_actions.events import Observer
-from bt_actions.running.goals import GoalReport
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.running.loop import TickLoop, TreeError, check_seconds
 from bt_actions.running.threads import StartedRun, WakeUp
 from bt_actions.utilities.places import path_of, root_of

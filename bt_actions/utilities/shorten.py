@@ -9,7 +9,10 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
-__all__ = ["given_fields", "shorten", "shorten_fields"]
+__all__ = ["MESSAGE", "fit", "given_fields", "shorten", "shorten_fields"]
+
+MESSAGE = 300
+"""Characters of a message: three lines of a terminal."""
 
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
@@ -19,7 +22,7 @@ Part = tuple[str, object]
 """A text, and a value that stands behind it (or `_NOTHING`)."""
 
 
-def shorten(value: object, limit: int = 300) -> str:
+def shorten(value: object, limit: int = MESSAGE) -> str:
     """Return a value as people write it in a tree: ``{x: 1.0, on: true, name: 'a'}``.
 
     A long list is ``[7, 7, 7, … 4000000 items]``; a text of more than `limit` characters is cut,
@@ -48,6 +51,14 @@ def shorten(value: object, limit: int = 300) -> str:
         else:
             stack.append(parts)
     return text if len(text) <= limit else f"{text[: limit - 1]}…"
+
+
+def fit(text: str, limit: int = MESSAGE) -> str:
+    """Return a message as it is, or without its middle: its end often says what to do."""
+    if len(text) <= limit:
+        return text
+    tail = limit // 3
+    return f"{text[: limit - tail - 3]} … {text[-tail:]}"
 
 
 def shorten_fields(message: object, limit: int = 80) -> str:

@@ -569,14 +569,14 @@ def test_reports_and_the_live_view_shorten_long_values_and_json_has_them_whole(
     report.observe(story.finish(Status.SUCCESS))
     assert last_words(report, Closing(Exit.SUCCESS))[1:3] == [
         "many: [7, 7, 7, … 1000000 items]",
-        f"text: {'x' * 299}…",
+        f"text: {'x' * 131} … {'x' * 66}",
     ]
     *_, finished = objects_of(root, [story.start()])
     assert finished["outputs"] == {"many": LARGE, "text": "x" * 1_000_000}
     result = result_lines(Fibonacci.Result(sequence=LARGE))
     assert result == ["  sequence:", "  - 7", "  - 7", "  - 7", "  - … 1000000 items"]
     result = MoveRobot.Result(message="x" * 1_000_000)
-    assert fields_text(result).endswith(f", message {'x' * 299}…")
+    assert fields_text(result).endswith(f", message {'x' * 131} … {'x' * 66}")
 
 
 def test_without_a_result_there_are_no_lines() -> None:

@@ -14,6 +14,7 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.render import action_of
 from bt_actions.running.report import DONE, Report, Row
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import fit
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, GoalChanged
@@ -135,7 +136,7 @@ class LineView:
         self._write(f"{self._report.now - self._report.started:8.2f} s  {what:<8} {clean(text)}")
 
     def _write(self, line: str) -> None:
-        self._out.write(f"{line}\n")
+        self._out.write(f"{fit(line)}\n")
         self._out.flush()
 
 

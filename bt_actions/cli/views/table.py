@@ -76,7 +76,9 @@ def summary(report: Report) -> list[str]:
             lines.append(f"  failed{_because(culprit.message)}")
         else:
             tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
-            lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
+            is_told = row.end is End.UNKNOWN  # of the goal that is not accounted for
+            why = "" if is_told else _because(row.reason or culprit.message)
+            lines.append(f"  {row.outcome} after {tries}{why}")
         if culprit.place:
             lines.append(f"  {culprit.place}")
     return lines

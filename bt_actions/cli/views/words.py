@@ -15,7 +15,7 @@ from bt_actions.cli.views.table import summary, table
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.shorten import fit, shorten
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -35,7 +35,7 @@ MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
 MANY = 20
 """Items of a list that is shown whole."""
-LONG = 300
+LONG = 200
 """Characters of a value; longer ones are cut."""
 CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
 
@@ -80,9 +80,7 @@ def outputs_of(report: Report) -> dict[str, object]:
 
 def brief(value: object) -> str:
     """Return a value as people read it, short however large it is; a text without quotes."""
-    if not isinstance(value, str):
-        return shorten(value, LONG)
-    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
+    return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
 
 
 def troubles(report: Report, closing: Closing) -> list[str]:
@@ -95,7 +93,7 @@ def troubles(report: Report, closing: Closing) -> list[str]:
     if report.unaccounted and not closing.verdict:  # of a simulation, which ends with us
         lines.append(CLEAN_UP)
     lines += [f"not accounted for: {line}" for line in report.unaccounted]
-    return lines
+    return [fit(line) for line in lines]
 
 
 def stood_still(report: Report) -> str:
@@ -121,8 +119,8 @@ def goal_text(row: Row) -> str:
         return f"{words.get(row.state, row.state.lower())} {row.server}{attempt}"
     text = f"{row.outcome}{attempt}"
     if row.end is End.UNKNOWN:
-        text += ", end not known" if not row.live else ", end not known yet"
-    elif row.in_doubt:
+        return f"{text}, end not known{' yet' if row.live else ''}"  # why, is told of the goal
+    if row.in_doubt:
         text += ", not started as far as its server knows"
     elif row.end is not None and row.end is not _USUAL_ENDS.get(row.outcome):
         text += f", ended {row.end}"
