@@ -306,7 +306,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     def explain(self, outcome: Outcome, result: Any) -> str:
         """What to add to the reason of a goal that has not succeeded, or nothing."""
         told = outcome is Outcome.ABORTED and result is not None
-        return f"its result is: {shorten(result)}" if told else ""
+        return f"its result is: {shorten(result, 150)}" if told else ""
 
     # Within
 

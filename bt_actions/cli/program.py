@@ -18,7 +18,6 @@ from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.results import give_stdout_back, results
 from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note, write
 from bt_actions.ros.environment import Reach, prepare
-from bt_actions.utilities.shorten import fit
 
 COMMANDS = {
     "run": "run",
@@ -91,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         code = _dispatch(argv)
     except BadInput as error:
-        note(fit(f"bt-actions: {error}") if error.prefixed else str(error))
+        note(f"bt-actions: {error}" if error.prefixed else str(error))
         code = Exit.BAD_INPUT
     except OutputLost as error:
         note(f"bt-actions: {error}")

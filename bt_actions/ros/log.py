@@ -28,7 +28,9 @@ MOST = 10_000
 WITHIN = 1.0
 """Seconds for which `flush` waits."""
 LONGEST = 3000
-"""Bytes of a line; a pipe that has room at all has room for 4,096."""
+"""Bytes of a tree's line; a pipe that has room at all has room for 4,096."""
+LINE = 250
+"""Characters of one of ours: with what stands before it, three lines of a terminal."""
 STDERR = 2
 
 
@@ -58,9 +60,9 @@ class Log:
         self._logger.addHandler(_StandardError())
         self._logger.setLevel(logging.INFO)
         self._logger.propagate = False  # others' handlers may be added to this one
-        self.info = lambda text: self._put(self._logger.info, fit(text))
-        self.warning = lambda text: self._put(self._logger.warning, fit(text))
-        self.error = lambda text: self._put(self._logger.error, fit(text))
+        self.info = lambda text: self._put(self._logger.info, fit(text, LINE))
+        self.warning = lambda text: self._put(self._logger.warning, fit(text, LINE))
+        self.error = lambda text: self._put(self._logger.error, fit(text, LINE))
         self._begin()
         atexit.register(self.flush)
         os.register_at_fork(after_in_child=self._begin)  # what waits is the parent's to write

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TextIO
 
+from bt_actions.utilities.shorten import fit
+
 if TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour
     from bt_actions.cli.views.words import Closing
@@ -54,23 +56,19 @@ class GoalView:
 
     def finish(self, closing: Closing) -> None:
         """Write the result and the outcome."""
-        from bt_actions.cli.views.words import CLEAN_UP, goal_text, stood_still
+        from bt_actions.cli.views.words import goal_text, left_open
         from bt_actions.goals.policy import Outcome
 
         for line in self.result_lines():
             self._line(line)
         for row in self._report.rows:
+            if self._leaf.history:
+                row.reason = self._leaf.history[-1].goal.reason  # the result was told above
             if closing.cause and row.outcome is Outcome.CANCELED:
                 row.reason = closing.cause  # here is no tree that could have interrupted it
             self._line(f"{goal_text(row)}, after {row.seconds(self._report.now):.2f} s")
-        if closing.error:
-            self._line(closing.error)
-        if self._report.servers_gone:
-            self._line(stood_still(self._report))
-        if self._report.unaccounted:
-            self._line(CLEAN_UP)
-        for line in self._report.unaccounted:
-            self._line(f"not accounted for: {line}")
+        for line in left_open(self._report, closing):
+            self._line(line)
 
     def feedback_text(self, row: Row) -> str:
         """Return the latest feedback on one line."""
@@ -103,5 +101,5 @@ class GoalView:
     def _line(self, text: str) -> None:
         start = "\r\x1b[K" if self._drawn else ""
         self._drawn = False
-        self._out.write(f"{start}{text}\n" if text else start)
+        self._out.write(f"{start}{fit(text)}\n" if text else start)
         self._out.flush()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import fit
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
@@ -81,7 +82,7 @@ def summary(report: Report) -> list[str]:
             lines.append(f"  {row.outcome} after {tries}{why}")
         if culprit.place:
             lines.append(f"  {culprit.place}")
-    return lines
+    return [fit(line) for line in lines]
 
 
 def _because(reason: str) -> str:

@@ -86,7 +86,13 @@ def brief(value: object) -> str:
 def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     warned = [f"{' / '.join(each.path)}: {each.message}" for each in report.warnings]
-    lines = [f"warning: {clean(line)}" for line in warned] + summary(report)
+    warnings = [fit(f"warning: {clean(line)}") for line in warned]
+    return [*warnings, *summary(report), *left_open(report, closing)]
+
+
+def left_open(report: Report, closing: Closing) -> list[str]:
+    """Return what went wrong beside the tree, and what is not known, the gravest last."""
+    lines = []
     if report.servers_gone and not closing.verdict:
         lines.append(stood_still(report))
     lines += [line for line in (closing.complaint, closing.error) if line]
@@ -98,10 +104,11 @@ def troubles(report: Report, closing: Closing) -> list[str]:
 
 def stood_still(report: Report) -> str:
     """Say what to do about servers that went away with a goal."""
-    servers = " ".join(sorted({row.server for row in report.rows if row.left_at_server}))
+    servers = sorted({row.server for row in report.rows if row.left_at_server})
+    which = " ".join(["", *servers]) if len(servers) <= MOST else ""
     return (
         "A server that only stood still, or was cut off, may go on with its goal; once it is back,"
-        f" `bt-actions cleanup {servers}` cancels that."
+        f" `bt-actions cleanup{which}` cancels that."
     )
 
 
