@@ -14,15 +14,13 @@ from bt_actions.utilities.shorten import fit, shorten
 __all__ = ["SAME_NAME", "begins", "ends", "warnings_of"]
 
 SAME_NAME = "SAME_NAME"
-_LONG = 60
-"""Characters of an input's value."""
 _STOPPED = tuple(each.value[0] for each in Ending)
 
 
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
     """Say what begins: its file, its inputs and the caller's name for it."""
     given = {each.name: each.default for each in tree.inputs.values()} | dict(inputs)
-    words = ", ".join(f"{name}={_brief(value)}" for name, value in given.items())
+    words = ", ".join(f"{name}={shorten(value, 60)}" for name, value in given.items())
     called = f", called {goal_name!r}" if goal_name else ""
     return clean(f"begins ({file}){' with ' if words else ''}{fit(words, 200)}{called}")
 
@@ -35,8 +33,8 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
     elif outcome.code in _STOPPED:
         word = "STOPPED"
     after = "" if seconds is None else f" after {seconds:.2f} s"
-    why = "; ".join(["", *outcome.message.splitlines()])
-    return f"ends: {word}{after}{why.replace('; ', ': ', 1)}"
+    why = "; ".join(outcome.message.splitlines())
+    return f"ends: {word}{after}{f': {why}' if why else ''}"
 
 
 def warnings_of(entry: Entry) -> list[Said]:
@@ -45,7 +43,3 @@ def warnings_of(entry: Entry) -> list[Said]:
         Said(SAME_NAME, f"{entry.file} is served as {entry.name!r}, and {each} is not", str(each))
         for each in entry.hides
     ]
-
-
-def _brief(value: object) -> str:
-    return shorten(value, _LONG)

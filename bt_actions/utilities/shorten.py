@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
-__all__ = ["MESSAGE", "fit", "given_fields", "shorten", "shorten_fields"]
+__all__ = ["MESSAGE", "fit", "given_fields", "shorten"]
 
 MESSAGE = 300
 """Characters of a message: three lines of a terminal."""
@@ -59,23 +59,6 @@ def fit(text: str, limit: int = MESSAGE) -> str:
         return text
     tail = limit // 3
     return f"{text[: limit - tail - 3]} … {text[-tail:]}"
-
-
-def shorten_fields(message: object, limit: int = 80) -> str:
-    """Return the fields of a ROS message as ``remaining 1.2, phase moving``, cut as `shorten` does.
-
-    A field's own value is cut at half of the limit; a number has six digits.
-    """
-    text = ""
-    types = getattr(message, "get_fields_and_field_types", dict[str, str])()
-    for name in types:
-        value = field_of(message, name, types)
-        plain = value[:limit] if isinstance(value, str) else ""
-        number = f"{value:g}" if isinstance(value, float) else ""
-        text += f"{', ' if text else ''}{name} {plain or number or shorten(value, limit // 2)}"
-        if len(text) > limit:
-            return f"{text[: limit - 1]}…"
-    return text
 
 
 def given_fields(message: object) -> dict[str, object]:

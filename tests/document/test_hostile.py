@@ -40,7 +40,7 @@ def check_bytes(data: bytes) -> list[Finding]:
 
 def only(findings: list[Finding]) -> str:
     (finding,) = findings
-    return finding.headline()
+    return str(finding).splitlines()[0]
 
 
 def test_a_directory_is_no_tree(tmp_path: Path) -> None:

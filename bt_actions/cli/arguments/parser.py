@@ -88,7 +88,4 @@ class Parser(argparse.ArgumentParser):
 
 
 def _suggestion(word: str, known: Sequence[str] | dict[str, Any]) -> str:
-    beginnings = [name for name in known if len(word) > 3 and name.startswith(word)]
-    if len(beginnings) == 1:
-        return f"; did you mean {beginnings[0]!r}?"
     return did_you_mean(word, known) or "; there are " + ", ".join(known)

@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from signal import Signals as Signal
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from py_trees.common import Status
 
@@ -30,12 +30,10 @@ from bt_actions.cli.streams.writing import discard_stdout, note
 from bt_actions.cli.views.lines import QuietView
 from bt_actions.cli.views.view import View
 from bt_actions.cli.views.words import Closing, waiting_text
+from bt_actions.events import Event
 from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.running.loop import UnusableTree
 from bt_actions.running.report import Report
-
-if TYPE_CHECKING:
-    from bt_actions.events import Event
 
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
