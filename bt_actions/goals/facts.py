@@ -137,7 +137,7 @@ class Facts:
 
     def forget_message(self) -> None:
         """Keep of the message, which is as large as the user's data, what may still be told."""
-        if self.end is End.UNKNOWN:
+        if self.state is not State.DONE:
             self._fields_then = self.fields
         self.message = None
 

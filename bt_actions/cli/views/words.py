@@ -14,7 +14,7 @@ from bt_actions.cli.views.table import summary, table
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import fit, shorten
+from bt_actions.utilities.shorten import MESSAGE, fit, shorten
 from bt_actions.utilities.suggest import listing
 
 _USUAL_ENDS = {
@@ -54,7 +54,7 @@ class Closing:
     """The bug in a behaviour that ended the run, or ""."""
 
 
-def last_words(report: Report, closing: Closing, width: int | None = None) -> list[str]:
+def last_words(report: Report, closing: Closing, width: int = MESSAGE) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     lines = ["", *table(report, width)] if report.rows else []
     outputs = [clean(f"{name}: {brief(value)}") for name, value in outputs_of(report).items()]

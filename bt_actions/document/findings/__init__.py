@@ -76,12 +76,16 @@ class Finding:
     def place(self) -> Place:
         return Place(self.file, self.line, self.column)
 
+    def headline(self) -> str:
+        """``trees/x.yaml:14:17: error[BT203]: MoveRobot.Goal has no field 'distnace'``"""
+        return f"{self.place}: {self.severity}[{self.code}]: {fit(self.message, 250)}"
+
     def __str__(self) -> str:
         return self.text()
 
     def text(self, width: int = 200) -> str:
         """As a compiler prints it; the source line is cut to `width` columns."""
-        lines = [f"{self.place}: {self.severity}[{self.code}]: {fit(self.message, 250)}"]
+        lines = [self.headline()]
         if self.source_line is not None:
             lines += _excerpt(self, width)
         if self.hint:
