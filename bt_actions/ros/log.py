@@ -20,7 +20,7 @@ from functools import partial
 from rclpy.logging import get_logger
 
 from bt_actions.traffic.backend import LEVELS
-from bt_actions.utilities.plain_text import clean_lines
+from bt_actions.utilities.plain_text import clean, clean_lines
 from bt_actions.utilities.shorten import fit
 
 MOST = 10_000
@@ -60,9 +60,9 @@ class Log:
         self._logger.addHandler(_StandardError())
         self._logger.setLevel(logging.INFO)
         self._logger.propagate = False  # others' handlers may be added to this one
-        self.info = lambda text: self._put(self._logger.info, fit(text, LINE))
-        self.warning = lambda text: self._put(self._logger.warning, fit(text, LINE))
-        self.error = lambda text: self._put(self._logger.error, fit(text, LINE))
+        self.info = lambda text: self._put(self._logger.info, clean(fit(text, LINE)))
+        self.warning = lambda text: self._put(self._logger.warning, clean(fit(text, LINE)))
+        self.error = lambda text: self._put(self._logger.error, clean(fit(text, LINE)))
         self._begin()
         atexit.register(self.flush)
         os.register_at_fork(after_in_child=self._begin)  # what waits is the parent's to write

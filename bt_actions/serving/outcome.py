@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
+from bt_actions.utilities.plain_text import clean
 
 __all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]
 
@@ -109,7 +110,7 @@ def outcome_of(
     if succeeded:
         pass
     elif error is not None:
-        code, lines = Code.EXCEPTION, [str(error)]
+        code, lines = Code.EXCEPTION, [clean(str(error))]
     elif ending is not None:
         code, lines = ending.value[0], [ending.value[1]]
     else:

@@ -257,11 +257,12 @@ def test_the_summary_names_path_attempts_outcome_reason_and_place(story: Story) 
 def test_reasons_of_any_length_leave_the_end_of_a_run_with_lines_that_can_be_read(
     story: Story,
 ) -> None:
-    leaf, reason = FakeAction("n" * 400, server=f"/{'s' * 200}"), "the motor is hot; " * 300
+    leaf, reason = FakeAction("n" * 400, server=f"/{'s' * 200}"), "the motor\nis hot; " * 300
     report = told(leaf, *fail(story, leaf, reason), story.finish(Status.FAILURE))
     report.unaccounted = [f"Move on /move_robot, goal 01: {reason}"] * 2
     closing = Closing(Exit.FAILURE, error=reason)
-    assert all(len(line) <= MESSAGE for line in troubles(report, closing))
+    said = troubles(report, closing)
+    assert all(len(line) <= MESSAGE and "\n" not in line for line in said)
     assert report.culprits()[0].row.reason == reason  # type: ignore[union-attr]
     out = io.StringIO()
     view = LineView(report, out)

@@ -100,7 +100,7 @@ def left_open(report: Report, closing: Closing) -> list[str]:
             f"sight, `bt-actions cleanup{which}` cancels it."
         )
     lines += [f"not accounted for: {line}" for line in report.unaccounted]
-    return [fit(line) for line in lines]
+    return [fit(clean(line)) for line in lines]
 
 
 def goal_text(row: Row) -> str:
