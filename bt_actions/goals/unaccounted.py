@@ -20,16 +20,10 @@ class GoalReport:
     fields: str = ""
     """What the goal asks for, in short: ``{distance: 12.0}``."""
 
-    @classmethod
-    def of(cls, goal: Goal, name: str) -> GoalReport:
-        """Return the report of a goal of the leaf called `name`, as the goal stands."""
-        why = f"{goal.reason}{goal.cancel_said}"
-        return cls(name, goal.server, goal.id.hex(), goal.outcome, why, goal.fields)
-
     @property
     def alarm(self) -> str:
-        """Say so in a log, with what to do."""
-        remedy = f"`bt-actions cleanup {self.server}` cancels it once this process has ended"
+        """All of it as one line of a log, with what to do."""
+        remedy = f"once this process has ended, `bt-actions cleanup {self.server}` cancels it"
         return f"not accounted for: {self}; {remedy}"
 
     def __str__(self) -> str:
@@ -37,3 +31,9 @@ class GoalReport:
         asks = f" {self.fields}" if self.fields and self.fields not in self.reason else ""
         why = f": {self.reason}" if self.reason else ""
         return f"{self.name} on {self.server}, goal {self.goal_id}{asks}{why}"
+
+
+def report_of(goal: Goal, name: str) -> GoalReport:
+    """Return the report of a goal of the leaf called `name`, as the goal stands."""
+    why = f"{goal.reason}{goal.cancel_said}"
+    return GoalReport(name, goal.server, goal.id.hex(), goal.outcome, why, goal.fields)

@@ -9,7 +9,7 @@ import atexit
 import contextlib
 
 from bt_actions.goals.policy import End
-from bt_actions.goals.unaccounted import GoalReport
+from bt_actions.goals.unaccounted import report_of
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.signals import ended_by_signals
@@ -43,7 +43,7 @@ def close_process() -> None:
         finally:
             for handle in left:
                 if not handle.is_over and handle.told is not End.UNKNOWN:  # else the log has it
-                    log.error(GoalReport.of(handle.goal, handle.name).alarm)
+                    log.error(report_of(handle.goal, handle.name).alarm)
             host.record.close()
             log.flush()
 

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import State
-from bt_actions.goals.unaccounted import GoalReport
+from bt_actions.goals.unaccounted import GoalReport, report_of
 from bt_actions.traffic.handle import GoalHandle, Run, begun_in
 
 T = TypeVar("T")
@@ -62,7 +62,7 @@ class RunGoals:
     def unaccounted(self) -> list[GoalReport]:
         """Those whose end is UNKNOWN, by now."""
         return [
-            GoalReport.of(handle.goal, handle.name)
+            report_of(handle.goal, handle.name)
             for handle in list(self._handles)
             if handle.goal.end is End.UNKNOWN
             and (handle.goal.outcome is not None or not self.run_goes_on)

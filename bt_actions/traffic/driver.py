@@ -13,7 +13,7 @@ from typing import Any
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
-from bt_actions.goals.unaccounted import GoalReport
+from bt_actions.goals.unaccounted import report_of
 from bt_actions.servers.replies import Told
 from bt_actions.traffic.admission import why_not
 from bt_actions.traffic.handle import Effect, Endpoint, GoalHandle, Standing, wake
@@ -202,9 +202,9 @@ class Driver:
                 back = "its server is back; canceling it, should it still run there"
                 log.warning(f"{handle.name} on {goal.server}, goal {goal.id.hex()}: {back}")
             else:
-                log.error(GoalReport.of(goal, handle.name).alarm)
+                log.error(report_of(goal, handle.name).alarm)
         elif told is End.UNKNOWN is not handle.told:
-            log.info(f"accounted for at last: {GoalReport.of(goal, handle.name)}")
+            log.info(f"accounted for at last: {report_of(goal, handle.name)}")
         if handle.begun_in is not None:
             handle.begun_in.tell(handle)
         self._host.notify_all()
