@@ -20,11 +20,12 @@ from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.messages.conversion import MessageError, fill
+from bt_actions.messages.fields import fields_in_words
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.drain import drain
 from bt_actions.utilities.places import root_of
-from bt_actions.utilities.shorten import shorten, shorten_fields
+from bt_actions.utilities.shorten import shorten
 
 if TYPE_CHECKING:
     from bt_actions.traffic.endpoint import ActionEndpoint
@@ -306,7 +307,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     def explain(self, outcome: Outcome, result: Any) -> str:
         """Return what to add to the reason of a goal that has not succeeded, or nothing."""
         told = outcome is Outcome.ABORTED and result is not None
-        return f"its result is: {shorten(result)}" if told else ""
+        return f"its result is: {shorten(result, 150)}" if told else ""
 
     # Within
 
@@ -358,7 +359,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self, handle: GoalHandle, outcome: Outcome, reason: str, backend: Backend
     ) -> AttemptRecord:
         goal, begun, ended = handle.goal, handle.begun_at.ros, backend.now().ros
-        goal.message = None  # as large as the user's data
+        goal.forget_message()
         return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:
@@ -377,7 +378,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
         feedback = handle.goal.feedback
         if feedback is not self._shown_feedback[0]:
-            told = f": {shorten_fields(feedback)}" if feedback is not None else ""
+            told = f": {fields_in_words(feedback)}" if feedback is not None else ""
             self._shown_feedback = feedback, told
         state = handle.goal.state.shown.lower().replace("_", " ")
         return f"{state}{tries}{self._shown_feedback[1]}"
