@@ -19,9 +19,9 @@ if _TYPE_CHECKING:
     from bt_actions.behaviours.run_tree import RunTree
     from bt_actions.behaviours.variables import Var
     from bt_actions.document import load_tree
-    from bt_actions.events import GoalReport
     from bt_actions.goals.attempts import AttemptRecord
     from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
+    from bt_actions.goals.unaccounted import GoalReport
     from bt_actions.running.runner import TreeRunner
     from bt_actions.running.telling import TreeError
 
@@ -56,7 +56,7 @@ _PLACES = {
     "document": ["load_tree"],
     "goals.attempts": ["AttemptRecord"],
     "goals.policy": ["Busy", "End", "Outcome", "Retry", "Timeouts"],
-    "events.kinds": ["GoalReport"],
+    "goals.unaccounted": ["GoalReport"],
     "running.telling": ["TreeError"],
     "running.runner": ["TreeRunner"],
 }

@@ -17,7 +17,7 @@ ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
     {"cli"},
     {"serving", "testing"},
-    {"packages", "render", "recovery", "running", "simulation"},
+    {"render", "recovery", "running", "simulation"},
     {"document"},
     {"behaviours"},
     {"wiring"},
@@ -26,7 +26,7 @@ ROOMS = [
     {"messages", "expressions", "servers"},
     {"story"},
     {"events"},
-    {"goals"},
+    {"goals", "packages"},
     {"utilities"},
 ]
 """From above to below: a room imports from the rows below its own, never from beside or above."""

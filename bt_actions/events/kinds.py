@@ -15,6 +15,7 @@ from py_trees.common import Status
 
 from bt_actions.events.snapshot import Value
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.unaccounted import GoalReport
 
 
 class Moment(NamedTuple):
@@ -49,17 +50,6 @@ class Node:
     settings: Mapping[str, Value] = field(default_factory=dict)
     """The policies of the node: `timeouts` in seconds by phase, `attempts`, `expect`, `memory`,
     `constants` by message (``{"feedback": {"status": {"2": "MOVING"}}}``)."""
-
-
-class GoalReport(NamedTuple):
-    """A goal that nobody can account for: it may still be running."""
-
-    name: str
-    """The leaf's."""
-    server: str
-    goal_id: str
-    outcome: Outcome | None
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,6 @@ from bt_actions.behaviours.kinds import action_of, kind
 from bt_actions.render.look import left_out, rows
 from bt_actions.utilities.plain_text import clean
 
-__all__ = ["text"]
-
 
 def text(root: Behaviour, *, encoding: str = "utf-8", depth: int | None = None) -> str:
     """Return `root` as lines of text, in plain ASCII where `encoding` has no box characters.

@@ -8,6 +8,8 @@ from __future__ import annotations
 import atexit
 import contextlib
 
+from bt_actions.goals.policy import End
+from bt_actions.goals.unaccounted import report_of
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.signals import ended_by_signals
@@ -40,8 +42,8 @@ def close_process() -> None:
             drain(host, left, lambda: hurried)
         finally:
             for handle in left:
-                if not handle.is_over:
-                    log.error(f"{handle.goal!r}: the process ends and cannot account for it")
+                if not handle.is_over and handle.told is not End.UNKNOWN:  # else the log has it
+                    log.error(report_of(handle.goal, handle.name).alarm)
             host.record.close()
             log.flush()
 

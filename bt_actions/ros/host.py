@@ -52,7 +52,6 @@ class RosHost:
     wall = staticmethod(time.time)
 
     def domain(self, number: int) -> Domain:
-        """Return what is shared in the ROS domain of this number."""
         with self.lock:
             return self.domains.setdefault(number, Domain())
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from bt_actions.events import FeedbackCame, GoalChanged, GoalReport
+from bt_actions.events import FeedbackCame, GoalChanged
 from bt_actions.events.snapshot import snapshot
 from bt_actions.events.teller import OFTEN, Teller, here
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import State
+from bt_actions.goals.unaccounted import GoalReport, report_of
 from bt_actions.traffic.handle import GoalHandle, Run, begun_in
 
 T = TypeVar("T")
@@ -64,13 +65,7 @@ class RunGoals:
     def unaccounted(self) -> list[GoalReport]:
         """Those whose end is UNKNOWN, by now."""
         return [
-            GoalReport(
-                handle.name,
-                handle.goal.server,
-                handle.goal.id.hex(),
-                handle.goal.outcome,
-                f"{handle.goal.reason}{handle.goal.cancel_said}",
-            )
+            report_of(handle.goal, handle.name)
             for handle in list(self._handles)
             if handle.goal.end is End.UNKNOWN
             and (handle.goal.outcome is not None or not self.run_goes_on)

@@ -23,7 +23,6 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.kinds import action_of, kind
 from bt_actions.behaviours.variables import overhear, overhear_less
 from bt_actions.events import (
-    GoalReport,
     Node,
     NodeChanged,
     NodesAdded,
@@ -34,6 +33,7 @@ from bt_actions.events import (
 from bt_actions.events.snapshot import snapshot
 from bt_actions.events.stream import Stream
 from bt_actions.events.teller import Teller
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.messages.fields import constants
 from bt_actions.traffic.backend import Backend
 

@@ -13,8 +13,7 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
 from bt_actions.story.why import causes
-
-__all__ = ["ENDS", "OUTCOMES", "Code", "Ending", "RunOutcome", "outcome_of"]
+from bt_actions.utilities.plain_text import clean
 
 SEPARATOR = " / "
 """Between the names of a path."""
@@ -49,7 +48,7 @@ ENDS = {
 
 
 class Ending(enum.Enum):
-    """Who ended a run before its time, with the code and the words for it."""
+    """The ways to end a run before its time, with the code and the words of each."""
 
     CANCELED = (Code.CANCELED, "a client canceled it")
     REPLACED = (Code.REPLACED, "a newer goal replaced it")
@@ -60,7 +59,7 @@ class Ending(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class RunOutcome:
-    """What a RunTree goal is answered with; see RunTree.action."""
+    """The answer to a RunTree goal; see RunTree.action."""
 
     code: int
     message: str = ""
@@ -99,7 +98,7 @@ def outcome_of(
     if succeeded:
         pass
     elif error is not None:
-        code, lines = Code.EXCEPTION, [str(error)]
+        code, lines = Code.EXCEPTION, [clean(str(error))]
     elif ending is not None:
         code, lines = ending.value[0], [ending.value[1]]
     else:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
+from bt_actions_interfaces.msg import RunningLeaf
 from py_trees.common import Status
 
 from bt_actions.behaviours.action import ActionBehaviour
@@ -22,19 +23,8 @@ from bt_actions.story.state import OVER, NodeStory, State
 from bt_actions.story.words import doing_text
 from bt_actions.utilities.plain_text import as_json
 
-__all__ = ["Leaf", "Run"]
-
 SHOWN = 3
 """Running leaves that are told of."""
-
-
-class Leaf(NamedTuple):
-    """A leaf that runs; see RunningLeaf.msg."""
-
-    path: str
-    message: str
-    attempt: int
-    attempts: int
 
 
 class Run:
@@ -78,7 +68,7 @@ class Run:
         self._thread.start()
 
     def end(self, ending: Ending, *, abandon: bool = False) -> None:
-        """End it before its time: its goals are canceled and drained. Returns at once.
+        """End the run before its time: its goals are canceled and drained. Returns at once.
 
         With `abandon`, goals that are being drained are waited for no longer.
         """
@@ -87,15 +77,8 @@ class Run:
             if self._runner is not None:
                 self._runner.interrupt(abandon=abandon)
 
-    def pause(self) -> None:
-        """No new goal begins; those that run finish."""
-        self._pause(True)
-
-    def resume(self) -> None:
-        """Go on."""
-        self._pause(False)
-
-    def _pause(self, wanted: bool) -> None:
+    def pause(self, wanted: bool) -> None:
+        """Begin no new goal, or begin goals again; goals that run go on."""
         with self._lock:
             self.paused = wanted
             self.changes += 1
@@ -103,12 +86,12 @@ class Run:
                 (self._runner.pause if wanted else self._runner.resume)()
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait until all is over; whether it is."""
+        """Wait until the run is over, for so many seconds; return whether it is."""
         if self._thread.ident is not None:
             self._thread.join(timeout)
         return not self._thread.is_alive()
 
-    def running(self) -> list[Leaf]:
+    def running(self) -> list[RunningLeaf]:
         """The leaves that run, deepest first; on any thread."""
         with self._lock:
             return [self._leaf(each) for each in self._state.running[:SHOWN]]
@@ -122,12 +105,13 @@ class Run:
                 for each in state.running
             )
 
-    def _leaf(self, story: NodeStory) -> Leaf:
-        path, attempt, of = self._state.path(story.node.id), 0, 0
+    def _leaf(self, story: NodeStory) -> RunningLeaf:
+        path = SEPARATOR.join(self._state.path(story.node.id))
+        told = RunningLeaf(path=path, message=doing_text(story, self._state))
         if self._state.acts(story.node.id):
             action = self._state.action(story.node.id)
-            attempt, of = action.attempt, action.of
-        return Leaf(SEPARATOR.join(path), doing_text(story, self._state), attempt, of)
+            told.attempt, told.attempts = action.attempt, action.of
+        return told
 
     # On the run's thread
 

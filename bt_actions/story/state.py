@@ -33,6 +33,7 @@ from bt_actions.events.kinds import (
 )
 from bt_actions.events.snapshot import Value
 from bt_actions.goals.policy import End
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.story.actions import ActionStory, GoalStory
 from bt_actions.utilities.places import told_apart
 
@@ -360,19 +361,19 @@ class State:
         """A line for each goal whose end is not known, now that nothing more is waited for."""
         last = {key: goal.latest for action in self.actions for key, goal in action.goals.items()}
         told = self.finished.unaccounted if self.finished is not None else ()
-        lines = {
-            goal.goal_id: f"{goal.name} on {goal.server}, goal {goal.goal_id}"
-            + (f": {goal.reason}" if goal.reason else "")
+        goals = {
+            goal.goal_id: goal
             for goal in told
             if goal.goal_id not in last or last[goal.goal_id].end in (None, End.UNKNOWN)
         }
         for action in self.actions if self.left else ():
-            where = f"{self.called(action.node.id)} on {action.server}, goal"
-            for each in action.given_up:
-                lines.setdefault(each.goal_id, f"{where} {each.goal_id}: {each.reason}")
-            for goal_id, state in action.live.items():
-                lines.setdefault(goal_id, f"{where} {goal_id}, {state.lower()} when left")
-        return list(lines.values())
+            left = {each.goal_id: each.reason for each in action.given_up}
+            left |= {key: f"{state.lower()} when left" for key, state in action.live.items()}
+            for key, reason in left.items():
+                name = self.called(action.node.id)
+                report = GoalReport(name, action.server, key, action.outcome, reason)
+                goals.setdefault(key, report)
+        return [str(goal) for goal in goals.values()]
 
     @property
     def failures(self) -> list[Failure]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
+from bt_actions.utilities.shorten import MESSAGE
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
@@ -15,7 +16,7 @@ def table(
     actions: Iterable[ActionStory],
     names: Callable[[ActionStory], str],
     now: float,
-    width: int | None = None,
+    width: int = MESSAGE,
 ) -> list[str]:
     """Return actions as lines under a head, each as it stands at `now` on the steady clock.
 
@@ -57,14 +58,13 @@ def verdict(action: ActionStory) -> str:
     return f"{action.outcome}{told}{', late' if late else ''}{some}"
 
 
-def _columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
+def _columns(body: list[tuple[str, str, str, str, str]], width: int = MESSAGE) -> list[str]:
     """Return name, server, tries, verdict and duration of actions as lines, under a head."""
     head = ("action", "server", "attempts", "outcome", "duration")
     widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
-    if width is not None:
-        for column in (1, 0):  # the server first: it is often a long name
-            excess = sum(widths) + 2 * (len(widths) - 1) - width
-            widths[column] -= max(0, min(excess, widths[column] - 8))
+    for column in (1, 0):  # the server first: it is often a long name
+        excess = sum(widths) + 2 * (len(widths) - 1) - width
+        widths[column] -= max(0, min(excess, widths[column] - 8))
     right = {2, 4}
     return [
         "  ".join(

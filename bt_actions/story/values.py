@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 from bt_actions.events.snapshot import Cut, Value
 from bt_actions.story.actions import ActionStory
-from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.shorten import fit, shorten
 
 Constants = Mapping[str, Value]
 """By field the names of numbers."""
-LONG = 300
+LONG = 200
 """Characters of a value; longer ones are cut."""
 
 
 def brief(value: object) -> str:
     """Return a value as people read it, short however large it is; a text without quotes."""
-    if not isinstance(value, str):
-        return shorten(value, LONG)
-    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
+    return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
 
 
 def feedback_text(action: ActionStory) -> str:
@@ -42,9 +39,11 @@ def fields_text(message: Value, constants: Constants, most: int = 4) -> str:
         if isinstance(value, Cut) and isinstance(value.head, str):
             value = f"{value.head}…"
         if isinstance(value, float):
-            parts.append(f"{field} {value:.2f}" if math.isfinite(value) else f"{field} {value}")
-        elif isinstance(value, bool | str):
-            parts.append(f"{field} {brief(value)}")
+            parts.append(f"{field} {value:.2f}")
+        elif isinstance(value, str):
+            parts.append(f"{field} {fit(value, 80)}")
+        elif isinstance(value, bool):
+            parts.append(f"{field} {str(value).lower()}")
         elif isinstance(value, int):
             parts.append(f"{field} {named(constants, field, value)}")
     return ", ".join(parts[:most])

@@ -10,13 +10,13 @@ import time
 from collections.abc import Iterator
 
 from bt_actions.events.kinds import Node, RoundBegan
-from bt_actions.goals.policy import Outcome
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory, GoalStory
 from bt_actions.story.state import Failure, NodeStory, State
 from bt_actions.story.values import brief, feedback_text, opened
 from bt_actions.story.waiting import due_of
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.shorten import fit, shorten
 
 LINES = 12
 """Of one story in a terminal."""
@@ -53,7 +53,7 @@ def why(state: State, now: float | None = None) -> list[str]:
             lines.append(f"and {len(causes) - number} more failed")
             break
         lines += cause
-    return lines + dealt
+    return [fit(line) for line in lines + dealt]
 
 
 def causes(state: State) -> list[str]:
@@ -139,8 +139,8 @@ def attempt_text(action: ActionStory, goal: GoalStory) -> str:
             f"{name} is {shorten(value, LONG)}" for name, value in verdict.seen.items()
         )
         why_not = f"expected {verdict.expect}{f', and {seen}' if seen else ''}"
-    else:
-        why_not = goal.reason
+    else:  # of an end that is not known the run tells at its end
+        why_not = "" if goal.latest.end is End.UNKNOWN else goal.reason
     told = f"{goal.outcome}: {why_not}" if why_not else f"{goal.outcome}"
     sent = shorten(opened(goal.goal), LONG) if goal.goal is not None else ""
     if sent and "goal {" not in told:

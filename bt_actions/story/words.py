@@ -16,6 +16,8 @@ from bt_actions.story.table import table
 from bt_actions.story.values import brief, constants_of, feedback_text, named
 from bt_actions.story.why import why
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import MESSAGE, fit
+from bt_actions.utilities.suggest import listing
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -36,10 +38,9 @@ MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
 MANY = 20
 """Items of a list that is shown whole."""
-CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
 
 
-def last_words(state: State, width: int | None = None) -> list[str]:
+def last_words(state: State, width: int = MESSAGE) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     ended = state.ended or _NOTHING
     lines = ["", *action_table(state, width)] if state.actions else []
@@ -54,23 +55,31 @@ def last_words(state: State, width: int | None = None) -> list[str]:
     return [*lines, *(["", *wrong] if wrong else [])]
 
 
-def action_table(state: State, width: int | None = None) -> list[str]:
+def action_table(state: State, width: int = MESSAGE) -> list[str]:
     """Return the table of the actions of a run."""
     return table(state.actions, lambda each: state.called(each.node.id), state.latest, width)
 
 
 def troubles(state: State) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
-    ended = state.ended or _NOTHING
     warned = [f"{' / '.join(each.path)}: {each.message}" for each in state.warnings]
-    lines = [f"warning: {clean(line)}" for line in warned] + why(state)
-    if state.servers_gone and not ended.world:
-        lines.append(stood_still(state))
-    lines += [line for line in (ended.complaint, error_text(state)) if line]
-    if ended.unaccounted and not ended.world:  # of a simulation, which ends with us
-        lines.append(CLEAN_UP)
+    warnings = [fit(f"warning: {clean(line)}") for line in warned]
+    return [*warnings, *why(state), *left_open(state)]
+
+
+def left_open(state: State) -> list[str]:
+    """Return what went wrong beside the tree, and what is not known, the gravest last."""
+    ended = state.ended or _NOTHING
+    lines = [line for line in (ended.complaint, error_text(state)) if line]
+    left = {each.server for each in state.actions if each.left_at_server or each.live}
+    if left and not ended.world:  # of a simulation, which ends with us
+        which = " ".join(["", *sorted(left)]) if len(left) <= MOST else ""
+        lines.append(
+            "A goal may still run, or run on where its server only stood still: once that is in "
+            f"sight, `bt-actions cleanup{which}` cancels it."
+        )
     lines += [f"not accounted for: {line}" for line in ended.unaccounted]
-    return lines
+    return [fit(clean(line)) for line in lines]
 
 
 def error_text(state: State) -> str:
@@ -78,15 +87,6 @@ def error_text(state: State) -> str:
     if state.finished is not None and (state.finished.error or state.failures):
         return state.finished.error
     return state.ended.error if state.ended is not None else ""
-
-
-def stood_still(state: State) -> str:
-    """Say what to do about servers that went away with a goal."""
-    servers = " ".join(sorted({each.server for each in state.actions if each.left_at_server}))
-    return (
-        "A server that only stood still, or was cut off, may go on with its goal; once it is back,"
-        f" `bt-actions cleanup {servers}` cancels that."
-    )
 
 
 def goal_text(action: ActionStory) -> str:
@@ -102,9 +102,9 @@ def goal_text(action: ActionStory) -> str:
         }
         return f"{words.get(action.state, action.state.lower())} {action.server}{attempt}"
     text = f"{action.outcome}{attempt}"
-    if action.end is End.UNKNOWN:
-        text += ", end not known" if not action.live else ", end not known yet"
-    elif action.in_doubt:
+    if action.end is End.UNKNOWN:  # why, is told of the goal
+        return f"{text}, end not known{' yet' if action.live else ''}"
+    if action.in_doubt:
         text += ", not started as far as its server knows"
     elif action.end is not None and action.end is not _USUAL_ENDS.get(action.outcome):
         text += f", ended {action.end}"
@@ -151,8 +151,7 @@ def waiting_text(state: State) -> str:
 
 
 def _where(state: State, actions: list[ActionStory]) -> str:
-    which = ", ".join(f"{state.called(each.node.id)} on {each.server}" for each in actions[:MOST])
-    return f"{which} and {len(actions) - MOST} more" if len(actions) > MOST else which
+    return listing([f"{state.called(each.node.id)} on {each.server}" for each in actions], MOST)
 
 
 def result_lines(action: ActionStory) -> list[str]:

@@ -19,8 +19,9 @@ from bt_actions.testing.network import VirtualNetwork
 from bt_actions.utilities.stepping import Done, Sleep
 
 if TYPE_CHECKING:
-    from bt_actions.events import Event, GoalReport, Observer
+    from bt_actions.events import Event, Observer
     from bt_actions.goals.policy import Outcome
+    from bt_actions.goals.unaccounted import GoalReport
 
 LONGEST = 3600.0
 """Virtual seconds that a run may take where nothing else is said."""

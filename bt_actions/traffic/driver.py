@@ -13,6 +13,7 @@ from typing import Any
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
+from bt_actions.goals.unaccounted import report_of
 from bt_actions.servers.replies import Told
 from bt_actions.traffic.admission import why_not
 from bt_actions.traffic.handle import Effect, Endpoint, GoalHandle, Standing, wake
@@ -198,14 +199,12 @@ class Driver:
         told, handle.told = handle.told, None if goal.outcome is None else goal.end
         if handle.told is End.UNKNOWN is not told:
             if told is End.SERVER_GONE:
-                log.warning(
-                    f"{goal!r}: its server is back; canceling it, should it still run there"
-                )
+                back = "its server is back; canceling it, should it still run there"
+                log.warning(f"{handle.name} on {goal.server}, goal {goal.id.hex()}: {back}")
             else:
-                why = f"{goal.reason}{goal.cancel_said}"
-                log.error(f"{goal!r}: not accounted for, it may still be running: {why}")
+                log.error(report_of(goal, handle.name).alarm)
         elif told is End.UNKNOWN is not handle.told:
-            log.info(f"{goal!r}: accounted for at last")
+            log.info(f"accounted for at last: {report_of(goal, handle.name)}")
         if handle.begun_in is not None:
             handle.begun_in.tell(handle)
         self._host.notify_all()

@@ -18,8 +18,9 @@ from bt_actions.cli.driving.drive import Drive
 from bt_actions.cli.driving.signals import SAME_WISH, Signals
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.lines import LineView
-from bt_actions.events import Event, GoalReport
+from bt_actions.events import Event
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.story.state import State
 from tests.cli import fakes
 from tests.cli.fakes import FakeRunner
@@ -252,7 +253,7 @@ def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
     assert (code, run.abandoned) == (Exit.UNKNOWN, True)
     assert run.out.getvalue().splitlines()[-2:] == [
         "not accounted for: Move on move_robot, goal Move-0-1: silent",
-        "not accounted for: Move on move_robot, goal Move-1-1, executing when left",
+        "not accounted for: Move on move_robot, goal Move-1-1: executing when left",
     ]
     assert "  CANCELED, end UNKNOWN  " in run.out.getvalue()
     assert run.out.getvalue().count("Ctrl-C again leaves without waiting") == 1

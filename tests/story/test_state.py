@@ -108,7 +108,7 @@ def test_what_is_left_without_waiting_keeps_its_duration(leaf: FakeNode, story: 
     action = only(state)
     assert (action.duration, action.outcome) == (pytest.approx(7.0), Outcome.CANCELED)
     assert action.end is End.UNKNOWN
-    assert state.unaccounted == ["Move on move_robot, goal Move-1-1, executing when left"]
+    assert state.unaccounted == ["Move on move_robot, goal Move-1-1: executing when left"]
 
 
 def test_late_news_of_an_older_goal_leave_the_newer_one_alone(leaf: FakeNode, story: Story) -> None:

@@ -6,17 +6,20 @@ from typing import Any
 
 import pytest
 from py_trees.common import Status
+from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events import Cut, Event, Moment, RunEnded
 from bt_actions.events.snapshot import snapshot
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.messages.fields import fields_in_words
 from bt_actions.running.telling import describe
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
 from bt_actions.story.table import verdict
 from bt_actions.story.values import constants_of, feedback_text, fields_text
 from bt_actions.story.words import action_table, goal_text, last_words, result_lines
+from bt_actions.utilities.shorten import MESSAGE
 from tests.support.told_trees import FakeAction, FakeNode, Story
 
 NOWHERE = Moment(0, 0.0, 0.0, 0.0)
@@ -194,12 +197,12 @@ def test_long_values_are_shortened_in_words() -> None:
     state = story.told(story.finish(Status.SUCCESS, outputs=outputs))
     assert last_words(state)[1:3] == [
         "many: [7, 7, 7, … 1000000 items]",
-        f"text: {'x' * 299}…",
+        f"text: {'x' * 131} … {'x' * 66}",
     ]
     result = result_lines(ended_with(Fibonacci, Fibonacci.Result(sequence=LARGE)))
     assert result == ["  sequence:", "  - 7", "  - 7", "  - 7", "  - … 1000000 items"]
     message = snapshot(MoveRobot.Result(message="x" * 1_000_000))
-    assert fields_text(message, {}).endswith(f", message {'x' * 299}…")
+    assert fields_text(message, {}).endswith(f", message {'x' * 51} … {'x' * 25}…")
 
 
 def test_an_output_of_plain_data_is_told_as_it_is_written() -> None:
@@ -216,3 +219,19 @@ def test_an_output_of_plain_data_is_told_as_it_is_written() -> None:
 
 def test_without_a_result_there_are_no_lines(leaf: FakeNode, story: Story) -> None:
     assert result_lines(action_of(story, story.goal(leaf, "DONE", outcome=Outcome.ABORTED))) == []
+
+
+def test_reasons_of_any_length_leave_the_end_of_a_run_with_lines_that_can_be_read() -> None:
+    leaf, reason = FakeAction("n" * 400, server=f"/{'s' * 200}"), "the motor\nis hot; " * 300
+    story = Story(leaf)
+    ended = {"unaccounted": (f"Move on /move_robot, goal 01: {reason}",) * 2, "error": reason}
+    state = story.told(*story.fail(leaf, reason), story.finish(Status.FAILURE))
+    said = words(state, 1, **ended)
+    assert all(len(line) <= MESSAGE and "\n" not in line for line in said), said
+    assert state.failures[0].action.reason == reason  # type: ignore[union-attr]
+
+
+def test_a_ros_message_in_words_shows_constants_by_name() -> None:
+    """What a leaf's `feedback_message` says; of an event `fields_text` says the same."""
+    result = MoveRobot.Result(final_pose=2.0, status=MoveRobot.Result.STATUS_FAULT, message="hot")
+    assert fields_in_words(result) == "final_pose 2.00, status FAULT, message hot"

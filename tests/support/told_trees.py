@@ -12,7 +12,6 @@ from bt_actions.events import (
     Event,
     FeedbackCame,
     GoalChanged,
-    GoalReport,
     Moment,
     Node,
     NodeChanged,
@@ -23,6 +22,7 @@ from bt_actions.events import (
     Value,
 )
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.story.state import State
 from tests.support.stories import state_of
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from bt_actions.cli.arguments.options import add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.arguments.values import goal_fields, nested
-from bt_actions.cli.exits import BadInput
+from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.results import keep_results_apart
 from bt_actions.cli.streams.writing import note
 
@@ -69,18 +69,22 @@ def run(args: argparse.Namespace) -> int:
 
     from bt_actions.cli.driving.session import Session
     from bt_actions.cli.views.lines import QuietView
-    from bt_actions.cli.views.served_run import CallJsonView, CallView, Rejected
+    from bt_actions.cli.views.served_run import CallJsonView, CallView, rejection
+    from bt_actions.goals.policy import Outcome
 
-    rejection = Rejected(leaf, goal_name)
+    def judge(code: Exit) -> tuple[Exit, str]:
+        rejected = code is Exit.FAILURE and leaf.outcome is Outcome.REJECTED
+        return rejection(goal_name) if rejected else (code, "")
+
     with Session(leaf, namespace=args.namespace, name=name) as session:
         view: View = CallView(session.state, sys.stdout, feedback=True)
         if args.json:
             view = session.json_view(CallJsonView)
         elif args.quiet:
             view = QuietView(session.state, sys.stdout)
-        code = session.run(view, timeout=args.timeout, judge=rejection.judge)
+        code = session.run(view, timeout=args.timeout, judge=judge)
     ended = session.state.ended
-    if ended is not None and ended.error and rejection.happened:
+    if ended is not None and ended.error and leaf.outcome is Outcome.REJECTED:
         note(f"bt-actions call: {ended.error}")
     return code
 

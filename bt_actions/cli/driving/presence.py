@@ -69,10 +69,11 @@ class Presence:
         if failed:
             self._rosout.say("error", f"{name}: {failed}")
         word = state.status.value if state.status is not Status.INVALID else "STOPPED"
-        unaccounted = [f"{goal.name} on {goal.server}" for goal in self._runner.unaccounted]
+        unaccounted = self._runner.unaccounted
+        for goal in unaccounted:
+            self._rosout.say("error", f"{name}: not accounted for: {goal}")
         text = f"{name} ends: {word} after {state.elapsed:.2f} s"
         text += ", left without waiting for its goals" if left else ""
-        text += f"; not accounted for: {', '.join(unaccounted)}" if unaccounted else ""
         wrong = left or unaccounted or failed or state.status is Status.FAILURE
         self._rosout.say("error" if wrong else "info", text)
         self._rosout.close()

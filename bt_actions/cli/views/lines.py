@@ -21,6 +21,7 @@ from bt_actions.story.actions import DONE
 from bt_actions.story.state import OVER, State
 from bt_actions.story.words import goal_text, last_words, stopping_text, troubles
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import fit
 
 LASTING = 1.0
 """Seconds after which a goal that still waits, or is still being canceled, gets a line."""
@@ -137,7 +138,7 @@ class LineView:
         self._write(f"{max(0.0, at - self._state.started):8.2f} s  {what:<8} {clean(text)}")
 
     def _write(self, line: str) -> None:
-        self._out.write(f"{line}\n")
+        self._out.write(f"{fit(line)}\n")
         self._out.flush()
 
 

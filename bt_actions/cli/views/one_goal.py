@@ -9,14 +9,8 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
 from bt_actions.story.values import feedback_text
-from bt_actions.story.words import (
-    CLEAN_UP,
-    error_text,
-    goal_text,
-    result_lines,
-    stood_still,
-    stopping_text,
-)
+from bt_actions.story.words import goal_text, left_open, result_lines, stopping_text
+from bt_actions.utilities.shorten import fit
 
 
 class GoalView:
@@ -67,17 +61,13 @@ class GoalView:
             for line in self.result_lines(action):
                 self._line(line)
         for action in state.actions:
+            if action.latest is not None:
+                action.reason = action.latest.latest.reason  # the result was told above
             if ended.cause and action.outcome is Outcome.CANCELED:
                 action.reason = ended.cause  # here is no tree that could have interrupted it
             self._line(f"{goal_text(action)}, after {action.seconds(state.latest):.2f} s")
-        if error := error_text(state):
-            self._line(error)
-        if state.servers_gone:
-            self._line(stood_still(state))
-        if ended.unaccounted:
-            self._line(CLEAN_UP)
-        for line in ended.unaccounted:
-            self._line(f"not accounted for: {line}")
+        for line in left_open(state):
+            self._line(line)
 
     def feedback_text(self, action: ActionStory) -> str:
         """Return the latest feedback on one line."""
@@ -105,5 +95,5 @@ class GoalView:
     def _line(self, text: str) -> None:
         start = "\r\x1b[K" if self._drawn else ""
         self._drawn = False
-        self._out.write(f"{start}{text}\n" if text else start)
+        self._out.write(f"{start}{fit(text)}\n" if text else start)
         self._out.flush()

@@ -3,59 +3,31 @@
 from __future__ import annotations
 
 import json
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.json_lines import JsonView, action_data, plain
 from bt_actions.cli.views.one_goal import GoalView
-from bt_actions.events import Node
+from bt_actions.events import Node, Value
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.table import table
 from bt_actions.story.values import brief, opened
 from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
 
-if TYPE_CHECKING:
-    from bt_actions.behaviours.run_tree import RunTree
-    from bt_actions.events import Value
-
 _NOT_NOW = ("BUSY", "INACTIVE")
 """Codes of rejections that say nothing against the tree or its inputs."""
 
 
-class Rejected:
-    """Why the server rejected the goal, if it did; asked once, when somebody wants to know."""
+def rejection(goal_name: str) -> tuple[Exit, str]:
+    """Ask why the server rejected a goal: whether what was asked for is wrong, and in words."""
+    from bt_actions.serving.client import why_rejected
 
-    def __init__(self, leaf: RunTree, goal_name: str) -> None:
-        self._leaf = leaf
-        self._goal_name = goal_name
-
-    @property
-    def happened(self) -> bool:
-        """Whether it did."""
-        from bt_actions.goals.policy import Outcome
-
-        return self._leaf.outcome is Outcome.REJECTED
-
-    @cached_property
-    def _why(self) -> tuple[str, str] | None:
-        from bt_actions.serving.asking import why_rejected
-
-        why = why_rejected(self._goal_name)
-        return None if why is None else (clean(why.code), clean(why.message))
-
-    @property
-    def text(self) -> str:
-        """Code and reason."""
-        return ": ".join(self._why or ("the server rejected the goal", "why is in its log"))
-
-    def judge(self, code: Exit) -> tuple[Exit, str]:
-        """Return the exit code, and what is wrong with what was asked for, or ""."""
-        if code is not Exit.FAILURE or not self.happened:
-            return code, ""
-        wrong = self._why is not None and self._why[0] not in _NOT_NOW
-        return Exit.BAD_INPUT if wrong else Exit.FAILURE, self.text
+    why = why_rejected(goal_name)
+    if why is None:
+        return Exit.FAILURE, "the server rejected the goal: why is in its log"
+    code = Exit.FAILURE if why.code in _NOT_NOW else Exit.BAD_INPUT
+    return code, clean(f"{why.code}: {why.message}")
 
 
 class CallView(GoalView):

@@ -5,10 +5,9 @@ A view only writes; it decides nothing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from bt_actions.events import Event
+from bt_actions.events import Event
 
 
 class View(Protocol):

@@ -14,8 +14,6 @@ from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.variables import write
 
-__all__ = ["Scope"]
-
 _ODD = re.compile(r"[^A-Za-z0-9_]")
 _LOADS = "/bt/loads"
 """The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""
