@@ -28,7 +28,7 @@ from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:
     from bt_actions.traffic.endpoint import ActionEndpoint
-    from bt_actions.traffic.handle import GoalHandle
+    from bt_actions.traffic.state import GoalHandle
 
 
 _PLAIN = {bool, int, float, str}

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.terms import State
-from bt_actions.traffic.handle import GoalHandle, Run, begun_in
+from bt_actions.traffic.state import GoalHandle, Run, begun_in
 
 T = TypeVar("T")
 

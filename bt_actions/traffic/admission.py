@@ -8,7 +8,7 @@ from __future__ import annotations
 from bt_actions.goals.policy import Busy, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.servers.presence import Server
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.state import GoalHandle
 from bt_actions.traffic.watcher import BESIDE
 
 IN_FLIGHT = 8

@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterable
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.terms import Event, State
-from bt_actions.traffic.handle import GoalHandle
-from bt_actions.traffic.host import Host
+from bt_actions.traffic.state import GoalHandle, Host
 from bt_actions.utilities.stepping import Done, Sleep
 
 JUST_PAST = 0.1

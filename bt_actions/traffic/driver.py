@@ -15,8 +15,7 @@ from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
 from bt_actions.servers.replies import Told
 from bt_actions.traffic.admission import why_not
-from bt_actions.traffic.handle import Effect, Endpoint, GoalHandle, Standing, wake
-from bt_actions.traffic.host import Entry, Host
+from bt_actions.traffic.state import Effect, Endpoint, Entry, GoalHandle, Host, Standing, wake
 from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
 
 _UNANSWERED = (Outcome.ACCEPT_TIMEOUT, None)

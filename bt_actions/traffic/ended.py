@@ -17,8 +17,7 @@ from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, NEVER, Event
 from bt_actions.servers.presence import GID
-from bt_actions.traffic.handle import Endpoint, GoalHandle
-from bt_actions.traffic.host import Host
+from bt_actions.traffic.state import Endpoint, GoalHandle, Host
 from bt_actions.traffic.transport import GOALS_KEPT, Request
 
 

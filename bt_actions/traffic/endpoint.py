@@ -19,10 +19,9 @@ from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
 from bt_actions.servers.replies import DENIALS
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.handle import Action, GoalHandle, wake
-from bt_actions.traffic.host import Host
 from bt_actions.traffic.predecessors import warn_of_dead
 from bt_actions.traffic.route import Route
+from bt_actions.traffic.state import Action, GoalHandle, Host, wake
 from bt_actions.traffic.transport import ActionTransport, Participant, Request, nobodys, probe
 from bt_actions.traffic.watcher import Watcher
 from bt_actions.utilities.plain_text import raised

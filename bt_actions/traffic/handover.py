@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.traffic.handle import Endpoint
-from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import TOO_NEW
+from bt_actions.traffic.state import Endpoint, Host
 
 LOST_KEPT = 100
 """Goals of one action remembered in case their server, or their request, turns up: the newest."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from bt_actions.goals.ids import author_of
-from bt_actions.traffic.host import Log
+from bt_actions.traffic.state import Log
 
 TOLD_AT_MOST = 10
 """Goals of one action that are named; who left more left them in the same way."""

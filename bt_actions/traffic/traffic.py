@@ -23,8 +23,7 @@ from bt_actions.servers.presence import Server
 from bt_actions.traffic import admission, handover
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Action, Endpoint, GoalHandle, begun_in
-from bt_actions.traffic.host import Host
+from bt_actions.traffic.state import Action, Endpoint, GoalHandle, Host, begun_in
 from bt_actions.traffic.transport import Participant
 from bt_actions.utilities.plain_text import in_words
 

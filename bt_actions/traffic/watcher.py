@@ -11,9 +11,8 @@ import contextlib
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import handover
-from bt_actions.traffic.handle import Endpoint, wake
-from bt_actions.traffic.host import Host
 from bt_actions.traffic.route import TOO_NEW, Route
+from bt_actions.traffic.state import Endpoint, Host, wake
 
 LOOK_WHILE_WAITING = 0.05
 LOOK_WHILE_RUNNING = 0.2

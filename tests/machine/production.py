@@ -1,6 +1,6 @@
 """Leaves, and the production traffic beneath them, in a model world.
 
-A model is what lies around it, as traffic/transport.py and traffic/host.py have it: transports,
+A model is what lies around it, as traffic/transport.py and traffic/state.py have it: transports,
 participants and the host. Of traffic/ itself nothing is copied, and nothing replaced. Each step of
 a goal is shown to the judge, by the host's trace.
 """
@@ -19,11 +19,10 @@ from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import Command, Event, Now, State
 from bt_actions.servers.reachability import Reachability
 from bt_actions.servers.stalls import IN_A_ROW, Stalls
-from bt_actions.traffic import handle as traffic
+from bt_actions.traffic import state as traffic
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Domain
-from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduler
+from bt_actions.traffic.state import Domain, Record, Trace
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import GOALS_KEPT, Listener
 from tests.machine.judge import Judge, Violation

@@ -27,7 +27,7 @@ from bt_actions.traffic import admission, handover
 from bt_actions.traffic.driver import Driver
 from bt_actions.traffic.ended import EndedGoals
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.state import GoalHandle
 from tests.machine.crowds import CrowdPlay, crowded_history
 from tests.machine.histories import broken, first_broken, random_history, shrink, tell
 

@@ -13,7 +13,7 @@ from bt_actions.goals.policy import End, Outcome, Timeouts
 from bt_actions.goals.terms import Event, Now, State
 from bt_actions.traffic.cancel_queue import Cancels
 from bt_actions.traffic.drain import JUST_PAST, Drain
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.state import GoalHandle
 from bt_actions.utilities.stepping import Done, Sleep
 
 LIMITS = Timeouts(accept=1.0, cancel=2.0)

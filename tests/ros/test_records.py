@@ -13,7 +13,7 @@ from bt_actions.goals.terms import Event
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.host import host as process
 from bt_actions.ros.node_participant import traffic_of
-from bt_actions.traffic.host import Entry
+from bt_actions.traffic.state import Entry
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import started, state
 from tests.support.waiting import until

@@ -27,7 +27,7 @@ from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.ros.action_transport import FEEDBACK_AT_MOST
 from bt_actions.simulation.journal import live_intervals
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import FEEDBACK_KEPT
+from bt_actions.traffic.state import FEEDBACK_KEPT
 from tests.support.accounts import Report, compare
 from tests.support.processes import HostFactory, Journal, Process
 from tests.support.reliability import Record

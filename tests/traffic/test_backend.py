@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
-from bt_actions.traffic.handle import Run, begun_in
+from bt_actions.traffic.state import Run, begun_in
 from bt_actions.wiring import backend_of
 from tests.support.waiting import until
 

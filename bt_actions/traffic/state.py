@@ -1,12 +1,16 @@
-"""A goal on its way, and what it belongs to: its endpoint, its run, its ROS domain.
+"""What there is: a process, its ROS domains, their endpoints, and the goals on their way.
 
-Values, registers, and the protocols by which the parts of traffic/ know each other.
+Each belongs to the one before it, and knows it. They are values and registers, and decide nothing;
+what is done with them stands in the other files of this folder. `Host` is a part of the seam: one a
+process with rclpy (ros/host.py), or one a simulated run (testing/host.py). All that goals share
+beyond their endpoints hangs on it, so that nothing hangs on a module.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -14,11 +18,12 @@ from typing import Any, NamedTuple, Protocol
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
-from bt_actions.goals.terms import NEVER, Event, Now, State
+from bt_actions.goals.terms import NEVER, Command, Event, Now, State
 from bt_actions.servers.presence import Server, ServerWatch
 from bt_actions.servers.replies import Replies, Told
+from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.cancel_queue import Cancels
-from bt_actions.traffic.scheduler import Scheduled
+from bt_actions.traffic.scheduler import Scheduled, Scheduler
 from bt_actions.traffic.transport import ActionTransport, Listener, Participant
 
 FEEDBACK_KEPT = 100
@@ -27,6 +32,120 @@ FEEDBACK_KEPT = 100
 Action = tuple[Any, str]
 """Type and name."""
 _LONG_AGO = Now(NEVER, NEVER)
+
+
+class Log(Protocol):
+    """Takes lines from any thread, and never waits."""
+
+    def info(self, text: str) -> None:
+        """Log at info level."""
+
+    def warning(self, text: str) -> None:
+        """Log at warning level."""
+
+    def error(self, text: str) -> None:
+        """Log at error level."""
+
+    def flush(self) -> None:
+        """Have what was said written, before more is told by other ways; waits a moment at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What is on record of a goal."""
+
+    action: str
+    domain: int
+    """ROS domain id."""
+    servers: frozenset[bytes]
+    """GIDs of the servers that were in sight; none where they are not known."""
+    accept: float = 0.0
+    """Seconds that its server is given to decide; 0: nobody said."""
+    lost: bool = False
+    """They have gone, as far as is known; but they may only stand still."""
+
+
+class Record:
+    """What was sent and is not answered yet, should the process be killed; this one keeps nothing.
+
+    recovery/ledger.py has one that does.
+    """
+
+    def __contains__(self, goal_id: bytes) -> bool:
+        """Whether a goal is on record."""
+        return False
+
+    def enter(self, goal_id: bytes, entry: Entry) -> None:
+        """Put a goal on record that is about to be sent, or what more is known of it."""
+
+    def strike(self, goal_id: bytes) -> None:
+        """Take a goal off the record, if it is there."""
+
+    def close(self) -> None:
+        """Take note that the process ends."""
+
+    def disown(self) -> None:
+        """Let go of it, as the child of a fork: it is the parent's."""
+
+
+class Trace:
+    """Is told of every step of every goal, under the lock; this one takes no note."""
+
+    def tells(self, handle: GoalHandle, event: Event) -> None:
+        """A goal is about to be told what happened."""
+
+    def told(
+        self, handle: GoalHandle, event: Event, detail: Any, commands: tuple[Command, ...]
+    ) -> None:
+        """A goal was told what happened, and returned these commands."""
+
+    def shows_time(self, handle: GoalHandle) -> None:
+        """A goal is about to be shown the time."""
+
+
+class Host(Protocol):
+    """What the goals of a process, or of one simulated run, have in common."""
+
+    @property
+    def lock(self) -> AbstractContextManager[Any]:
+        """The one lock; whoever holds it may take it again. Nothing waits under it."""
+
+    @property
+    def log(self) -> Log:
+        """Where lines go."""
+
+    record: Record
+    """Where a goal is put before it is sent."""
+
+    stalls: Stalls
+    """When this process stood still, and what it may not conclude yet."""
+
+    scheduler: Scheduler
+    """The endpoints with open goals."""
+
+    trace: Trace
+    """Who watches the goals' steps."""
+
+    forks: int
+    """Forks between the first process and this one: what an older one made is not ours."""
+
+    closing: bool
+    """Whether the process ends: a tree that ticks on begins nothing any more."""
+
+    def domain(self, number: int) -> Domain:
+        """Return what is shared in the ROS domain of this number."""
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for a change of any goal, at most so many seconds; the caller holds the lock."""
+
+    def notify_all(self) -> None:
+        """Wake whoever waits, as a goal has changed; the caller holds the lock."""
+
+    def steady(self) -> float:
+        """Return seconds that only ever go forward."""
+
+    def new_goal_id(self) -> bytes:
+        """Return 16 bytes that no goal has had."""
 
 
 class Endpoint(Listener, Scheduled, Protocol):
