@@ -27,8 +27,7 @@ from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.endpoint import ActionEndpoint
-    from bt_actions.traffic.state import GoalHandle
+    from bt_actions.traffic.state import Endpoint, GoalHandle
 
 
 _PLAIN = {bool, int, float, str}
@@ -49,7 +48,7 @@ class Progress:
     """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
 
 
-class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
+class ActionBehaviour(Connected["Endpoint"], Behaviour):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
     While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
@@ -205,7 +204,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.action_type = action
         super().setup(**kwargs)
 
-    def _make(self, backend: Backend) -> ActionEndpoint:
+    def _make(self, backend: Backend) -> Endpoint:
         return backend.traffic.endpoint(self.action_type, self.action_name)
 
     def initialise(self) -> None:

@@ -1,73 +1,34 @@
-"""One action as one node sees it: the shared transport, and the goals on it.
+"""What the world calls of an endpoint: answers come, time passes, another participant looks.
 
-Takes what the servers say, tells the goals, and does what they say. It decides nothing about a goal
-(goals/goal.py), about who is alive (servers/presence.py), about what is believed
-(servers/replies.py), about goals that have ended (ended.py), nor whether one may be sent
-(admission.py). All under the host's lock.
+It takes what servers say, has it weighed (servers/replies.py) and tells the goal (driver.py). It
+decides nothing about a goal, about who is alive (servers/presence.py), nor whether a goal may be
+sent (admission.py). All under the host's lock.
 """
 
 from __future__ import annotations
 
 import contextlib
-import itertools
-from collections.abc import Callable
 from typing import Any
 
-from bt_actions.goals.policy import End
-from bt_actions.goals.terms import STATUS_SUCCEEDED, Event, State
-from bt_actions.servers.presence import PROBES_KEPT, ServerWatch
+from bt_actions.goals.terms import NEVER, STATUS_SUCCEEDED, Event
+from bt_actions.servers.presence import LEASE
+from bt_actions.servers.reachability import TWICE
 from bt_actions.servers.replies import DENIALS
-from bt_actions.traffic.driver import Driver
-from bt_actions.traffic.ended import EndedGoals
+from bt_actions.servers.stalls import ANSWERS_TAKE
+from bt_actions.traffic import cancel_queue, ended, route, watcher
+from bt_actions.traffic.driver import close_if_unused, tell, tell_believed
 from bt_actions.traffic.predecessors import warn_of_dead
-from bt_actions.traffic.route import Route
-from bt_actions.traffic.state import Action, GoalHandle, Host, wake
-from bt_actions.traffic.transport import ActionTransport, Participant, Request, nobodys, probe
-from bt_actions.traffic.watcher import Watcher
-from bt_actions.utilities.plain_text import raised
+from bt_actions.traffic.state import Endpoint, GoalHandle, wake
+from bt_actions.traffic.transport import ActionTransport, Opener, Request, send_probe
+
+LAST_WORD = 0.5
+"""Seconds within which a server that is not busy answers."""
+ON_TRIAL = 0
+"""The number of a trial's probe, of which nobody is told."""
 
 
-class ActionEndpoint:
-    """One action as one node sees it: the shared transport, and the goals on it.
-
-    `tell` tells one goal what happened; `apply_deadlines` what time it is. `observe` reads
-    discovery, `observe_and_tell` tells the goals what that means. `deliver_arrived` takes messages
-    though nobody spins, `probe` asks a server for a sign of life. `run_due` does all of that, as
-    far as it is due, where nobody ticks.
-    """
-
-    def __init__(
-        self,
-        host: Host,
-        participant: Participant,
-        unused: Callable[[ActionEndpoint], None],
-        action: Action,
-    ) -> None:
-        """`unused` is told when there may be neither a user nor an open goal any more."""
-        self._host = host
-        self.participant, self._unused = participant, unused
-        self.domain = host.domain(participant.domain)
-        self.action, self.name = action, action[1]
-        self.users = 0
-        self._forks = host.forks
-        self.goals: dict[bytes, GoalHandle] = {}
-        self.watch = ServerWatch()
-        self.cancels = self.domain.cancels[action]
-        self.orphaned = False
-        self.heard_at = host.steady()
-        self._probes = itertools.count(PROBES_KEPT)
-        self._warned_of: set[str] = set()
-        self._left_by_dead: set[bytes] = set()
-        self._ended = EndedGoals(self, host)
-        self.transport = participant.open_transport(*action, self)
-        route = Route(self, host)
-        self.in_doubt, self.holds_back = route.in_doubt, route.holds_back
-        self.watcher = watcher = Watcher(self, host, route)
-        self.observe, self.observe_and_tell = watcher.observe, watcher.observe_and_tell
-        self.recent_state, self.run_due = watcher.recent_state, watcher.run_due
-        self.driver = driver = Driver(self, host, self._warn_once)
-        self.tell, self.pass_on = driver.tell, driver.pass_on
-        self.apply_deadlines, self.ask_to_cancel = driver.apply_deadlines, driver.ask_to_cancel
+class ActionEndpoint(Endpoint):
+    """An endpoint, with what its transport, the scheduler and rediscovery call."""
 
     def __repr__(self) -> str:
         return f"<ActionEndpoint {self.name}, {len(self.goals)} goals>"
@@ -80,26 +41,27 @@ class ActionEndpoint:
         """Pass on an answer about a goal; see to one that has ended, and may run again."""
         if self.is_parents:
             return
-        now = self.watch.heard_at = self._host.steady()
+        now = self.watch.heard_at = self.host.steady()
         if request == "cancel":
-            self.cancels.answered(goal_id, now)
+            cancel_queue.make_room(self.cancels, goal_id, now)
         handle = self._heard_of(goal_id, denies=answers[-1] in DENIALS)
         if handle is not None:
-            self.pass_on(handle, handle.replies.answered(request, self.watch, now, asked, answers))
+            told = handle.replies.answered(request, self.watch, now, asked, answers)
+            tell_believed(handle, told)
         elif self.watch.probe_answered(now, goal_id):
             wake(self.handles)
         else:
-            self._ended.answered(request, goal_id, asked, answers)
+            ended.take_answer(self, request, goal_id, asked, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
         handle = self.goals.get(goal_id)
         if handle is None:
-            self._ended.runs(goal_id)
+            ended.take_sign_of_life(self, goal_id)
             return
-        now = self.heard_at = self.watch.heard_at = self._host.steady()
+        now = self.heard_at = self.watch.heard_at = self.host.steady()
         handle.replies.spoke(self.watch, now)
-        self.tell(handle, Event.FEEDBACK, feedback)
+        tell(handle, Event.FEEDBACK, feedback)
         if handle.keeps_feedback and handle.goal.outcome is None:
             handle.feedback.append(feedback)
             wake([handle])
@@ -110,16 +72,16 @@ class ActionEndpoint:
         for goal_id, status in statuses.items():
             if goal_id not in self.goals:  # nearly all, of a server that keeps what has ended
                 if 0 < status < STATUS_SUCCEEDED:
-                    self._ended.runs(goal_id)
+                    ended.take_sign_of_life(self, goal_id)
                     running.append(goal_id)
             elif status > 0 and (handle := self._heard_of(goal_id)) is not None:
-                now = self.watch.heard_at = self._host.steady()
-                self.pass_on(handle, handle.replies.shown(self.watch, now, status))
-        warn_of_dead(self.name, running, self._left_by_dead, self._host.log)
+                now = self.watch.heard_at = self.host.steady()
+                tell_believed(handle, handle.replies.shown(self.watch, now, status))
+        warn_of_dead(self.name, running, self.left_by_dead, self.host.log)
 
     def all_delivered(self) -> None:
         """Let go of the transport, if it was kept for what has just been delivered."""
-        self._unused(self)
+        close_if_unused(self)
 
     def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
         """Return the goal that an answer is about; of one of several it counts who is in sight.
@@ -129,88 +91,77 @@ class ActionEndpoint:
         handle = self.goals.get(goal_id)
         if handle is not None:
             if not (denies and self.watch.changed(handle.replies.sent_to)):
-                self.heard_at = self._host.steady()
+                self.heard_at = self.host.steady()
             if len(handle.replies.sent_to) > 1:
-                self.observe()
+                route.glance(self)
         return handle
 
-    # What the goals want
+    # Time passes (scheduler.Scheduled)
 
-    @property
-    def is_parents(self) -> bool:
-        """Whether this was made before a fork, and we are the child: the goals are not ours."""
-        return self._forks != self._host.forks
+    def run_due(self, now: float) -> float:
+        """Look, send and apply deadlines as far as due; return the seconds until there is more."""
+        return watcher.run_due(self, now)
 
-    @property
-    def handles(self) -> list[GoalHandle]:
-        """Those of the goals that are here now."""
-        return list(self.goals.values())
+    # Another participant looks (transport.Seeker)
 
-    @property
-    def has_unsent(self) -> bool:
-        """Whether a goal is still to be sent."""
-        return any(not handle.goal.sent for handle in self.handles)
+    def misses(self) -> bool:
+        """Whether a server is wanted, and is not in sight, or does not answer, by now."""
+        return route.misses(self)
 
-    def probe(self) -> None:
-        """Ask the server just in order to be answered."""
-        number, now = next(self._probes), self._host.steady()
-        self.watch.probe_sent(now, nobodys(number))
-        self.transport.forget(nobodys(number - PROBES_KEPT))
-        with contextlib.suppress(Exception):  # the next look finds out why it cannot be sent
-            probe(self.transport, number, now)
+    def try_in(self, participant: Opener) -> ActionTransport:
+        """Return a transport like our own in another participant, on trial."""
+        now = self.host.steady()
+        transport = participant.open_transport(*self.action, self)
+        transport.on_trial = True
+        if not route.is_absent(self, now):
+            self.transport.reachability.tried(now)
+            transport.reachability.doubt(now, TWICE)
+            self.compared_at = NEVER
+        return transport
 
-    def deliver_arrived(self) -> None:
-        """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
-        if self.is_parents:
+    def try_and_compare(self, transport: ActionTransport) -> bool:
+        """Ask in this one, which is ready; whether it is heard where our own is not, or sees more.
+
+        A server that answers nobody is busy; one that has just answered this one would answer our
+        own as well, if it heard it.
+        """
+        now = self.host.steady()
+        if route.is_absent(self, now):
+            return True
+        if not route.is_unresponsive(self, now):
+            return False
+        transport.deliver_arrived()
+        if not transport.reachability.heard:
+            if transport.reachability.take_question(now):
+                with contextlib.suppress(Exception):
+                    send_probe(transport, ON_TRIAL, now)
+            return False
+        if self.compared_at == NEVER:
+            self.compared_at = now
+            route.probe(self)
+        return now - self.compared_at >= LAST_WORD
+
+    def move_to(self, transport: ActionTransport) -> None:
+        """Use a transport in a participant that sees the server; nobody spins that.
+
+        What is under way in the old one is not heard there. A question for a result, or a cancel,
+        is asked anew; of a goal request nobody knows whether it has arrived.
+        """
+        now, log = self.host.steady(), self.host.log
+        blind, seen = route.is_absent(self, now), self.watch.gids
+        route.deliver_arrived(self)
+        if self.transport.closed:  # by what came, and nobody used the endpoint
+            transport.close()
             return
-        try:
-            self.transport.deliver_arrived()
-        except Exception as error:  # noqa: BLE001 - the middleware's: any
-            self._warn_once("something that arrived could not be taken", error)
-        self.cancels.send_more(self._host.steady())
-
-    def _warn_once(self, what: str, error: Exception) -> None:
-        if what not in self._warned_of:
-            self._warned_of.add(what)
-            self._host.log.error(f"{self.name}: {what}: {raised(error)}")
-
-    # Which goals are here, and how the server is reached
-
-    def take_in(self, handle: GoalHandle) -> None:
-        """See to this goal from now on; it may have been another's."""
-        if handle.endpoint is not self:
-            handle.endpoint = self
-            handle.replies.taken_over()
-        self.goals[handle.goal.id] = handle
-        if not handle.goal.claims_resources:
-            self.domain.left[handle] = None
-        self.domain.open[self] = None
-        if not handle.goal.sent:
-            self.domain.unsent[handle] = None
-        self._host.scheduler.add(self)
-
-    def retire(self, handle: GoalHandle) -> None:
-        """See to this goal no more; without any goal, to the server neither."""
-        goal = handle.goal
-        if self.goals.get(goal.id) is handle:  # and not what has turned up again
-            del self.goals[goal.id]
-            if handle.endpoint is self:  # and not another's by now
-                self.domain.left.pop(handle, None)
-            self.transport.forget(goal.id)
-            if goal.end is End.UNKNOWN:
-                self.cancels.send_now(goal.id)  # nobody will ask again
-            self.cancels.forget(goal.id)
-            if goal.sent and goal.state is State.DONE:
-                self._ended.keep(handle)
-        if not self.goals:
-            self.domain.open.pop(self, None)
-            self._host.scheduler.remove(self)
-            self.watcher.rest()
-            self._unused(self)
-
-    def replace_transport(self, transport: ActionTransport) -> None:
-        """Use another transport, of which nothing is known yet."""
-        self.transport.close()
-        self.transport, self.watch = transport, ServerWatch()
-        self.watcher.begin_anew()
-        self._host.scheduler.wake_by(self._host.steady())
+        transport.on_trial = False
+        self.elsewhere = True
+        route.replace_transport(self, transport)
+        if blind:
+            log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
+            return
+        log.info(f"{self.name}: does not hear this node any more; a new one is heard")
+        for handle in self.handles:
+            if handle.replies.sent_to & seen:  # it may be shown later than another of its name
+                handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
+            handle.goal.deadlines.suspend(ANSWERS_TAKE, self.participant.now())
+            tell(handle, Event.SERVER_CHANGED)

@@ -8,6 +8,8 @@ beyond their endpoints hangs on it, so that nothing hangs on a module.
 
 from __future__ import annotations
 
+import itertools
+import weakref
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
@@ -16,15 +18,15 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from bt_actions.goals.goal import Goal
-from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.policy import Busy, End, Outcome, Timeouts
 from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import NEVER, Command, Event, Now, State
-from bt_actions.servers.presence import Server, ServerWatch
-from bt_actions.servers.replies import Replies, Told
+from bt_actions.servers.presence import GID, PROBES_KEPT, Server, ServerWatch
+from bt_actions.servers.replies import Replies
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic.cancel_queue import Cancels
 from bt_actions.traffic.scheduler import Scheduled, Scheduler
-from bt_actions.traffic.transport import ActionTransport, Listener, Participant
+from bt_actions.traffic.transport import Listener, Participant, Seeker
+from bt_actions.utilities.plain_text import raised
 
 FEEDBACK_KEPT = 100
 """Feedback messages kept for a leaf that reads them and is not ticked; older ones are dropped."""
@@ -148,76 +150,83 @@ class Host(Protocol):
         """Return 16 bytes that no goal has had."""
 
 
-class Endpoint(Listener, Scheduled, Protocol):
-    """One action as one node sees it (ActionEndpoint), as its parts and its neighbors know it."""
+class Endpoint(Listener, Scheduled, Seeker):
+    """One action as one node sees it: the shared transport, and the goals on it.
 
-    participant: Participant
-    domain: Domain
-    name: str
-    action: Action
-    users: int
-    goals: dict[bytes, GoalHandle]
-    watch: ServerWatch
-    transport: ActionTransport
-    cancels: Cancels
-    orphaned: bool
-    """Its node is gone: nobody can want its goals any more."""
-    heard_at: float
-    """When its servers were last heard of."""
+    Each is an ActionEndpoint (endpoint.py), which has what the world calls: the methods of these
+    three protocols.
+    """
+
+    def __init__(
+        self, host: Host, participant: Participant, of_node: dict[str, Endpoint], action: Action
+    ) -> None:
+        """Open the transport; raises what the middleware raises for a wrong name or type."""
+        self.host, self.participant = host, participant
+        self.domain = host.domain(participant.domain)
+        self.of_node = of_node
+        """The endpoints of its node, by name: it takes itself out when it is not used any more."""
+        self.action, self.name = action, action[1]
+        self.users = 0
+        """How many leaves are set up for it."""
+        self.goals: dict[bytes, GoalHandle] = {}
+        self.ended: dict[bytes, Ended] = {}
+        """The newest goals that were DONE here (ended.py)."""
+        self.cancels = self.domain.cancels[action]
+        self.forks = host.forks
+        """Before so many forks it was made."""
+
+        # Its server (watcher.py)
+        self.watch = ServerWatch()
+        self.heard_at = host.steady()
+        """When its servers were last heard of."""
+        self.orphaned = False
+        """Its node is gone: nobody can want its goals any more."""
+        self.look_at = 0.0
+        """When to look at the server again."""
+        self.looked_at, self.looked_like = NEVER, Server.ABSENT
+        """When that was last done and told to the goals, and what was found."""
+        self.counted = 0
+        """How many servers were shown then."""
+        self.held_back = (True, True)
+        """Why nothing was sent then, though a server was in sight: it had just come, as it has in
+        the beginning; `route.holds_back`."""
+        self.left_by_dead: set[bytes] = set()
+        """Goals of dead processes that were named."""
+        self.probes = itertools.count(PROBES_KEPT)
+
+        # The way to it (route.py)
+        self.elsewhere = False
+        """The transport is not in our node's participant: nobody spins it."""
+        self.long_stalls = participant.long_stalls
+        self.compared_at = NEVER
+        """When a server was asked that has answered a transport on trial."""
+        self._warned_of: set[str] = set()
+        self.transport = participant.open_transport(*action, self)
 
     @property
     def is_parents(self) -> bool:
         """Whether this was made before a fork, and we are the child: the goals are not ours."""
+        return self.forks != self.host.forks
 
     @property
     def handles(self) -> list[GoalHandle]:
         """Those of the goals that are here now."""
+        return list(self.goals.values())
 
     @property
     def has_unsent(self) -> bool:
         """Whether a goal is still to be sent."""
+        return any(not handle.goal.sent for handle in self.handles)
 
-    def tell(self, handle: GoalHandle, event: Event, detail: Any = None) -> None:
-        """Tell a goal what happened and do what it says."""
+    def look_soon(self) -> None:
+        """Have the next look at the server taken at once."""
+        self.look_at = 0.0
 
-    def pass_on(self, handle: GoalHandle, told: Told) -> None:
-        """Tell a goal what is believed of what was said of it, or seen."""
-
-    def apply_deadlines(self, handle: GoalHandle) -> None:
-        """Let the goal's deadlines take effect; what fails in it stops nothing."""
-
-    def take_in(self, handle: GoalHandle) -> None:
-        """See to this goal from now on."""
-
-    def retire(self, handle: GoalHandle) -> None:
-        """See to it no more."""
-
-    def deliver_arrived(self) -> None:
-        """Take what has arrived, whether or not somebody spins."""
-
-    def observe_and_tell(self, now: float) -> Server:
-        """Observe the server, tell the goals what that means for them, and return its state."""
-
-    def recent_state(self, now: float) -> Server:
-        """Return the server's state; observe it, where that may have changed."""
-
-    def observe(self) -> None:
-        """Observe who is in sight; what follows is for `observe_and_tell` to say."""
-
-    def ask_to_cancel(self, goal_id: bytes) -> None:
-        """Ask the server to cancel a goal, as soon as its queue has room."""
-
-    def in_doubt(self, now: float) -> float:
-        """Return for how many seconds a server that is silent may not have heard us; or 0."""
-
-    def holds_back(self, now: float) -> bool:
-        """Whether nothing is sent though a server is in sight."""
-
-    def probe(self) -> None:
-        """Ask the server just in order to be answered."""
-
-    def replace_transport(self, transport: ActionTransport) -> None:
-        """Use another transport, of which nothing is known yet."""
+    def warn_once(self, what: str, error: Exception) -> None:
+        """Log, the first time, what could not be done, which is tried again later."""
+        if what not in self._warned_of:
+            self._warned_of.add(what)
+            self.host.log.error(f"{self.name}: {what}: {raised(error)}")
 
 
 @dataclass(eq=False, slots=True)
@@ -245,11 +254,11 @@ class GoalHandle:
     """Its tree is, and it was not sent."""
     held_back_since: float | None = None
     """Since when (steady clock) its deadlines stand still, as it is paused, or not sent though a
-    server is in sight (Route.holds_back)."""
+    server is in sight (route.holds_back)."""
     not_gone_before: float = NEVER
     """Until when (steady clock) its server does not count as gone where it is not shown. It may be
     stopped, and is shown again within LEASE, or not be discovered by a new node, which takes
-    TOO_NEW (handover.adopt, Route.move_to)."""
+    TOO_NEW (handover.adopt, ActionEndpoint.move_to)."""
 
     standing: Standing = field(init=False)
     """How the goal stood after its last step."""
@@ -340,32 +349,37 @@ def wake(handles: Iterable[GoalHandle]) -> None:
             run.tell(None)
 
 
+@dataclass(slots=True)
+class Ended:
+    """What is kept of a goal that is DONE; not the goal itself, which has its result."""
+
+    timeouts: Timeouts
+    resources: frozenset[str]
+    busy: Busy
+    owner: weakref.ref[Any] | None
+    name: str
+    begun_in: Run | None
+    attempt: int
+    accepted: bool
+    servers: frozenset[GID]
+    """Who may have had it."""
+    since: float
+    asked_at: float = NEVER
+    """When it was last asked to be canceled all the same."""
+
+
+@dataclass(slots=True)
+class CancelQueue:
+    """The cancel requests of this process to one server (cancel_queue.py)."""
+
+    waiting: dict[bytes, Endpoint] = field(default_factory=dict)
+    """Whom there is no room for yet, and which endpoint is to ask."""
+    asked: dict[bytes, float] = field(default_factory=dict)
+    """When those were asked for that have no answer since."""
+
+
 Effect = Callable[[GoalHandle], None]
-"""What is done for a goal."""
-
-
-class Effects:
-    """What goals have decided is to be done, in that order; the caller holds the host's lock."""
-
-    def __init__(self) -> None:
-        self._waiting: deque[tuple[Effect, GoalHandle]] = deque()
-        self._runs = False
-
-    def run(self, handle: GoalHandle, effects: Iterable[Effect]) -> None:
-        """Do these for a goal behind what was decided before, and what is meanwhile behind these.
-
-        Where that is under way, whoever has begun it does all.
-        """
-        self._waiting.extend([(effect, handle) for effect in effects])
-        if self._runs:
-            return
-        self._runs = True
-        try:
-            while self._waiting:
-                effect, whose = self._waiting.popleft()
-                effect(whose)
-        finally:
-            self._runs = False
+"""What is done for a goal (driver.py)."""
 
 
 class Domain:
@@ -373,11 +387,13 @@ class Domain:
 
     def __init__(self) -> None:
         self.resources: Resources[GoalHandle] = Resources()
-        self.effects = Effects()
+        self.effects: deque[tuple[Effect, GoalHandle]] = deque()
+        """What goals have decided is to be done, in that order."""
+        self.does_effects = False
         self.open: dict[Endpoint, None] = {}
         """The endpoints with goals, of all nodes, in the order in which they came."""
         self.unsent: dict[GoalHandle, None] = {}
-        """Goals that are to be sent, and some that were since (Driver drops them)."""
+        """Goals that are to be sent, and some that were since (driver.py drops them)."""
         self.left: dict[GoalHandle, None] = {}
         """Goals of these endpoints that hold no resources any more."""
         self.ever_lost_sight = False
@@ -386,5 +402,4 @@ class Domain:
         """The actions that had a server once."""
         self.lost: dict[Action, list[GoalHandle]] = defaultdict(list)
         """Lost goals whose endpoint is gone: their server may be back for the next one."""
-        self.cancels: dict[Action, Cancels] = defaultdict(Cancels)
-        """The cancel requests of this process."""
+        self.cancels: dict[Action, CancelQueue] = defaultdict(CancelQueue)

@@ -25,7 +25,7 @@ def nobodys(probe: int) -> bytes:
     return b"bt_probe" + probe.to_bytes(8, "big")
 
 
-def probe(transport: ActionTransport, number: int, now: float) -> None:
+def send_probe(transport: ActionTransport, number: int, now: float) -> None:
     """Ask for a goal that nobody knows: each live server answers at once, with status 0."""
     transport.ask_result(nobodys(number))
     transport.reachability.asked(now)

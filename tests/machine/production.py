@@ -20,6 +20,8 @@ from bt_actions.goals.terms import Command, Event, Now, State
 from bt_actions.servers.reachability import Reachability
 from bt_actions.servers.stalls import IN_A_ROW, Stalls
 from bt_actions.traffic import state as traffic
+from bt_actions.traffic import watcher
+from bt_actions.traffic.driver import apply_deadlines, tell
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.scheduler import Scheduler
 from bt_actions.traffic.state import Domain, Record, Trace
@@ -258,7 +260,7 @@ class Caller:
         self.host = ModelHost(self)
         self._traffics = {number: self._traffic(number) for number in NODES}
         self._endpoints: dict[
-            tuple[str, int], ActionEndpoint
+            tuple[str, int], traffic.Endpoint
         ] = {}  # made when a leaf first wants them
         world.client = self
         judge.caller = self
@@ -277,7 +279,7 @@ class Caller:
                 "look": (lambda: (None,), lambda _: self.attend()),
                 "drained": (
                     self._left_behind,
-                    lambda handle: handle.endpoint.tell(handle.real, Event.DRAIN_GAVE_UP),
+                    lambda handle: tell(handle.real, Event.DRAIN_GAVE_UP),
                 ),
                 "rerun": (lambda: () if self.closed else NODES, self.run_again),
             }
@@ -308,7 +310,7 @@ class Caller:
     def _traffic(self, number: int) -> Traffic:
         return Traffic(self.host, ModelParticipant(self, number))
 
-    def come(self, action: str, node: int) -> ActionEndpoint:
+    def come(self, action: str, node: int) -> traffic.Endpoint:
         """Return the line of a node to an action, made when it is first wanted."""
         found = self._endpoints.get((action, node))
         if found is None:
@@ -334,8 +336,8 @@ class Caller:
         of_node = self._traffics[leaf.plan.node]
         to_action = self.come(leaf.plan.action, leaf.plan.node)
         if leaf.handle is not None and leaf.attempts is not None:
-            to_action.observe_and_tell(self.moment())
-            leaf.handle.endpoint.apply_deadlines(leaf.handle)
+            watcher.look(to_action, self.moment())
+            apply_deadlines(leaf.handle)
             goal = leaf.handle.goal
             if goal.outcome is not None:
                 self._judge_attempt(leaf, leaf.attempts, leaf.handle)
@@ -374,7 +376,7 @@ class Caller:
     def interrupt(self, leaf: Leaf) -> None:
         """What py_trees' terminate(INVALID) does; twice, because it may come twice."""
         if leaf.handle is not None:
-            leaf.handle.endpoint.tell(leaf.handle, Event.INTERRUPTED)
+            tell(leaf.handle, Event.INTERRUPTED)
             self.judge.interrupted_again(self.seen[leaf.handle.goal.id])
         leaf.handle = leaf.attempts = None
 
@@ -392,8 +394,8 @@ class Caller:
         """The process ends."""
         self.closed = True
         for handle in self.handles:
-            handle.endpoint.tell(handle.real, Event.PARKED)
-            handle.endpoint.tell(handle.real, Event.ABANDONED)
+            tell(handle.real, Event.PARKED)
+            tell(handle.real, Event.ABANDONED)
 
     def _left_behind(self) -> list[GoalHandle]:
         """Goals that are still waited for, though no leaf has them any more."""
@@ -433,7 +435,7 @@ class Caller:
     def _run_due(self) -> None:
         for each in self.host.scheduler.scheduled:
             assert isinstance(each, ActionEndpoint)
-            each.watcher.rest()  # a look is due
+            each.look_soon()  # a look is due
             each.run_due(self.moment())
             for real in each.goals.values():
                 handle = self.known(real.goal)
@@ -493,10 +495,10 @@ class Caller:
         return self.host.domain(DOMAIN).resources
 
     @property
-    def endpoints(self) -> list[ActionEndpoint]:
+    def endpoints(self) -> list[traffic.Endpoint]:
         return [each for of_node in self._traffics.values() for each in of_node._endpoints.values()]
 
-    def _endpoints_to(self, action: str) -> list[ActionEndpoint]:
+    def _endpoints_to(self, action: str) -> list[traffic.Endpoint]:
         return [each for each in self.endpoints if each.name == action]
 
     def accepted_on_server(self, job: Job) -> None:

@@ -20,7 +20,7 @@ from bt_actions.behaviours.variables import read
 from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic import handover
+from bt_actions.traffic import handover, watcher
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -634,7 +634,7 @@ def test_a_lost_goal_that_another_node_takes_over_is_still_known_to_be_left(
     until_it_runs(world, leaves[0])
     one, two = (leaf._own for leaf in leaves)
     monkeypatch.setattr(one.transport, "servers", frozenset)
-    one.observe_and_tell(here.host.steady())
+    watcher.look(one, here.host.steady())
     two.watch.observe(here.host.steady(), True, two.transport.servers())
     handover.take_over(two, here.host.steady())
     [handle] = leaves[0].open_handles()
