@@ -146,7 +146,7 @@ def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[E
         yield _update_record
     if now.state is not before.state:
         if now.state is State.DONE:
-            yield _retire
+            yield retire
         elif now.state is State.EXECUTING and handle.goal.busy is Busy.REPLACE:
             yield _replace
 
@@ -270,10 +270,6 @@ def _put_on_record(handle: GoalHandle) -> None:
     endpoint.host.record.enter(goal.id, entry)
 
 
-def _retire(handle: GoalHandle) -> None:
-    retire(handle.endpoint, handle)
-
-
 # Which goals are where
 
 
@@ -291,13 +287,12 @@ def take_in(endpoint: Endpoint, handle: GoalHandle) -> None:
     endpoint.host.scheduler.add(endpoint)
 
 
-def retire(endpoint: Endpoint, handle: GoalHandle) -> None:
-    """Have the endpoint see to this goal no more; without any goal, to the server neither."""
-    goal = handle.goal
+def retire(handle: GoalHandle) -> None:
+    """Have its endpoint see to this goal no more; without any goal, to the server neither."""
+    goal, endpoint = handle.goal, handle.endpoint
     if endpoint.goals.get(goal.id) is handle:  # and not what has turned up again
         del endpoint.goals[goal.id]
-        if handle.endpoint is endpoint:  # and not another's by now
-            endpoint.domain.left.pop(handle, None)
+        endpoint.domain.left.pop(handle, None)
         endpoint.transport.forget(goal.id)
         if goal.end is End.UNKNOWN:
             cancel_queue.send_now(endpoint.cancels, goal.id)  # nobody will ask again
@@ -312,7 +307,7 @@ def retire(endpoint: Endpoint, handle: GoalHandle) -> None:
 
 
 def _keep_ended(handle: GoalHandle) -> None:
-    """Remember what ended.py wants to know of a goal that is DONE."""
+    """Remember what endpoint.py wants to know of a goal that is DONE."""
     goal, endpoint = handle.goal, handle.endpoint
     endpoint.ended[goal.id] = Ended(
         goal.timeouts, goal.resources, goal.busy,

@@ -1,34 +1,31 @@
-"""What the world calls of an endpoint: answers come, time passes, another participant looks.
+"""What the world calls of an endpoint: answers come, and time passes.
 
-It takes what servers say, has it weighed (servers/replies.py) and tells the goal (driver.py). It
-decides nothing about a goal, about who is alive (servers/presence.py), nor whether a goal may be
-sent (admission.py). All under the host's lock.
+What a server says is weighed (servers/replies.py), and told to the goal that it is about
+(driver.py). Nothing is decided here about a goal, about who is alive (servers/presence.py), nor
+whether a goal may be sent (admission.py). All under the host's lock.
 """
 
 from __future__ import annotations
 
-import contextlib
+from collections.abc import Collection, Sequence
 from typing import Any
 
-from bt_actions.goals.terms import NEVER, STATUS_SUCCEEDED, Event
-from bt_actions.servers.presence import LEASE
-from bt_actions.servers.reachability import TWICE
+from bt_actions.goals.asking import ASK_AGAIN
+from bt_actions.goals.goal import Goal
+from bt_actions.goals.ids import author_of
+from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, STATUS_SUCCEEDED, Event
 from bt_actions.servers.replies import DENIALS
-from bt_actions.servers.stalls import ANSWERS_TAKE
-from bt_actions.traffic import cancel_queue, ended, route, watcher
-from bt_actions.traffic.driver import close_if_unused, tell, tell_believed
-from bt_actions.traffic.predecessors import warn_of_dead
-from bt_actions.traffic.state import Endpoint, GoalHandle, wake
-from bt_actions.traffic.transport import ActionTransport, Opener, Request, send_probe
+from bt_actions.traffic import cancel_queue, route, watcher
+from bt_actions.traffic.driver import close_if_unused, take_in, tell, tell_believed
+from bt_actions.traffic.state import Ended, Endpoint, GoalHandle, Log, wake
+from bt_actions.traffic.transport import Request
 
-LAST_WORD = 0.5
-"""Seconds within which a server that is not busy answers."""
-ON_TRIAL = 0
-"""The number of a trial's probe, of which nobody is told."""
+TOLD_AT_MOST = 10
+"""Goals of one action that are named; who left more left them in the same way."""
 
 
 class ActionEndpoint(Endpoint):
-    """An endpoint, with what its transport, the scheduler and rediscovery call."""
+    """An endpoint, with what its transport and the scheduler call."""
 
     def __repr__(self) -> str:
         return f"<ActionEndpoint {self.name}, {len(self.goals)} goals>"
@@ -51,13 +48,13 @@ class ActionEndpoint(Endpoint):
         elif self.watch.probe_answered(now, goal_id):
             wake(self.handles)
         else:
-            ended.take_answer(self, request, goal_id, asked, answers)
+            _ended_answered(self, request, goal_id, asked, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
         """Pass on feedback of a goal of ours."""
         handle = self.goals.get(goal_id)
         if handle is None:
-            ended.take_sign_of_life(self, goal_id)
+            _ended_runs(self, goal_id)
             return
         now = self.heard_at = self.watch.heard_at = self.host.steady()
         handle.replies.spoke(self.watch, now)
@@ -72,7 +69,7 @@ class ActionEndpoint(Endpoint):
         for goal_id, status in statuses.items():
             if goal_id not in self.goals:  # nearly all, of a server that keeps what has ended
                 if 0 < status < STATUS_SUCCEEDED:
-                    ended.take_sign_of_life(self, goal_id)
+                    _ended_runs(self, goal_id)
                     running.append(goal_id)
             elif status > 0 and (handle := self._heard_of(goal_id)) is not None:
                 now = self.watch.heard_at = self.host.steady()
@@ -102,66 +99,82 @@ class ActionEndpoint(Endpoint):
         """Look, send and apply deadlines as far as due; return the seconds until there is more."""
         return watcher.run_due(self, now)
 
-    # Another participant looks (transport.Seeker)
 
-    def misses(self) -> bool:
-        """Whether a server is wanted, and is not in sight, or does not answer, by now."""
-        return route.misses(self)
+# A goal that has ended: should it turn up at a second server, it is canceled. A word of it may be
+# older than its end, or that of another server of the name, which took it, too: to ask for its
+# cancel tells, as whoever has ended a goal neither agrees nor refuses.
 
-    def try_in(self, participant: Opener) -> ActionTransport:
-        """Return a transport like our own in another participant, on trial."""
-        now = self.host.steady()
-        transport = participant.open_transport(*self.action, self)
-        transport.on_trial = True
-        if not route.is_absent(self, now):
-            self.transport.reachability.tried(now)
-            transport.reachability.doubt(now, TWICE)
-            self.compared_at = NEVER
-        return transport
 
-    def try_and_compare(self, transport: ActionTransport) -> bool:
-        """Ask in this one, which is ready; whether it is heard where our own is not, or sees more.
+def _ended_answered(
+    endpoint: Endpoint, request: Request, goal_id: bytes, asked: float, answers: Sequence[Any]
+) -> None:
+    """Take an answer. An acceptance may have been overtaken by the result, or have come twice.
 
-        A server that answers nobody is busy; one that has just answered this one would answer our
-        own as well, if it heard it.
-        """
-        now = self.host.steady()
-        if route.is_absent(self, now):
-            return True
-        if not route.is_unresponsive(self, now):
-            return False
-        transport.deliver_arrived()
-        if not transport.reachability.heard:
-            if transport.reachability.take_question(now):
-                with contextlib.suppress(Exception):
-                    send_probe(transport, ON_TRIAL, now)
-            return False
-        if self.compared_at == NEVER:
-            self.compared_at = now
-            route.probe(self)
-        return now - self.compared_at >= LAST_WORD
+    And whoever has ended a goal neither agrees nor refuses to cancel it.
+    """
+    ended = endpoint.ended.get(goal_id)
+    if ended is None:
+        return
+    if request == "cancel":
+        if asked > ended.since and answers[-1] in (CANCEL_ACCEPTED, CANCEL_REJECTED):
+            _turns_up(endpoint, goal_id, ended)
+    elif request == "goal" and answers[-1]:
+        is_news = not ended.accepted and sum(answers) == 1
+        if is_news or _may_be_several(endpoint, ended):
+            _turns_up(endpoint, goal_id, ended)
+        elif sum(answers) > 1:  # by one, twice, or by one that is not shown yet
+            _ask(endpoint, goal_id, ended)
 
-    def move_to(self, transport: ActionTransport) -> None:
-        """Use a transport in a participant that sees the server; nobody spins that.
 
-        What is under way in the old one is not heard there. A question for a result, or a cancel,
-        is asked anew; of a goal request nobody knows whether it has arrived.
-        """
-        now, log = self.host.steady(), self.host.log
-        blind, seen = route.is_absent(self, now), self.watch.gids
-        route.deliver_arrived(self)
-        if self.transport.closed:  # by what came, and nobody used the endpoint
-            transport.close()
-            return
-        transport.on_trial = False
-        self.elsewhere = True
-        route.replace_transport(self, transport)
-        if blind:
-            log.info(f"{self.name}: out of sight of this node though it runs; a new one sees it")
-            return
-        log.info(f"{self.name}: does not hear this node any more; a new one is heard")
-        for handle in self.handles:
-            if handle.replies.sent_to & seen:  # it may be shown later than another of its name
-                handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
-            handle.goal.deadlines.suspend(ANSWERS_TAKE, self.participant.now())
-            tell(handle, Event.SERVER_CHANGED)
+def _ended_runs(endpoint: Endpoint, goal_id: bytes) -> None:
+    """Take feedback, or a status that shows that the goal runs: is it older than its end?"""
+    ended = endpoint.ended.get(goal_id)
+    if ended is not None and _may_be_several(endpoint, ended):
+        _ask(endpoint, goal_id, ended)
+
+
+def _ask(endpoint: Endpoint, goal_id: bytes, ended: Ended) -> None:
+    now = endpoint.host.steady()
+    if now - ended.asked_at >= ASK_AGAIN:
+        ended.asked_at = now
+        cancel_queue.ask_to_cancel(endpoint, goal_id)
+
+
+def _may_be_several(endpoint: Endpoint, ended: Ended) -> bool:
+    route.glance(endpoint)
+    return len(ended.servers | endpoint.watch.gids) > 1
+
+
+def _turns_up(endpoint: Endpoint, goal_id: bytes, ended: Ended) -> None:
+    """A second server runs it: cancel it, and account for it like for any goal."""
+    del endpoint.ended[goal_id]
+    goal = Goal(
+        goal_id, endpoint.name, ended.timeouts, endpoint.participant.now(),
+        resources=ended.resources, busy=ended.busy,
+    )  # fmt: skip
+    goal.turns_up_again()
+    owner = None if ended.owner is None else ended.owner()
+    handle = GoalHandle(goal, endpoint, owner, ended.name, ended.begun_in, ended.attempt)
+    endpoint.watch.two_answered()
+    handle.replies.taken_by_two(ended.servers | endpoint.watch.gids, endpoint.host.steady())
+    take_in(endpoint, handle)
+    tell(handle, Event.SERVER_RETURNED)
+
+
+def warn_of_dead(action: str, running: Collection[bytes], told: set[bytes], log: Log) -> None:
+    """Name what the dead have left among the ids that a status shows running, but our own.
+
+    A process that is killed cancels nothing. Nor is anything canceled here: `bt-actions cleanup`
+    does that (recovery/sweep.py), when a user wants it. `told` are those that were named before.
+    """
+    if len(told) >= TOLD_AT_MOST:
+        return
+    authors = {each: author_of(each) for each in running if each not in told}
+    dead = {each for each in {*authors.values()} if each and not each.alive}  # reads a file
+    for goal_id, author in authors.items():
+        if author in dead and len(told) < TOLD_AT_MOST:
+            told.add(goal_id)
+            log.warning(
+                f"{action}: a goal of process {author.pid}, which is dead, still runs "
+                f"there; `bt-actions cleanup` cancels it: {goal_id.hex()}"
+            )

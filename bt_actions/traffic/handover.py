@@ -34,8 +34,8 @@ def take_over(endpoint: Endpoint, now: float) -> None:
             continue
         taken_for_dead = watch.all_live(now) and not other.watch.all_live(now)
         if other.orphaned or other.watch.gone(now, servers) or taken_for_dead:
+            retire(handle)
             take_in(endpoint, handle)
-            retire(other, handle)
 
 
 def adopt(endpoint: Endpoint) -> None:
@@ -58,7 +58,7 @@ def park(endpoint: Endpoint, *, all_of_them: bool = False) -> None:
         if goal.lost:
             goal.deadlines.clear()  # nobody looks out for its server from now on
             endpoint.domain.lost[endpoint.action].append(handle)
-            retire(endpoint, handle)
+            retire(handle)
 
 
 def bound_the_lost(endpoint: Endpoint) -> None:

@@ -1,8 +1,8 @@
 """How one endpoint sees, asks and hears its server: in its node's participant, or in another.
 
 Our participant may not see a server that runs (ros/rediscovery.py), or that server may not hear it
-(servers/reachability.py). Another participant is looked for then, and used until it is gone
-(`ActionEndpoint.move_to`). Tells no goal anything. All under the host's lock.
+(servers/reachability.py). Another participant is looked for then, and its transport is tried; it is
+used (`watcher.move_to`) until it is gone. Tells no goal anything. All under the host's lock.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import contextlib
 
 from bt_actions.goals.terms import NEVER, State
 from bt_actions.servers.presence import PROBES_KEPT, Server, ServerWatch
-from bt_actions.servers.reachability import Reachability
+from bt_actions.servers.reachability import TWICE, Reachability
 from bt_actions.traffic import cancel_queue
 from bt_actions.traffic.state import Endpoint
 from bt_actions.traffic.transport import ActionTransport, nobodys, send_probe
@@ -23,6 +23,10 @@ After them it has discovered who was there."""
 DISCOVERS = 1.0
 """Seconds that a participant, while it is new, takes to see all servers of a name: of two that had
 been up for long, the second was seen up to 0.6 s after the first, on one machine."""
+LAST_WORD = 0.5
+"""Seconds within which a server that is not busy answers."""
+ON_TRIAL = 0
+"""The number of a trial's probe, of which nobody is told."""
 LOOK_WHILE_RUNNING = 0.2
 """Seconds between two looks at a server on which goals are open."""
 
@@ -147,6 +151,39 @@ def is_unresponsive(endpoint: Endpoint, now: float) -> bool:
         return False
     deliver_arrived(endpoint)
     return endpoint.transport.reachability.is_unresponsive(now)
+
+
+def begin_trial(endpoint: Endpoint, transport: ActionTransport) -> None:
+    """Try a transport like our own, which was opened in another participant."""
+    transport.on_trial = True
+    now = endpoint.host.steady()
+    if not is_absent(endpoint, now):
+        endpoint.transport.reachability.tried(now)
+        transport.reachability.doubt(now, TWICE)
+        endpoint.compared_at = NEVER
+
+
+def is_better(endpoint: Endpoint, transport: ActionTransport) -> bool:
+    """Whether this one, which is ready, is heard where our own is not, or sees what that does not.
+
+    Asked again and again until an answer has had time to come. A server that answers nobody is
+    busy; one that has just answered this one would answer our own as well, if it heard it.
+    """
+    now = endpoint.host.steady()
+    if is_absent(endpoint, now):
+        return True
+    if not is_unresponsive(endpoint, now):
+        return False
+    transport.deliver_arrived()
+    if not transport.reachability.heard:
+        if transport.reachability.take_question(now):
+            with contextlib.suppress(Exception):
+                send_probe(transport, ON_TRIAL, now)
+        return False
+    if endpoint.compared_at == NEVER:
+        endpoint.compared_at = now
+        probe(endpoint)
+    return now - endpoint.compared_at >= LAST_WORD
 
 
 def replace_transport(endpoint: Endpoint, transport: ActionTransport) -> None:

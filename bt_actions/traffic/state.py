@@ -25,7 +25,7 @@ from bt_actions.servers.presence import GID, PROBES_KEPT, Server, ServerWatch
 from bt_actions.servers.replies import Replies
 from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.scheduler import Scheduled, Scheduler
-from bt_actions.traffic.transport import Listener, Participant, Seeker
+from bt_actions.traffic.transport import ActionTransport, Listener
 from bt_actions.utilities.plain_text import raised
 
 FEEDBACK_KEPT = 100
@@ -150,11 +150,61 @@ class Host(Protocol):
         """Return 16 bytes that no goal has had."""
 
 
-class Endpoint(Listener, Scheduled, Seeker):
+class Participant(Protocol):
+    """A participant of the ROS network: what it sees and hears, the goals of its node do."""
+
+    domain: int
+    """The ROS domain id."""
+
+    name: str
+    """The name of the node."""
+
+    namespace: str
+    """The namespace of the node: "/" or "/r1"."""
+
+    seen_since: float
+    """Since when it sees others (seconds, steady clock).
+
+    A new one has dropped no server yet: what it does not see it may still discover.
+    """
+
+    long_stalls: int
+    """How often the process had stood still for long by `seen_since` (Stalls.long_times)."""
+
+    def now(self) -> Now:
+        """Return this moment, by the steady clock and by its own."""
+
+    def alive(self) -> bool:
+        """Whether it is there, and can send and hear."""
+
+    def shut_down(self) -> bool:
+        """Whether all of ROS was shut down here, as by Ctrl-C; else one that is not alive has gone
+        from under its goals."""
+
+    def full_name(self, action: str) -> str:
+        """Return the full name of an action; raises ValueError for one that ROS refuses."""
+
+    def open_transport(self, action_type: Any, name: str, listener: Listener) -> ActionTransport:
+        """Open one; raises what the middleware raises for a wrong name or type."""
+
+    def instead(self, action_type: Any, name: str) -> str:
+        """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
+
+    def unheard(self) -> str:
+        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
+
+    def seek(self, endpoint: Endpoint) -> None:
+        """Have another participant look for its server, soon, as long as `route.misses` it.
+
+        Does nothing where there can be no other, or where it would find another server than ours.
+        """
+
+
+class Endpoint(Listener, Scheduled):
     """One action as one node sees it: the shared transport, and the goals on it.
 
     Each is an ActionEndpoint (endpoint.py), which has what the world calls: the methods of these
-    three protocols.
+    two protocols.
     """
 
     def __init__(
@@ -170,7 +220,7 @@ class Endpoint(Listener, Scheduled, Seeker):
         """How many leaves are set up for it."""
         self.goals: dict[bytes, GoalHandle] = {}
         self.ended: dict[bytes, Ended] = {}
-        """The newest goals that were DONE here (ended.py)."""
+        """The newest goals that were DONE here."""
         self.cancels = self.domain.cancels[action]
         self.forks = host.forks
         """Before so many forks it was made."""
@@ -258,7 +308,7 @@ class GoalHandle:
     not_gone_before: float = NEVER
     """Until when (steady clock) its server does not count as gone where it is not shown. It may be
     stopped, and is shown again within LEASE, or not be discovered by a new node, which takes
-    TOO_NEW (handover.adopt, ActionEndpoint.move_to)."""
+    TOO_NEW (handover.adopt, watcher.move_to)."""
 
     standing: Standing = field(init=False)
     """How the goal stood after its last step."""

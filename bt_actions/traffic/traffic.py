@@ -24,8 +24,7 @@ from bt_actions.traffic import admission, handover, watcher
 from bt_actions.traffic.drain import drain
 from bt_actions.traffic.driver import apply_deadlines, close_if_unused, note, take_in, tell
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.state import Action, Endpoint, GoalHandle, Host, begun_in
-from bt_actions.traffic.transport import Participant
+from bt_actions.traffic.state import Action, Endpoint, GoalHandle, Host, Participant, begun_in
 from bt_actions.utilities.plain_text import in_words
 
 

@@ -7,12 +7,14 @@ for servers/replies.py. All under the host's lock.
 from __future__ import annotations
 
 from bt_actions.goals.terms import NEVER, Event
-from bt_actions.servers.presence import Server
+from bt_actions.servers.presence import LEASE, Server
+from bt_actions.servers.stalls import ANSWERS_TAKE
 from bt_actions.traffic import cancel_queue, handover, route
 from bt_actions.traffic.admission import BESIDE
 from bt_actions.traffic.driver import apply_deadlines, tell, tell_believed
 from bt_actions.traffic.route import LOOK_WHILE_RUNNING
 from bt_actions.traffic.state import Endpoint, wake
+from bt_actions.traffic.transport import ActionTransport
 
 LOOK_WHILE_WAITING = 0.05
 LOOK_AT_REST = 1.0
@@ -181,3 +183,29 @@ def _orphan(endpoint: Endpoint) -> None:
     silent = now - endpoint.heard_at > SILENT_FOR
     if silent and not host.stalls.answers_take(now):
         handover.park(endpoint, all_of_them=True)
+
+
+def move_to(endpoint: Endpoint, transport: ActionTransport) -> None:
+    """Use a transport in a participant that sees the server; nobody spins that.
+
+    What is under way in the old one is not heard there. A question for a result, or a cancel,
+    is asked anew; of a goal request nobody knows whether it has arrived.
+    """
+    now, log = endpoint.host.steady(), endpoint.host.log
+    blind, seen = route.is_absent(endpoint, now), endpoint.watch.gids
+    route.deliver_arrived(endpoint)
+    if endpoint.transport.closed:  # by what came, and nobody used the endpoint
+        transport.close()
+        return
+    transport.on_trial = False
+    endpoint.elsewhere = True
+    route.replace_transport(endpoint, transport)
+    if blind:
+        log.info(f"{endpoint.name}: out of sight of this node though it runs; a new one sees it")
+        return
+    log.info(f"{endpoint.name}: does not hear this node any more; a new one is heard")
+    for handle in endpoint.handles:
+        if handle.replies.sent_to & seen:  # it may be shown later than another of its name
+            handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
+        handle.goal.deadlines.suspend(ANSWERS_TAKE, endpoint.participant.now())
+        tell(handle, Event.SERVER_CHANGED)

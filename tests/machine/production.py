@@ -156,7 +156,7 @@ class ModelParticipant:
     def unheard(self) -> str:
         return ""
 
-    def seek(self, seeker: Any) -> None:
+    def seek(self, endpoint: Any) -> None:
         """There is nothing that is out of sight for good."""
 
 

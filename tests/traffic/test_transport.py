@@ -23,7 +23,8 @@ from bt_actions.goals.terms import (
 from bt_actions.simulation import Script, ScriptedServer
 from bt_actions.testing import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic.transport import ActionTransport, Participant, Request, nobodys, send_probe
+from bt_actions.traffic.state import Participant
+from bt_actions.traffic.transport import ActionTransport, Request, nobodys, send_probe
 from tests.support.waiting import until
 
 NUMBERS = itertools.count(1)
