@@ -101,11 +101,11 @@ class VirtualTransport:
         if self.closed or not (question in self._questions or question in self._past):
             return
         tell = self._listener
-        self.reachability.answered(question.asked)
+        self.reachability.answer_came(question.asked)
         question.answers.append(answer)
         if self.on_trial:
             return
-        tell.answered(question.kind, question.goal_id, question.asked, tuple(question.answers))
+        tell.answer_came(question.kind, question.goal_id, question.asked, tuple(question.answers))
         tell.all_delivered()
 
     def hear_feedback(self, goal_id: bytes, feedback: Any) -> None:

@@ -1,15 +1,15 @@
 """Tells goals what happens, and does what they decide.
 
 A goal decides at once, whoever tells it something (`tell`). What follows waits in one queue of its
-domain and is done in the order of decision (`_do`), so nothing is done by recursion. Only a cancel
-looks again at what is true by then. A goal request that does not leave is told to the goal. All
-under the host's lock.
+domain and is done in the order of decision (`_do_in_order`), so nothing is done by recursion. Only
+a cancel looks again at what is true by then. A goal request that does not leave is told to the
+goal. All under the host's lock.
 """
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from bt_actions.goals.policy import Busy, End, Outcome
@@ -17,18 +17,11 @@ from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
 from bt_actions.servers.replies import Told
 from bt_actions.traffic import cancel_queue, route
 from bt_actions.traffic.admission import why_not
-from bt_actions.traffic.state import (
-    Domain,
-    Effect,
-    Ended,
-    Endpoint,
-    Entry,
-    GoalHandle,
-    Standing,
-    wake,
-)
+from bt_actions.traffic.state import Ended, Endpoint, Entry, GoalHandle, Standing, wake
 from bt_actions.traffic.transport import GOALS_KEPT
 
+Effect = Callable[[GoalHandle], None]
+"""What is done for a goal."""
 _UNANSWERED = (Outcome.ACCEPT_TIMEOUT, None)
 
 
@@ -127,7 +120,7 @@ def _apply(handle: GoalHandle, event: Event, now: Now, detail: Any = None) -> No
         goal.reason += endpoint.participant.unheard()
     if (due := goal.due_in(now)) is not None:
         host.scheduler.wake_by(now.steady + due)
-    _do(endpoint.domain, handle, _what_follows(handle, commands))
+    _do_in_order(handle, _what_follows(handle, commands))
 
 
 def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Effect]:
@@ -135,14 +128,14 @@ def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[E
     before, now = handle.standing, Standing.of(handle)
     handle.standing = now
     if now.shown != before.shown:
-        yield note
+        yield report
     for command in commands:
         yield _COMMANDS[command]
     if now.in_the_way != before.in_the_way:
         if not handle.goal.claims_resources and handle.goal.id in handle.endpoint.goals:
             handle.endpoint.domain.left[handle] = None
         yield _wake_waiting
-    if (now.answered, now.state is State.LOST) != (before.answered, before.state is State.LOST):
+    if (now.off_record, now.state is State.LOST) != (before.off_record, before.state is State.LOST):
         yield _update_record
     if now.state is not before.state:
         if now.state is State.DONE:
@@ -151,11 +144,12 @@ def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[E
             yield _replace
 
 
-def _do(domain: Domain, handle: GoalHandle, effects: Iterable[Effect]) -> None:
+def _do_in_order(handle: GoalHandle, effects: Iterable[Effect]) -> None:
     """Do these for a goal behind what was decided before, and what is meanwhile behind these.
 
     Where that is under way, whoever has begun it does all.
     """
+    domain = handle.endpoint.domain
     domain.effects.extend([(effect, handle) for effect in effects])
     if domain.does_effects:
         return
@@ -180,12 +174,12 @@ def _send(handle: GoalHandle) -> None:
     """Count who gets it, have it on record, and send the request."""
     endpoint, goal, replies = handle.endpoint, handle.goal, handle.replies
     try:
-        replies.sent(endpoint.watch)
+        replies.count_receivers(endpoint.watch)
         _put_on_record(handle)
         endpoint.transport.send(goal.id, goal.message)
         known = replies.sent_to
         route.glance(endpoint)
-        replies.sent(endpoint.watch)  # who opened since got it, too
+        replies.count_receivers(endpoint.watch)  # who opened since got it, too
         if replies.sent_to != known:
             _put_on_record(handle)
     except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
@@ -217,20 +211,20 @@ _COMMANDS: dict[Command, Effect] = {
 # What follows from it
 
 
-def note(handle: GoalHandle) -> None:
+def report(handle: GoalHandle) -> None:
     """Report a goal's change to the log, and to its run."""
     goal, log = handle.goal, handle.endpoint.host.log
-    told, handle.told = handle.told, None if goal.outcome is None else goal.end
-    if handle.told is End.UNKNOWN is not told:
+    told, handle.end_logged = handle.end_logged, None if goal.outcome is None else goal.end
+    if handle.end_logged is End.UNKNOWN is not told:
         if told is End.SERVER_GONE:
             log.warning(f"{goal!r}: its server is back; canceling it, should it still run there")
         else:
             why = f"{goal.reason}{goal.cancel_said}"
             log.error(f"{goal!r}: not accounted for, it may still be running: {why}")
-    elif told is End.UNKNOWN is not handle.told:
+    elif told is End.UNKNOWN is not handle.end_logged:
         log.info(f"{goal!r}: accounted for at last")
-    if handle.begun_in is not None:
-        handle.begun_in.tell(handle)
+    if handle.run is not None:
+        handle.run.notify(handle)
     handle.endpoint.host.notify_all()
 
 
@@ -257,7 +251,7 @@ def _replace(handle: GoalHandle) -> None:
 def _update_record(handle: GoalHandle) -> None:
     """Take it off the record, or put on it what more is known of it, if it is there."""
     record = handle.endpoint.host.record
-    if handle.standing.answered:
+    if handle.standing.off_record:
         record.strike(handle.goal.id)
     elif handle.goal.state is not State.DONE and handle.goal.id in record:
         _put_on_record(handle)
@@ -312,7 +306,7 @@ def _keep_ended(handle: GoalHandle) -> None:
     endpoint.ended[goal.id] = Ended(
         goal.timeouts, goal.resources, goal.busy,
         None if handle.owner is None else weakref.ref(handle.owner),
-        handle.name, handle.begun_in, handle.attempt,
+        handle.name, handle.run, handle.attempt,
         goal.accepted, handle.replies.sent_to, endpoint.host.steady(),
     )  # fmt: skip
     if len(endpoint.ended) > GOALS_KEPT:

@@ -32,7 +32,7 @@ class ActionEndpoint(Endpoint):
 
     # What the server says (transport.Listener)
 
-    def answered(
+    def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         """Pass on an answer about a goal; see to one that has ended, and may run again."""
@@ -43,7 +43,7 @@ class ActionEndpoint(Endpoint):
             cancel_queue.make_room(self.cancels, goal_id, now)
         handle = self._heard_of(goal_id, denies=answers[-1] in DENIALS)
         if handle is not None:
-            told = handle.replies.answered(request, self.watch, now, asked, answers)
+            told = handle.replies.weigh_answer(request, self.watch, now, asked, answers)
             tell_believed(handle, told)
         elif self.watch.probe_answered(now, goal_id):
             wake(self.handles)
@@ -73,7 +73,7 @@ class ActionEndpoint(Endpoint):
                     running.append(goal_id)
             elif status > 0 and (handle := self._heard_of(goal_id)) is not None:
                 now = self.watch.heard_at = self.host.steady()
-                tell_believed(handle, handle.replies.shown(self.watch, now, status))
+                tell_believed(handle, handle.replies.weigh_status(self.watch, now, status))
         warn_of_dead(self.name, running, self.left_by_dead, self.host.log)
 
     def all_delivered(self) -> None:
@@ -154,7 +154,7 @@ def _turns_up(endpoint: Endpoint, goal_id: bytes, ended: Ended) -> None:
     )  # fmt: skip
     goal.turns_up_again()
     owner = None if ended.owner is None else ended.owner()
-    handle = GoalHandle(goal, endpoint, owner, ended.name, ended.begun_in, ended.attempt)
+    handle = GoalHandle(goal, endpoint, owner, ended.name, ended.run, ended.attempt)
     endpoint.watch.two_answered()
     handle.replies.taken_by_two(ended.servers | endpoint.watch.gids, endpoint.host.steady())
     take_in(endpoint, handle)

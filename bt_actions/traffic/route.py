@@ -52,7 +52,7 @@ def ask_discovery(endpoint: Endpoint, now: float, *, concludes: bool = True) -> 
     transport = endpoint.transport
     endpoint.counted = transport.count()
     ready, servers = transport.ready(), transport.servers()
-    endpoint.watch.observe(now, ready, servers, concludes=concludes)
+    endpoint.watch.see(now, ready, servers, concludes=concludes)
 
 
 def probe(endpoint: Endpoint) -> None:

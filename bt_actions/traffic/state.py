@@ -150,6 +150,39 @@ class Host(Protocol):
         """Return 16 bytes that no goal has had."""
 
 
+class Domain:
+    """What all nodes of this process in one ROS domain share."""
+
+    def __init__(self) -> None:
+        self.resources: Resources[GoalHandle] = Resources()
+        self.effects: deque[tuple[Callable[[GoalHandle], None], GoalHandle]] = deque()
+        """What goals have decided is to be done, in that order."""
+        self.does_effects = False
+        self.open: dict[Endpoint, None] = {}
+        """The endpoints with goals, of all nodes, in the order in which they came."""
+        self.unsent: dict[GoalHandle, None] = {}
+        """Goals that are to be sent, and some that were since (driver.py drops them)."""
+        self.left: dict[GoalHandle, None] = {}
+        """Goals of these endpoints that hold no resources any more."""
+        self.ever_lost_sight = False
+        """A server went out of sight once: what else its process serves may have, too."""
+        self.known: set[Action] = set()
+        """The actions that had a server once."""
+        self.lost: dict[Action, list[GoalHandle]] = defaultdict(list)
+        """Lost goals whose endpoint is gone: their server may be back for the next one."""
+        self.cancels: dict[Action, CancelQueue] = defaultdict(CancelQueue)
+
+
+@dataclass(slots=True)
+class CancelQueue:
+    """The cancel requests of this process to one server (cancel_queue.py)."""
+
+    waiting: dict[bytes, Endpoint] = field(default_factory=dict)
+    """Whom there is no room for yet, and which endpoint is to ask."""
+    asked: dict[bytes, float] = field(default_factory=dict)
+    """When those were asked for that have no answer since."""
+
+
 class Participant(Protocol):
     """A participant of the ROS network: what it sees and hears, the goals of its node do."""
 
@@ -290,7 +323,7 @@ class GoalHandle:
     """The leaf; None where it is gone, and a second server has taken its goal, too."""
     name: str
     """The leaf's."""
-    begun_in: Run | None = None
+    run: Run | None = None
     """Which run it belongs to: the last one that ticked its leaf; None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
@@ -298,7 +331,7 @@ class GoalHandle:
     """When it was wished for; long ago where nobody knows."""
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     replies: Replies = field(init=False)
-    told: End | None = None
+    end_logged: End | None = None
     """The end that the log knows of: it says where that is UNKNOWN, and is not any more."""
     paused: bool = False
     """Its tree is, and it was not sent."""
@@ -353,7 +386,7 @@ class Standing(NamedTuple):
     shown: tuple[str, Outcome | None, End]
     in_the_way: tuple[bool, ...]
     """What others may wait for: room at its server, or its end."""
-    answered: bool
+    off_record: bool
     """Whether it need not be on record any more: whoever got it shows it, or will not run it.
 
     One that two servers got is accepted by one of them first. And a server that has gone may only
@@ -365,38 +398,38 @@ class Standing(NamedTuple):
         goal = handle.goal
         pending = goal.in_flight, goal.request_pending
         in_the_way = *pending, goal.outstanding, goal.lost, goal.claims_resources
-        answered = (goal.accepted and len(handle.replies.sent_to) <= 1) or (
+        off_record = (goal.accepted and len(handle.replies.sent_to) <= 1) or (
             handle.accounted_for and goal.end is not End.SERVER_GONE
         )
         shown = goal.state.shown, goal.outcome, goal.end
-        return cls(goal.state, shown, in_the_way, answered)
+        return cls(goal.state, shown, in_the_way, off_record)
 
 
 @dataclass(eq=False)
 class Run:
     """Who runs a tree, as its goals know it, which outlive both."""
 
-    tell: Callable[[GoalHandle | None], None]
+    notify: Callable[[GoalHandle | None], None]
     """Takes note, on any thread and under the lock, of a goal of its that has a new state, outcome
     or end; of None: there is reason to tick."""
 
 
-begun_in: ContextVar[Run | None] = ContextVar("begun_in", default=None)
+ticking_run: ContextVar[Run | None] = ContextVar("ticking_run", default=None)
 """Which run sets up, or ticks, a tree on this thread; None where nobody has said it, as in a loop
 of the user's."""
 
 
 def waker() -> Callable[[], None]:
     """Return what has the run of this thread tick soon; that may be called on any thread."""
-    run = begun_in.get()
-    return (lambda: None) if run is None else (lambda: run.tell(None))
+    run = ticking_run.get()
+    return (lambda: None) if run is None else (lambda: run.notify(None))
 
 
 def wake(handles: Iterable[GoalHandle]) -> None:
     """Have the runs of these goals tick: something may be sent, or can be read."""
-    for run in {handle.begun_in: None for handle in handles}:
+    for run in {handle.run: None for handle in handles}:
         if run is not None:
-            run.tell(None)
+            run.notify(None)
 
 
 @dataclass(slots=True)
@@ -408,7 +441,7 @@ class Ended:
     busy: Busy
     owner: weakref.ref[Any] | None
     name: str
-    begun_in: Run | None
+    run: Run | None
     attempt: int
     accepted: bool
     servers: frozenset[GID]
@@ -416,40 +449,3 @@ class Ended:
     since: float
     asked_at: float = NEVER
     """When it was last asked to be canceled all the same."""
-
-
-@dataclass(slots=True)
-class CancelQueue:
-    """The cancel requests of this process to one server (cancel_queue.py)."""
-
-    waiting: dict[bytes, Endpoint] = field(default_factory=dict)
-    """Whom there is no room for yet, and which endpoint is to ask."""
-    asked: dict[bytes, float] = field(default_factory=dict)
-    """When those were asked for that have no answer since."""
-
-
-Effect = Callable[[GoalHandle], None]
-"""What is done for a goal (driver.py)."""
-
-
-class Domain:
-    """What all nodes of this process in one ROS domain share."""
-
-    def __init__(self) -> None:
-        self.resources: Resources[GoalHandle] = Resources()
-        self.effects: deque[tuple[Effect, GoalHandle]] = deque()
-        """What goals have decided is to be done, in that order."""
-        self.does_effects = False
-        self.open: dict[Endpoint, None] = {}
-        """The endpoints with goals, of all nodes, in the order in which they came."""
-        self.unsent: dict[GoalHandle, None] = {}
-        """Goals that are to be sent, and some that were since (driver.py drops them)."""
-        self.left: dict[GoalHandle, None] = {}
-        """Goals of these endpoints that hold no resources any more."""
-        self.ever_lost_sight = False
-        """A server went out of sight once: what else its process serves may have, too."""
-        self.known: set[Action] = set()
-        """The actions that had a server once."""
-        self.lost: dict[Action, list[GoalHandle]] = defaultdict(list)
-        """Lost goals whose endpoint is gone: their server may be back for the next one."""
-        self.cancels: dict[Action, CancelQueue] = defaultdict(CancelQueue)

@@ -22,9 +22,9 @@ from bt_actions.messages.interfaces import TwoTypes, interface_name
 from bt_actions.servers.presence import Server
 from bt_actions.traffic import admission, handover, watcher
 from bt_actions.traffic.drain import drain
-from bt_actions.traffic.driver import apply_deadlines, close_if_unused, note, take_in, tell
+from bt_actions.traffic.driver import apply_deadlines, close_if_unused, report, take_in, tell
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.state import Action, Endpoint, GoalHandle, Host, Participant, begun_in
+from bt_actions.traffic.state import Action, Endpoint, GoalHandle, Host, Participant, ticking_run
 from bt_actions.utilities.plain_text import in_words
 
 
@@ -99,12 +99,12 @@ class Traffic:
                 busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
             handle = GoalHandle(
-                goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback, now
+                goal, endpoint, owner, owner.name, ticking_run.get(), attempt, keeps_feedback, now
             )
             take_in(endpoint, handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
             if answer is None:
-                note(handle)
+                report(handle)
             else:
                 tell(handle, answer)
             return handle
@@ -131,7 +131,7 @@ class Traffic:
         called without the lock (the server may go meanwhile), unless `is_plain` says that it runs
         no code of the user's.
         """
-        endpoint, handle.begun_in = handle.endpoint, begun_in.get() or handle.begun_in
+        endpoint, handle.run = handle.endpoint, ticking_run.get() or handle.run
         if handle.goal.state is State.DONE:
             return
         at_once = handle.goal.state is State.WAITING_FOR_SERVER and is_plain()

@@ -33,7 +33,7 @@ def send_probe(transport: ActionTransport, number: int, now: float) -> None:
 class Listener(Protocol):
     """Who is told what the servers say: under the host's lock, from whichever thread delivers."""
 
-    def answered(
+    def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         """A server answered a request that was sent at `asked` (seconds, steady clock).

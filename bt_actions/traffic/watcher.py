@@ -114,7 +114,7 @@ def look(endpoint: Endpoint, now: float) -> Server:
         return Server.ABSENT
     if not alive:
         if watch.is_crowded:  # of those shown when the node went, asking tells who lives
-            watch.observe(now, True, watch.gids)
+            watch.see(now, True, watch.gids)
             _tell_goals(endpoint, now)
         return Server.ABSENT
     try:
@@ -162,7 +162,7 @@ def _tell_goals(endpoint: Endpoint, now: float) -> None:
         if handle.goal.sent:
             if gone and not handle.goal.lost:
                 route.deliver_arrived(endpoint)  # its last words
-            tell_believed(handle, handle.replies.looked(watch, now))
+            tell_believed(handle, handle.replies.weigh_sight(watch, now))
 
 
 def _orphan(endpoint: Endpoint) -> None:

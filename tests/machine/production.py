@@ -111,9 +111,9 @@ class ModelTransport:
         if self.closed or question is None:
             return
         kind, about, asked, by_server = question
-        self.reachability.answered(asked)
+        self.reachability.answer_came(asked)
         if kind == "probe":
-            self._listener.answered("result", about, asked, ((0, None),))
+            self._listener.answer_came("result", about, asked, ((0, None),))
             return
         if message.server.gid in by_server:
             return
@@ -121,7 +121,7 @@ class ModelTransport:
         answers = tuple(by_server.values())
         if kind == "result":
             answers = tuple((status, None) for status in answers)
-        self._listener.answered(kind, about, asked, answers)
+        self._listener.answer_came(kind, about, asked, answers)
 
 
 class ModelParticipant:

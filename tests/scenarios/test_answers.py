@@ -325,7 +325,7 @@ def test_a_result_that_overtakes_the_acceptance(
     record: Record,
 ) -> None:
     """A goal of 0.3 s whose acceptance is told after so many seconds, or never (None)"""
-    told = noted(monkeypatch, "answered", "goal")
+    told = noted(monkeypatch, "answer_came", "goal")
     journal = serve("1:drop_accept", tells_after=after)
     leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(accept=5.0))
     with TreeRunner(leaf, node=node) as runner:

@@ -635,7 +635,7 @@ def test_a_lost_goal_that_another_node_takes_over_is_still_known_to_be_left(
     one, two = (leaf._own for leaf in leaves)
     monkeypatch.setattr(one.transport, "servers", frozenset)
     watcher.look(one, here.host.steady())
-    two.watch.observe(here.host.steady(), True, two.transport.servers())
+    two.watch.see(here.host.steady(), True, two.transport.servers())
     handover.take_over(two, here.host.steady())
     [handle] = leaves[0].open_handles()
     assert handle.goal.lost

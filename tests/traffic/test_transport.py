@@ -104,7 +104,7 @@ class Heard:
         self.feedback: list[tuple[bytes, Any]] = []
         self.delivered = 0
 
-    def answered(
+    def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         if request == "result":
