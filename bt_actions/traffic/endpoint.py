@@ -108,10 +108,7 @@ class ActionEndpoint(Endpoint):
 def _ended_answered(
     endpoint: Endpoint, request: Request, goal_id: bytes, asked: float, answers: Sequence[Any]
 ) -> None:
-    """Take an answer. An acceptance may have been overtaken by the result, or have come twice.
-
-    And whoever has ended a goal neither agrees nor refuses to cancel it.
-    """
+    """Take an answer. An acceptance may have been overtaken by the result, or have come twice."""
     ended = endpoint.ended.get(goal_id)
     if ended is None:
         return

@@ -118,12 +118,6 @@ def _reachability(endpoint: Endpoint, now: float) -> Reachability:
 # Is there another way?
 
 
-def seek(endpoint: Endpoint) -> None:
-    """Have another way looked for, where this one fails."""
-    if misses(endpoint):
-        endpoint.participant.seek(endpoint)
-
-
 def misses(endpoint: Endpoint) -> bool:
     """Whether a server is wanted that may be there, though nothing shows all of it.
 

@@ -140,7 +140,8 @@ def look(endpoint: Endpoint, now: float) -> Server:
             host.log.warning(
                 f"{endpoint.name}: two action servers answer to this name; no more is sent"
             )
-    route.seek(endpoint)
+    if route.misses(endpoint):
+        endpoint.participant.seek(endpoint)
     return state
 
 

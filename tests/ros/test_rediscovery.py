@@ -140,14 +140,13 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     from rclpy.node import Node
 
     enclaves = list[str]()
-    monkeypatch.setattr(route, "misses", lambda which: which.name == name)
     monkeypatch.setattr(node_participant, "look_for", lambda *to: enclaves.append(to[2]))
     context = Context()
     context.init(args=["--ros-args", flag, "/kitchen/robot"], domain_id=domain)
     leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
     leaf.setup(node=secure)
     with process.lock:
-        route.seek(leaf._own)
+        leaf._own.participant.seek(leaf._own)
     sight = SecondParticipant(domain, enclaves[0])
     assert {enclave(secure), enclave(sight.node)} == {"/kitchen/robot"}
     sight.close()
@@ -173,12 +172,11 @@ def test_where_a_part_of_the_names_is_remapped_nobody_looks(
     leaf = MoveRobot("m", 0.1, action_name=name)
     leaf.setup(node=remapped)
     looked_for = list[Any]()
-    monkeypatch.setattr(route, "misses", lambda which: which.name == f"{name}/base")
     monkeypatch.setattr(
         node_participant, "look_for", lambda seeker, *_: looked_for.append(seeker.name)
     )
     with process.lock:
-        route.seek(leaf._own)
+        leaf._own.participant.seek(leaf._own)
     assert looked_for == ([f"{name}/base"] if parts == PARTS else [])
     leaf.shutdown()
     remapped.destroy_node()
