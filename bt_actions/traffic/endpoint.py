@@ -35,7 +35,7 @@ class ActionEndpoint(Endpoint):
     def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
-        """Pass on an answer about a goal; see to one that has ended, and may run again."""
+        """Tell a goal of ours what is believed of an answer; others are a probe's, or too late."""
         if self.is_parents:
             return
         now = self.watch.heard_at = self.host.steady()
@@ -51,7 +51,7 @@ class ActionEndpoint(Endpoint):
             _ended_answered(self, request, goal_id, asked, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
-        """Pass on feedback of a goal of ours."""
+        """Tell a goal of ours of its feedback, and keep that for the leaf."""
         handle = self.goals.get(goal_id)
         if handle is None:
             _ended_runs(self, goal_id)
@@ -64,7 +64,7 @@ class ActionEndpoint(Endpoint):
             wake([handle])
 
     def statuses_came(self, statuses: dict[bytes, int]) -> None:
-        """Pass on the statuses of our goals: each proves that the server has accepted the goal."""
+        """Tell our goals their statuses: each proves that the server has accepted the goal."""
         running = []
         for goal_id, status in statuses.items():
             if goal_id not in self.goals:  # nearly all, of a server that keeps what has ended
@@ -100,9 +100,9 @@ class ActionEndpoint(Endpoint):
         return watcher.run_due(self, now)
 
 
-# A goal that has ended: should it turn up at a second server, it is canceled. A word of it may be
-# older than its end, or that of another server of the name, which took it, too: to ask for its
-# cancel tells, as whoever has ended a goal neither agrees nor refuses.
+# A goal that has ended is canceled should it turn up at a second server of the name, which took it,
+# too. But what is heard of it may also be older than its end. A cancel request tells: a server that
+# has ended a goal neither agrees to cancel it nor refuses.
 
 
 def _ended_answered(
@@ -120,17 +120,17 @@ def _ended_answered(
         if is_news or _may_be_several(endpoint, ended):
             _turns_up(endpoint, goal_id, ended)
         elif sum(answers) > 1:  # by one, twice, or by one that is not shown yet
-            _ask(endpoint, goal_id, ended)
+            _try_to_cancel(endpoint, goal_id, ended)
 
 
 def _ended_runs(endpoint: Endpoint, goal_id: bytes) -> None:
     """Take feedback, or a status that shows that the goal runs: is it older than its end?"""
     ended = endpoint.ended.get(goal_id)
     if ended is not None and _may_be_several(endpoint, ended):
-        _ask(endpoint, goal_id, ended)
+        _try_to_cancel(endpoint, goal_id, ended)
 
 
-def _ask(endpoint: Endpoint, goal_id: bytes, ended: Ended) -> None:
+def _try_to_cancel(endpoint: Endpoint, goal_id: bytes, ended: Ended) -> None:
     now = endpoint.host.steady()
     if now - ended.asked_at >= ASK_AGAIN:
         ended.asked_at = now

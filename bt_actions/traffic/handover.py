@@ -1,8 +1,8 @@
 """Hands goals that were lost, or left, from one endpoint to another of the same action.
 
-Each node discovers for itself; so a goal whose server has gone for one node is seen to by whichever
-node of this process sees that server again, and is canceled first. Whether a
-server is there is for servers/ to say. All under the host's lock.
+Each node discovers for itself. So where a goal's server has gone for one node, whichever node of
+this process sees that server again sees to the goal, and cancels it first. All under the host's
+lock.
 """
 
 from __future__ import annotations

@@ -17,11 +17,11 @@ from bt_actions.traffic.state import Endpoint, wake
 from bt_actions.traffic.transport import ActionTransport
 
 LOOK_WHILE_WAITING = 0.05
+"""Seconds between two looks at a server that a goal waits for; for others, LOOK_WHILE_RUNNING."""
 LOOK_AT_REST = 1.0
+"""The same for a server that is ready and alone, as long as the count of servers stays the same."""
 DELIVER_EVERY = 0.01
-"""Seconds between two looks at a server: somebody waits for it; it is ready and alone, so that it
-does to count those in sight meanwhile, every LOOK_WHILE_RUNNING. The last: between two takes of
-answers, where nobody spins."""
+"""Seconds between two takes of answers, where nobody spins."""
 SILENT_FOR = 40.0
 """Seconds without a word of their server until goals whose node is gone are left to whoever can see
 whether it is there: longer than a dead one is shown, or a question is kept (DENIED_FOR_GOOD)."""
@@ -51,23 +51,23 @@ def run_due(endpoint: Endpoint, now: float) -> float:
 
 
 def _is_alone(endpoint: Endpoint) -> bool:
-    """Whether one server was there at the last look, and ready."""
+    """Whether the last look found one server, and it was ready."""
     return endpoint.looked_like is Server.READY and not endpoint.watch.is_crowded
 
 
 def _rests(endpoint: Endpoint) -> bool:
-    """Whether it was so, and nothing is held back from it."""
+    """Whether the server is alone, and no goal is held back from it."""
     return _is_alone(endpoint) and not any(endpoint.held_back)
 
 
 def recent_state(endpoint: Endpoint, now: float) -> Server:
-    """Return the server's state; look, unless that was done lately, and the count is as then.
+    """Return the server's state; look, unless that was done lately and the count is as then.
 
-    Who has taken another's place since is seen right after a send.
+    A server that has taken another's place since is seen right after a send.
     """
-    is_new = now - endpoint.looked_at < LOOK_AT_REST and _is_alone(endpoint)
-    is_new &= endpoint.action not in endpoint.domain.lost  # what was left is canceled first
-    if is_new and endpoint.participant.alive() and not _counts_others(endpoint):
+    is_known = now - endpoint.looked_at < LOOK_AT_REST and _is_alone(endpoint)
+    is_known &= endpoint.action not in endpoint.domain.lost  # what was left is canceled first
+    if is_known and endpoint.participant.alive() and not _counts_others(endpoint):
         if _rests(endpoint):
             endpoint.look_at = max(endpoint.look_at, now + LOOK_WHILE_RUNNING)
         return Server.READY
