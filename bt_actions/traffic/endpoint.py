@@ -16,10 +16,12 @@ from bt_actions.goals.ids import author_of
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, STATUS_SUCCEEDED, Event
 from bt_actions.servers.replies import DENIALS
 from bt_actions.traffic import cancel_queue, route, watcher
-from bt_actions.traffic.driver import close_if_unused, take_in, tell, tell_believed
+from bt_actions.traffic.driver import apply_deadlines, close_if_unused, take_in, tell, tell_believed
 from bt_actions.traffic.state import Ended, Endpoint, GoalHandle, Log, wake
 from bt_actions.traffic.transport import Request
 
+DELIVER_EVERY = 0.01
+"""Seconds between two takes of answers, where nobody spins."""
 TOLD_AT_MOST = 10
 """Goals of one action that are named; who left more left them in the same way."""
 
@@ -97,7 +99,17 @@ class ActionEndpoint(Endpoint):
 
     def run_due(self, now: float) -> float:
         """Look, send and apply deadlines as far as due; return the seconds until there is more."""
-        return watcher.run_due(self, now)
+        if not self.goals:
+            return watcher.look_early(self, now)
+        wait = watcher.look_if_due(self, now)
+        cancel_queue.send_more(self.cancels, now)
+        if self.orphaned or self.elsewhere:
+            route.deliver_arrived(self)
+            if not all(handle.accounted_for for handle in self.handles):
+                wait = min(wait, DELIVER_EVERY)
+        for handle in self.handles:
+            apply_deadlines(handle)
+        return wait
 
 
 # A goal that has ended is canceled should it turn up at a second server of the name, which took it,

@@ -9,9 +9,9 @@ from __future__ import annotations
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import LEASE, Server
 from bt_actions.servers.stalls import ANSWERS_TAKE
-from bt_actions.traffic import cancel_queue, handover, route
+from bt_actions.traffic import handover, route
 from bt_actions.traffic.admission import BESIDE
-from bt_actions.traffic.driver import apply_deadlines, tell, tell_believed
+from bt_actions.traffic.driver import tell, tell_believed
 from bt_actions.traffic.route import LOOK_WHILE_RUNNING
 from bt_actions.traffic.state import Endpoint, wake
 from bt_actions.traffic.transport import ActionTransport
@@ -20,17 +20,13 @@ LOOK_WHILE_WAITING = 0.05
 """Seconds between two looks at a server that a goal waits for; for others, LOOK_WHILE_RUNNING."""
 LOOK_AT_REST = 1.0
 """The same for a server that is ready and alone, as long as the count of servers stays the same."""
-DELIVER_EVERY = 0.01
-"""Seconds between two takes of answers, where nobody spins."""
 SILENT_FOR = 40.0
 """Seconds without a word of their server until goals whose node is gone are left to whoever can see
 whether it is there: longer than a dead one is shown, or a question is kept (DENIED_FOR_GOOD)."""
 
 
-def run_due(endpoint: Endpoint, now: float) -> float:
-    """Look, send and apply deadlines as far as due; return the seconds until there is more."""
-    if not endpoint.goals:
-        return look_early(endpoint, now)
+def look_if_due(endpoint: Endpoint, now: float) -> float:
+    """Look, if it is time to; return the seconds until the next look."""
     if now >= endpoint.look_at:
         if _rests(endpoint):
             recent_state(endpoint, now)
@@ -39,15 +35,7 @@ def run_due(endpoint: Endpoint, now: float) -> float:
         handover.bound_the_lost(endpoint)
         waits = endpoint.has_unsent or endpoint.watch.state(now) is Server.UNCLEAR
         endpoint.look_at = now + (LOOK_WHILE_WAITING if waits else LOOK_WHILE_RUNNING)
-    wait = endpoint.look_at - now
-    cancel_queue.send_more(endpoint.cancels, now)
-    if endpoint.orphaned or endpoint.elsewhere:
-        route.deliver_arrived(endpoint)
-        if not all(handle.accounted_for for handle in endpoint.handles):
-            wait = min(wait, DELIVER_EVERY)
-    for handle in endpoint.handles:
-        apply_deadlines(handle)
-    return wait
+    return endpoint.look_at - now
 
 
 def _is_alone(endpoint: Endpoint) -> bool:
