@@ -2,7 +2,8 @@
 
 It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-goals/ decides what happens to the goal; here stand the visit to the leaf and its attempts.
+Here stand the visit to the leaf and its attempts. What happens to a goal is decided in goals/; how
+it goes out, and an answer comes back, is told at the head of traffic/__init__.py.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 What there is stands in state.py: a process (`Host`) has ROS domains, a domain has the endpoints of
 all nodes, an endpoint has goals on their way (`GoalHandle`), and each of those has one `Goal` of
-goals/. All else is functions over it. They wait for nothing, read no clock and have no thread; the
+goals/. All else is functions over it, which wait for nothing, read no clock and have no thread; the
 host's lock is held. The world comes in at four places:
 
     a leaf          Traffic.begin, .advance, .interrupt      traffic.py
@@ -18,9 +18,8 @@ A goal goes out, and a reply comes back, through these functions, in this order:
     answer_came       Replies.weigh_answer, driver.tell_believed, driver.tell: Goal.on, and what
                       follows from that in driver._do_in_order; when the goal is DONE, driver.retire
 
-The files from below to above; each calls those before it alone: transport.py, scheduler.py,
-state.py, cancel_queue.py, route.py (to see, ask and hear a server), admission.py (may it be sent?),
-driver.py (what goals are told, and what they decide), handover.py (goals that another endpoint sees
-to), watcher.py (looks at the server), endpoint.py, drain.py, traffic.py. Beside them is backend.py,
-for what is above this room.
+From below to above, each file imports those before it alone: transport.py, scheduler.py, state.py,
+cancel_queue.py, route.py (sees, asks and hears a server), admission.py (may a goal be sent?),
+driver.py (tells goals, and does what they decide), handover.py (goals go to another endpoint),
+watcher.py (looks at a server), endpoint.py, drain.py, traffic.py, and for the rooms above backend.py.
 """
