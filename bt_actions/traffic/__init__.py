@@ -21,5 +21,5 @@ A goal goes out, and a reply comes back, through these functions, in this order:
 From below to above, each file imports those before it alone: transport.py, scheduler.py, state.py,
 cancel_queue.py, route.py (sees, asks and hears a server), admission.py (may a goal be sent?),
 driver.py (tells goals, and does what they decide), handover.py (goals go to another endpoint),
-watcher.py (looks at a server), endpoint.py, drain.py, traffic.py, and for the rooms above backend.py.
+watcher.py (looks at a server), endpoint.py, drain.py, traffic.py, and, for other rooms, backend.py.
 """

@@ -261,7 +261,7 @@ class Endpoint(Listener, Scheduled):
         # Its server (watcher.py)
         self.watch = ServerWatch()
         self.heard_at = host.steady()
-        """When its servers were last heard of."""
+        """When a server of its goals was last heard; a denial by a newcomer does not count."""
         self.orphaned = False
         """Its node is gone: nobody can want its goals any more."""
         self.look_at = 0.0

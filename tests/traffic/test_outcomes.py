@@ -21,6 +21,7 @@ from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
 from bt_actions.testing.transport import VirtualParticipant
 from bt_actions.traffic import handover, watcher
+from bt_actions.traffic.state import GoalHandle, Run
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -653,6 +654,28 @@ def test_a_node_that_is_destroyed_while_a_goal_is_made_sends_it_not(world: World
         world.network.timeline.advance(world.network.now() + 0.05)
     assert stood(leaf) == (Outcome.CANCELED, End.NEVER_STARTED)
     assert journal.count("received") == 0
+
+
+def test_all_that_a_goal_has_decided_is_done_before_what_follows_for_the_next(world: World) -> None:
+    """The result of the first gives the server to the second, which is told when that is over."""
+    world.serve()
+    node = VirtualBackend(world.network)
+    first, second = MoveRobot("first", 0.1), MoveRobot("second", 0.1)
+    for leaf in (first, second):
+        leaf.setup(node=node)
+    until_it_runs(world, first)
+    second.tick_once()
+    [waits] = second.open_handles()
+    there = list[list[str]]()
+
+    def note(changed: GoalHandle | None) -> None:
+        if changed is not None:
+            there.append([each.name for each in changed.endpoint.handles])
+
+    waits.run = Run(note)
+    while not there:
+        world.network.timeline.advance(world.network.now() + 0.05)
+    assert there == [["second"]]
 
 
 def until_it_runs(world: World, leaf: ActionBehaviour) -> None:
