@@ -9,7 +9,7 @@ to decide. All under the host's lock.
 
 from __future__ import annotations
 
-from bt_actions.traffic.state import CancelQueue, Endpoint
+from bt_actions.traffic.state import Endpoint
 
 AT_MOST = 8
 """Requests of this process without an answer at one server: two places are left to others."""
@@ -20,36 +20,37 @@ ANSWERED_WITHIN = 1.0
 def ask_to_cancel(endpoint: Endpoint, goal_id: bytes) -> None:
     """Ask the server to cancel a goal, as soon as its queue has room."""
     endpoint.cancels.waiting[goal_id] = endpoint
-    send_more(endpoint.cancels, endpoint.host.steady())
+    send_more(endpoint, endpoint.host.steady())
 
 
-def make_room(queue: CancelQueue, goal_id: bytes, now: float) -> None:
+def make_room(endpoint: Endpoint, goal_id: bytes, now: float) -> None:
     """Take note of an answer (seconds, steady clock)."""
-    queue.asked.pop(goal_id, None)
-    send_more(queue, now)
+    endpoint.cancels.asked.pop(goal_id, None)
+    send_more(endpoint, now)
 
 
-def forget(queue: CancelQueue, goal_id: bytes) -> None:
+def forget(endpoint: Endpoint, goal_id: bytes) -> None:
     """Ask no more for this goal."""
-    queue.waiting.pop(goal_id, None)
-    queue.asked.pop(goal_id, None)
+    endpoint.cancels.waiting.pop(goal_id, None)
+    endpoint.cancels.asked.pop(goal_id, None)
 
 
-def send_now(queue: CancelQueue, goal_id: bytes) -> None:
+def send_now(endpoint: Endpoint, goal_id: bytes) -> None:
     """Send what waits for this goal, room or not: there may be no other time."""
-    endpoint = queue.waiting.pop(goal_id, None)
-    if endpoint is not None:
-        send_cancel(endpoint, goal_id)
+    sender = endpoint.cancels.waiting.pop(goal_id, None)
+    if sender is not None:
+        send_cancel(sender, goal_id)
 
 
-def send_more(queue: CancelQueue, now: float) -> None:
-    """Send what there is room for (seconds, steady clock)."""
-    for goal_id in [each for each, at in queue.asked.items() if now - at >= ANSWERED_WITHIN]:
-        del queue.asked[goal_id]
-    while queue.waiting and len(queue.asked) < AT_MOST:
-        goal_id = next(iter(queue.waiting))
-        if send_cancel(queue.waiting.pop(goal_id), goal_id):
-            queue.asked[goal_id] = now
+def send_more(endpoint: Endpoint, now: float) -> None:
+    """Send what the server has room for, of all endpoints to it (seconds, steady clock)."""
+    waiting, asked = endpoint.cancels.waiting, endpoint.cancels.asked
+    for goal_id in [each for each, at in asked.items() if now - at >= ANSWERED_WITHIN]:
+        del asked[goal_id]
+    while waiting and len(asked) < AT_MOST:
+        goal_id = next(iter(waiting))
+        if send_cancel(waiting.pop(goal_id), goal_id):
+            asked[goal_id] = now
 
 
 def send_cancel(endpoint: Endpoint, goal_id: bytes) -> bool:

@@ -94,7 +94,7 @@ class Drain:
                 self._deliver_arrived()
                 return Sleep(LOOK)
             for each in self._waits:  # all at once, though a server's queue drops what is too much
-                cancel_queue.send_now(each.endpoint.cancels, each.goal.id)
+                cancel_queue.send_now(each.endpoint, each.goal.id)
             for each in self._waits:
                 tell(each, Event.DRAIN_GAVE_UP)
             return Done([each for each in self._wanted if not each.is_over])

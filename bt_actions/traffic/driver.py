@@ -22,7 +22,6 @@ from bt_actions.traffic.transport import GOALS_KEPT
 
 Effect = Callable[[GoalHandle], None]
 """What is done for a goal."""
-_UNANSWERED = (Outcome.ACCEPT_TIMEOUT, None)
 
 
 # What happens
@@ -99,10 +98,8 @@ def _suspend_after_stall(handle: GoalHandle, now: Now) -> None:
     """Suspend deadlines that have passed while a stall may be why nothing has come in."""
     goal, endpoint, stalls = handle.goal, handle.endpoint, handle.endpoint.host.stalls
     waits = goal.state is State.WAITING_FOR_SERVER
-    is_open = (
-        route.holds_back(endpoint, now.steady) if waits else route.in_doubt(endpoint, now.steady)
-    )
-    in_doubt = route.LOOK_WHILE_RUNNING if is_open else 0.0
+    doubts = route.holds_back if waits else route.in_doubt
+    in_doubt = route.LOOK_WHILE_RUNNING if doubts(endpoint, now.steady) else 0.0
     servers = stalls.servers_take(now.steady) if waits or goal.lost else 0.0
     goal.deadlines.suspend(max(stalls.answers_take(now.steady), servers, in_doubt), now)
 
@@ -116,7 +113,10 @@ def _apply(handle: GoalHandle, event: Event, now: Now, detail: Any = None) -> No
     host.trace.told(handle, event, detail, commands)
     if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
         goal.reason += why_not(handle)
-    elif event is Event.ACCEPT_DUE and (goal.planned, goal.outcome) == _UNANSWERED:
+    elif event is Event.ACCEPT_DUE and (goal.planned, goal.outcome) == (
+        Outcome.ACCEPT_TIMEOUT,
+        None,
+    ):
         goal.reason += endpoint.participant.unheard()
     if (due := goal.due_in(now)) is not None:
         host.scheduler.wake_by(now.steady + due)
@@ -289,8 +289,8 @@ def retire(handle: GoalHandle) -> None:
         endpoint.domain.left.pop(handle, None)
         endpoint.transport.forget(goal.id)
         if goal.end is End.UNKNOWN:
-            cancel_queue.send_now(endpoint.cancels, goal.id)  # nobody will ask again
-        cancel_queue.forget(endpoint.cancels, goal.id)
+            cancel_queue.send_now(endpoint, goal.id)  # nobody will ask again
+        cancel_queue.forget(endpoint, goal.id)
         if goal.sent and goal.state is State.DONE:
             _keep_ended(handle)
     if not endpoint.goals:

@@ -42,7 +42,7 @@ class ActionEndpoint(Endpoint):
             return
         now = self.watch.heard_at = self.host.steady()
         if request == "cancel":
-            cancel_queue.make_room(self.cancels, goal_id, now)
+            cancel_queue.make_room(self, goal_id, now)
         handle = self._heard_of(goal_id, denies=answers[-1] in DENIALS)
         if handle is not None:
             told = handle.replies.weigh_answer(request, self.watch, now, asked, answers)
@@ -102,7 +102,7 @@ class ActionEndpoint(Endpoint):
         if not self.goals:
             return watcher.look_early(self, now)
         wait = watcher.look_if_due(self, now)
-        cancel_queue.send_more(self.cancels, now)
+        cancel_queue.send_more(self, now)
         if self.orphaned or self.elsewhere:
             route.deliver_arrived(self)
             if not all(handle.accounted_for for handle in self.handles):

@@ -72,7 +72,7 @@ def deliver_arrived(endpoint: Endpoint) -> None:
         endpoint.transport.deliver_arrived()
     except Exception as error:  # noqa: BLE001 - the middleware's: any
         endpoint.warn_once("something that arrived could not be taken", error)
-    cancel_queue.send_more(endpoint.cancels, endpoint.host.steady())
+    cancel_queue.send_more(endpoint, endpoint.host.steady())
 
 
 # Does the server hear us?

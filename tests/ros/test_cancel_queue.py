@@ -51,15 +51,15 @@ def server() -> Any:
 def test_so_many_are_sent_and_each_answer_makes_room_for_one(server: Any) -> None:
     assert server.sent == GOALS[:AT_MOST]
     for count, goal in enumerate(GOALS, start=1):
-        make_room(server.cancels, goal, 0.1)
+        make_room(server, goal, 0.1)
         assert server.sent == GOALS[: AT_MOST + count]
 
 
 def test_what_is_not_answered_makes_room_after_a_while(server: Any) -> None:
-    send_more(server.cancels, ANSWERED_WITHIN - 0.1)
+    send_more(server, ANSWERED_WITHIN - 0.1)
     assert server.sent == GOALS[:AT_MOST]
     for rounds in (1, 2):
-        send_more(server.cancels, rounds * ANSWERED_WITHIN)
+        send_more(server, rounds * ANSWERED_WITHIN)
     assert server.sent == GOALS
 
 
@@ -68,21 +68,21 @@ def test_who_is_asked_for_again_keeps_its_turn(server: Any) -> None:
     for goal in reversed(GOALS[AT_MOST:]):
         ask_to_cancel(server, goal)
     for goal in GOALS:
-        make_room(server.cancels, goal, 0.6)
+        make_room(server, goal, 0.6)
     assert server.sent == GOALS
 
 
 def test_what_has_ended_is_not_asked_for_and_makes_room(server: Any) -> None:
-    forget(server.cancels, GOALS[AT_MOST])
-    forget(server.cancels, GOALS[0])
-    send_more(server.cancels, 0.1)
+    forget(server, GOALS[AT_MOST])
+    forget(server, GOALS[0])
+    send_more(server, 0.1)
     assert server.sent == [*GOALS[:AT_MOST], GOALS[AT_MOST + 1]]
 
 
 def test_what_cannot_wait_is_sent_at_once_and_once(server: Any) -> None:
     for goal in GOALS:
-        send_now(server.cancels, goal)
-        make_room(server.cancels, goal, 0.1)
+        send_now(server, goal)
+        make_room(server, goal, 0.1)
     assert server.sent == GOALS
 
 
