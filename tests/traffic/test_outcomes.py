@@ -656,6 +656,18 @@ def test_a_node_that_is_destroyed_while_a_goal_is_made_sends_it_not(world: World
     assert journal.count("received") == 0
 
 
+def test_a_leaf_that_was_shut_down_and_is_set_up_again_has_a_transport_that_is_open(
+    world: World,
+) -> None:
+    node, leaf = VirtualBackend(world.network), MoveRobot("m", 0.1)
+    for _ in range(2):
+        leaf.setup(node=node)
+        transport = leaf._own.transport
+        assert not transport.closed
+        leaf.shutdown()
+        assert transport.closed
+
+
 def test_all_that_a_goal_has_decided_is_done_before_what_follows_for_the_next(world: World) -> None:
     """The result of the first gives the server to the second, which is told when that is over."""
     world.serve()
