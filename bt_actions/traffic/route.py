@@ -84,7 +84,7 @@ def holds_back(endpoint: Endpoint, now: float) -> bool:
     Of two, a new participant may not have discovered the second yet. The first one may be the wrong
     one, or both may move.
     """
-    if in_doubt(endpoint, now) > 0.0:
+    if in_doubt(endpoint, now):
         return True
     seen_since = endpoint.transport.seen_since
     came_at = max(seen_since, endpoint.watch.in_sight_since)
@@ -92,11 +92,11 @@ def holds_back(endpoint: Endpoint, now: float) -> bool:
     return is_new and not is_absent(endpoint, now)
 
 
-def in_doubt(endpoint: Endpoint, now: float) -> float:
-    """Return for how many seconds a server that is silent may not have heard us; or 0."""
+def in_doubt(endpoint: Endpoint, now: float) -> bool:
+    """Whether a server that is silent may not have heard us, and there may be another way."""
     if endpoint.orphaned or is_absent(endpoint, now):
-        return 0.0  # there is no other way
-    return _reachability(endpoint, now).in_doubt(now)
+        return False
+    return _reachability(endpoint, now).in_doubt(now) > 0.0
 
 
 def take_question(endpoint: Endpoint, now: float) -> bool:

@@ -256,7 +256,7 @@ class Endpoint(Listener, Scheduled):
         """The newest goals that were DONE here."""
         self.cancels = self.domain.cancels[action]
         self.forks = host.forks
-        """Before so many forks it was made."""
+        """How many forks there had been when it was made."""
 
         # Its server (watcher.py)
         self.watch = ServerWatch()

@@ -43,7 +43,7 @@ def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> 
 @pytest.fixture(autouse=True)
 def nothing_happens(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drain, "tell", tell)
-    monkeypatch.setattr(drain, "in_doubt", lambda endpoint, now: 0.0)
+    monkeypatch.setattr(drain, "in_doubt", lambda endpoint, now: False)
     for what in ("deliver_arrived", "apply_deadlines"):
         monkeypatch.setattr(drain, what, lambda _: None)
 
