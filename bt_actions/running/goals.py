@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import State
 from bt_actions.goals.unaccounted import GoalReport, report_of
-from bt_actions.traffic.handle import GoalHandle, Run, begun_in
+from bt_actions.traffic.state import GoalHandle, Run, ticking_run
 
 T = TypeVar("T")
 
@@ -42,11 +42,11 @@ class RunGoals:
 
     def begun_in(self, step: Callable[[], T]) -> T:
         """Return what `step` does; what it sets up and ticks is ours."""
-        before = begun_in.set(self._run)
+        before = ticking_run.set(self._run)
         try:
             return step()
         finally:
-            begun_in.reset(before)
+            ticking_run.reset(before)
 
     @property
     def not_over(self) -> list[GoalHandle]:
@@ -70,7 +70,7 @@ class RunGoals:
 
     def close(self, now: float) -> None:
         """Take note of nothing any more, and tell what has only now become known."""
-        self._run.tell = lambda handle: None
+        self._run.notify = lambda handle: None
         self.tell(now)
 
     def _note(self, handle: GoalHandle | None) -> None:
