@@ -294,6 +294,7 @@ def retire(handle: GoalHandle) -> None:
         cancel_queue.forget(endpoint, goal.id)
         if goal.sent and goal.state is State.DONE:
             _keep_ended(handle)
+    route.close_former(endpoint)
     if not endpoint.goals:
         endpoint.domain.open.pop(endpoint, None)
         endpoint.host.scheduler.remove(endpoint)

@@ -69,7 +69,8 @@ def deliver_arrived(endpoint: Endpoint) -> None:
     if endpoint.is_parents:
         return
     try:
-        endpoint.transport.deliver_arrived()
+        for transport in (endpoint.transport, *endpoint.former):
+            transport.deliver_arrived()
     except Exception as error:  # noqa: BLE001 - the middleware's: any
         endpoint.warn_once("something that arrived could not be taken", error)
     cancel_queue.send_more(endpoint, endpoint.host.steady())
@@ -149,7 +150,7 @@ def is_unresponsive(endpoint: Endpoint, now: float) -> bool:
 
 def begin_trial(endpoint: Endpoint, transport: ActionTransport) -> None:
     """Try a transport like our own, which was opened in another participant."""
-    transport.on_trial = True
+    transport.beside_another = True
     now = endpoint.host.steady()
     if not is_absent(endpoint, now):
         endpoint.transport.reachability.tried(now)
@@ -181,12 +182,27 @@ def is_better(endpoint: Endpoint, transport: ActionTransport) -> bool:
 
 
 def replace_transport(endpoint: Endpoint, transport: ActionTransport) -> None:
-    """Use another transport, of which nothing is known yet."""
-    endpoint.transport.close()
+    """Use another transport, of which nothing is known yet.
+
+    The old one stays open for the goal requests that are under way: on a link that loses them the
+    middleware sends them again, as long as their sender is there.
+    """
+    pending = [each for each in endpoint.handles if each.goal.request_pending]
+    endpoint.transport.beside_another = True
+    endpoint.former[endpoint.transport] = pending
+    close_former(endpoint)
     endpoint.transport, endpoint.watch = transport, ServerWatch()
     endpoint.looked_like, endpoint.looked_at = Server.ABSENT, NEVER
     endpoint.look_soon()
     endpoint.host.scheduler.wake_by(endpoint.host.steady())
+
+
+def close_former(endpoint: Endpoint) -> None:
+    """Close the transports of before by which no goal request is under way any more."""
+    for transport, sent in list(endpoint.former.items()):
+        if not any(handle.goal.request_pending for handle in sent):
+            del endpoint.former[transport]
+            transport.close()
 
 
 def fall_back(endpoint: Endpoint) -> bool:
@@ -198,5 +214,6 @@ def fall_back(endpoint: Endpoint) -> bool:
     except Exception:  # noqa: BLE001 - or it is gone by now, too
         return False
     endpoint.elsewhere = False
+    endpoint.transport.close()
     replace_transport(endpoint, transport)
     return True

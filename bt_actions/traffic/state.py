@@ -285,6 +285,8 @@ class Endpoint(Listener, Scheduled):
         """When a server was asked that has answered a transport on trial."""
         self._warned_of: set[str] = set()
         self.transport = participant.open_transport(*action, self)
+        self.former: dict[ActionTransport, list[GoalHandle]] = {}
+        """Transports that were replaced, and the goals whose request was under way there."""
 
     @property
     def is_parents(self) -> bool:

@@ -177,8 +177,8 @@ def _orphan(endpoint: Endpoint) -> None:
 def move_to(endpoint: Endpoint, transport: ActionTransport) -> None:
     """Use a transport in a participant that sees the server; nobody spins that.
 
-    What is under way in the old one is not heard there. A question for a result, or a cancel,
-    is asked anew; of a goal request nobody knows whether it has arrived.
+    A question for a result, or a cancel, is asked anew in it. Of a goal request nobody knows
+    whether it has arrived, so the old one goes on with that.
     """
     now, log = endpoint.host.steady(), endpoint.host.log
     blind, seen = route.is_absent(endpoint, now), endpoint.watch.gids
@@ -186,7 +186,7 @@ def move_to(endpoint: Endpoint, transport: ActionTransport) -> None:
     if endpoint.transport.closed:  # by what came, and nobody used the endpoint
         transport.close()
         return
-    transport.on_trial = False
+    transport.beside_another = False
     endpoint.elsewhere = True
     route.replace_transport(endpoint, transport)
     if blind:
