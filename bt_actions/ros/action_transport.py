@@ -87,8 +87,8 @@ class RosTransport:
         """Whom to tell what, and when that was asked for."""
         self.reachability = Reachability()
         """Under the one lock, as all requests."""
-        self.on_trial = False
-        """The listener has another client; here it wants to hear of statuses alone."""
+        self.beside_another = False
+        """The listener has another client, and hears of feedback by that alone."""
         self.closed = False
         check_for_type_support(action_type)
         self._impl = action_type.Impl
@@ -195,7 +195,7 @@ class RosTransport:
                 tell, what, asked = self._inbox.popleft()
                 if asked is not None:
                     self.reachability.answered(asked=asked)
-                if self.on_trial and tell != self._listener.statuses_came:
+                if self.beside_another and tell == self._listener.feedback_came:
                     continue
                 try:
                     tell(*what)

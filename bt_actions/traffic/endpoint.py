@@ -61,6 +61,8 @@ class ActionEndpoint:
         self._left_by_dead: set[bytes] = set()
         self._ended = EndedGoals(self, host)
         self.transport = participant.open_transport(*action, self)
+        self._former: dict[ActionTransport, list[GoalHandle]] = {}
+        """Transports that were replaced, and the goals whose request was under way there."""
         route = Route(self, host)
         self.in_doubt, self.holds_back = route.in_doubt, route.holds_back
         self.watcher = watcher = Watcher(self, host, route)
@@ -165,7 +167,8 @@ class ActionEndpoint:
         if self.is_parents:
             return
         try:
-            self.transport.deliver_arrived()
+            for transport in (self.transport, *self._former):
+                transport.deliver_arrived()
         except Exception as error:  # noqa: BLE001 - the middleware's: any
             self._warn_once("something that arrived could not be taken", error)
         self.cancels.send_more(self._host.steady())
@@ -210,8 +213,21 @@ class ActionEndpoint:
             self._unused(self)
 
     def replace_transport(self, transport: ActionTransport) -> None:
-        """Use another transport, of which nothing is known yet."""
-        self.transport.close()
+        """Use another transport, of which nothing is known yet.
+
+        The old one stays open for the goal requests that are under way: on a link that loses them
+        the middleware sends them again, as long as their sender is there.
+        """
+        self.transport.beside_another = True
+        self._former[self.transport] = [each for each in self.handles if each.goal.request_pending]
+        self.close_former()
         self.transport, self.watch = transport, ServerWatch()
         self.watcher.begin_anew()
         self._host.scheduler.wake_by(self._host.steady())
+
+    def close_former(self) -> None:
+        """Close the transports of before by which no goal request is under way any more."""
+        for transport, sent in list(self._former.items()):
+            if not any(handle.goal.request_pending for handle in sent):
+                del self._former[transport]
+                transport.close()

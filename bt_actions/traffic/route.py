@@ -123,7 +123,7 @@ class Route:
         """Return a transport like our own in another participant, on trial."""
         endpoint, now = self._endpoint, self._host.steady()
         transport = participant.open_transport(*endpoint.action, endpoint)
-        transport.on_trial = True
+        transport.beside_another = True
         if not self._is_absent(now):
             endpoint.transport.reachability.tried(now)
             transport.reachability.doubt(now, TWICE)
@@ -155,8 +155,8 @@ class Route:
     def move_to(self, transport: ActionTransport) -> None:
         """Use a transport in a participant that sees the server; nobody spins that.
 
-        What is under way in the old one is not heard there. A question for a result, or a cancel,
-        is asked anew; of a goal request nobody knows whether it has arrived.
+        A question for a result, or a cancel, is asked anew in it. Of a goal request nobody knows
+        whether it has arrived, so the old one goes on with that.
         """
         endpoint, now = self._endpoint, self._host.steady()
         blind, seen = self._is_absent(now), endpoint.watch.gids
@@ -164,7 +164,7 @@ class Route:
         if endpoint.transport.closed:  # by what came, and nobody used the endpoint
             transport.close()
             return
-        transport.on_trial = False
+        transport.beside_another = False
         self.elsewhere = True
         endpoint.replace_transport(transport)
         if blind:
@@ -189,5 +189,6 @@ class Route:
         except Exception:  # noqa: BLE001 - or it is gone by now, too
             return False
         self.elsewhere = False
+        endpoint.transport.close()
         endpoint.replace_transport(transport)
         return True

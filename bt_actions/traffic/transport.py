@@ -62,8 +62,8 @@ class ActionTransport(Protocol):
     """
 
     closed: bool
-    on_trial: bool
-    """The listener has another transport; of this one it wants to hear of statuses alone."""
+    beside_another: bool
+    """The listener has another transport, and hears of feedback by that alone."""
 
     seen_since: float
     """Since when its participant sees others (seconds, steady clock)."""

@@ -39,7 +39,7 @@ class ModelTransport:
     """One action as one node sees it, whose messages go through the model world."""
 
     seen_since = float("-inf")  # it has discovered who is there
-    has_more = on_trial = False
+    has_more = beside_another = False
 
     def __init__(self, caller: Caller, node: int, name: str, listener: Listener) -> None:
         self._caller, self._node, self._name, self._listener = caller, node, name, listener

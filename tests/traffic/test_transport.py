@@ -239,13 +239,14 @@ def test_of_what_is_forgotten_only_a_further_acceptance_is_told(side: Side) -> N
     side.until_told(("goal", goal_id, (True,)))
 
 
-def test_on_trial_it_tells_of_statuses_alone(side: Side) -> None:
-    side.transport.on_trial = True
+def test_beside_another_it_tells_of_no_feedback(side: Side) -> None:
+    side.transport.beside_another = True
     side.serve()
     goal_id = side.send()
     side.world.until(lambda: any(goal_id in each for each in side.heard.statuses))
-    side.world.until(lambda: side.transport.reachability.heard)
-    assert (side.heard.told, side.heard.feedback) == ([], [])
+    side.transport.ask_result(goal_id)
+    side.until_told(("goal", goal_id, (True,)), ("result", goal_id, (STATUS_SUCCEEDED,)))
+    assert side.heard.feedback == []
 
 
 def test_who_comes_later_is_shown_the_statuses_that_there_are(side: Side) -> None:
