@@ -213,10 +213,9 @@ class Driver:
     def _wake_waiting(self, handle: GoalHandle) -> None:
         """Wake those of all nodes whose goals may have waited for this one.
 
-        There may be room at its server, or no conflict any more, or its request was answered.
+        There may be room at its server, or no conflict any more.
         """
         endpoint, resources = self._endpoint, handle.goal.resources
-        endpoint.close_former()
         unsent = endpoint.domain.unsent
         for each in [each for each in unsent if each.goal.sent or each.goal.state is State.DONE]:
             del unsent[each]

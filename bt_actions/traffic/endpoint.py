@@ -206,6 +206,7 @@ class ActionEndpoint:
             self.cancels.forget(goal.id)
             if goal.sent and goal.state is State.DONE:
                 self._ended.keep(handle)
+        self._close_former()
         if not self.goals:
             self.domain.open.pop(self, None)
             self._host.scheduler.remove(self)
@@ -220,13 +221,12 @@ class ActionEndpoint:
         """
         self.transport.beside_another = True
         self._former[self.transport] = [each for each in self.handles if each.goal.request_pending]
-        self.close_former()
+        self._close_former()
         self.transport, self.watch = transport, ServerWatch()
         self.watcher.begin_anew()
         self._host.scheduler.wake_by(self._host.steady())
 
-    def close_former(self) -> None:
-        """Close the transports of before by which no goal request is under way any more."""
+    def _close_former(self) -> None:
         for transport, sent in list(self._former.items()):
             if not any(handle.goal.request_pending for handle in sent):
                 del self._former[transport]

@@ -100,9 +100,6 @@ class Endpoint(Listener, Scheduled, Protocol):
     def replace_transport(self, transport: ActionTransport) -> None:
         """Use another transport, of which nothing is known yet."""
 
-    def close_former(self) -> None:
-        """Close the transports of before by which no goal request is under way any more."""
-
 
 @dataclass(eq=False, slots=True)
 class GoalHandle:
