@@ -23,8 +23,10 @@ def move(leaf: MoveRobot, world: World) -> tuple[VirtualTransport, VirtualTransp
     ("distance", "outcome"), [(101.0, Outcome.REJECTED), (0.5, Outcome.SUCCEEDED)]
 )
 def test_a_goal_request_that_is_under_way_is_answered_where_it_was_sent(
-    world: World, distance: float, outcome: Outcome
+    world: World, monkeypatch: pytest.MonkeyPatch, distance: float, outcome: Outcome
 ) -> None:
+    """Nobody may spin the participant of before, either: what has come there is taken by hand."""
+    taken = list[float]()
     journal = world.serve("1:delay_accept=2")
     leaf = MoveRobot("m", distance)
     with world.runner(leaf) as runner:
@@ -32,8 +34,10 @@ def test_a_goal_request_that_is_under_way_is_answered_where_it_was_sent(
         runner.until(lambda: journal.events() == ["received"])
         former, later = move(leaf, world)
         assert not former.closed
+        monkeypatch.setattr(former, "deliver_arrived", lambda: taken.append(runner.now))
         runner.wait(10.0)
     assert leaf.outcome is outcome
+    assert taken
     assert former.closed
     assert later.closed
 
