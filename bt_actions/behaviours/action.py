@@ -2,7 +2,8 @@
 
 The leaf keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-goals/ decides what happens to the goal; here stand the visit to the leaf and its attempts.
+Here stand the visit to the leaf and its attempts. What happens to a goal is decided in goals/; how
+it goes out, and an answer comes back, is told at the head of traffic/__init__.py.
 """
 
 from __future__ import annotations
@@ -31,8 +32,7 @@ from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.endpoint import ActionEndpoint
-    from bt_actions.traffic.handle import GoalHandle
+    from bt_actions.traffic.state import Endpoint, GoalHandle
 
 
 _PLAIN = {bool, int, float, str}
@@ -53,7 +53,7 @@ class Progress:
     """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
 
 
-class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
+class ActionBehaviour(Connected["Endpoint"], Behaviour):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
     While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
@@ -214,7 +214,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.action_type = action
         super().setup(**kwargs)
 
-    def _make(self, backend: Backend) -> ActionEndpoint:
+    def _make(self, backend: Backend) -> Endpoint:
         return backend.traffic.endpoint(self.action_type, self.action_name)
 
     def initialise(self) -> None:

@@ -18,7 +18,7 @@ from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
 from bt_actions.messages.interfaces import RUN_TREE
 from bt_actions.traffic.backend import Backend
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.state import GoalHandle
 
 CANCEL = 15.0
 """Seconds for a run to end when it is canceled: it sees its own goals to their ends first, within

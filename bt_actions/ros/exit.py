@@ -42,7 +42,8 @@ def close_process() -> None:
             drain(host, left, lambda: hurried)
         finally:
             for handle in left:
-                if not handle.is_over and handle.told is not End.UNKNOWN:  # else the log has it
+                is_logged = handle.end_logged is End.UNKNOWN
+                if not handle.is_over and not is_logged:
                     log.error(report_of(handle.goal, handle.name).alarm)
             host.record.close()
             log.flush()

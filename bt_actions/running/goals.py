@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from bt_actions.events import FeedbackCame, GoalChanged
+from bt_actions.events import FeedbackCame, GoalChanged, ServerSeen
 from bt_actions.events.snapshot import snapshot
 from bt_actions.events.teller import OFTEN, Teller, here
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import State
 from bt_actions.goals.unaccounted import GoalReport, report_of
-from bt_actions.traffic.handle import GoalHandle, Run, begun_in
+from bt_actions.traffic.state import GoalHandle, Run, ticking_run
 
 T = TypeVar("T")
 
@@ -35,7 +35,7 @@ class RunGoals:
         `changed` is called, under the lock of the traffic, where one of ours has changed.
         """
         self._teller, self._wake, self._changed, self._steady = teller, wake, changed, steady
-        self._run = Run(self._note, self._feedback)
+        self._run = Run(self._note, self._feedback, self._sight)
         self._handles: dict[GoalHandle, _Told] = {}  # in the order in which they began
         self.run_goes_on = False
         """Between two runs only what earlier ones have left is of interest."""
@@ -44,12 +44,12 @@ class RunGoals:
 
     def begun_in(self, step: Callable[[], T]) -> T:
         """Return what `step` does; what it sets up and ticks is ours."""
-        before, teller = begun_in.set(self._run), here.set(self._teller)
+        before, teller = ticking_run.set(self._run), here.set(self._teller)
         try:
             return step()
         finally:
             here.reset(teller)
-            begun_in.reset(before)
+            ticking_run.reset(before)
 
     @property
     def not_over(self) -> list[GoalHandle]:
@@ -73,8 +73,9 @@ class RunGoals:
 
     def close(self) -> None:
         """Take note of nothing any more."""
-        self._run.tell = lambda handle: None
+        self._run.notify = lambda handle: None
         self._run.feedback = lambda handle, message: None
+        self._run.sight = lambda server, in_sight: None
 
     def forget(self) -> None:
         """Forget what is over."""
@@ -120,6 +121,9 @@ class RunGoals:
         if now - told.at >= OFTEN:
             told.at = now
             self._tell_feedback(handle, told)
+
+    def _sight(self, server: str, in_sight: bool) -> None:
+        self._teller.stream.add(ServerSeen, server, in_sight)
 
     def _tell_feedback(self, handle: GoalHandle, told: _Told) -> None:
         """Tell the latest that was not told yet."""

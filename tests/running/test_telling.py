@@ -14,7 +14,7 @@ from py_trees.common import Access, Status
 from robot_control_interfaces.action import Gripper as GripperAction
 from robot_control_interfaces.action import MoveRobot as Move
 
-from bt_actions import ActionBehaviour, MoveRobot, Retry, load_tree
+from bt_actions import ActionBehaviour, MoveRobot, Retry, Timeouts, load_tree
 from bt_actions.events import (
     AttemptEnded,
     Event,
@@ -24,6 +24,7 @@ from bt_actions.events import (
     NodesAdded,
     RoundBegan,
     RunBegan,
+    ServerSeen,
     VariableWritten,
 )
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
@@ -113,6 +114,21 @@ class TestGoals:
         assert (second.attempt, second.again_in) == (2, None)
         assert first.expect == "result.stalled and result.position > $least"
         assert first.seen == {"result.stalled": False, "result.position": 0.0, "$least": 5.0}
+
+
+def test_a_server_is_told_of_when_it_comes_in_sight_and_when_it_goes() -> None:
+    network = VirtualNetwork()
+    leaf = MoveRobot("m", 2.0, timeout=Timeouts(server=30.0))
+    runner = VirtualRunner(leaf, network)
+    runner.start()
+    runner.advance(2.0)
+    server = ScriptedServer(network, Move, "move_robot", Script(duration=60.0))
+    runner.advance(5.0)
+    server.die()
+    runner.advance(30.0)
+    told = [(e.server, e.in_sight) for e in events_of(runner, ServerSeen)]
+    assert told == [("/move_robot", True), ("/move_robot", False)]
+    assert runner.state.servers["/move_robot"].in_sight is False
 
 
 class TestNodes:

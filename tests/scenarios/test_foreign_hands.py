@@ -24,6 +24,7 @@ from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeRunner
 from bt_actions.ros.host import host as process
 from bt_actions.servers.presence import Server
 from bt_actions.traffic.admission import IN_FLIGHT
+from bt_actions.traffic.watcher import look
 from tests.support.foreign import PROGRAMS
 from tests.support.processes import PATIENCE, Host, Journal, Process
 from tests.support.reliability import Record, first_paragraph
@@ -483,7 +484,7 @@ def test_a_server_that_is_stopped_is_sent_no_more_than_its_queue_holds_by_all_no
     def sees(leaf: MoveRobot) -> bool:
         with process.lock:
             assert leaf._own is not None
-            return leaf._own.observe_and_tell(time.monotonic()) is Server.READY
+            return look(leaf._own, time.monotonic()) is Server.READY
 
     def count(what: str) -> int:
         return [state(leaf) for leaf in leaves].count(what)
