@@ -1,7 +1,8 @@
 """The tags `MoveRobot` and `Gripper` of py_trees' own XML trees, with their ports.
 
-`import bt_actions` makes them known to `py_trees.parsers.behaviour_tree_xml`; the leaf that stands
-for both, in robot.py, is imported when a tree has one. py_trees marks ports as experimental.
+After `import bt_actions` this file is imported with `py_trees.parsers`, to which it makes the tags
+known; the leaf that stands for both, in robot.py, when a tree has one. py_trees marks ports as
+experimental.
 """
 
 from __future__ import annotations
