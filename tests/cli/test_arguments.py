@@ -85,7 +85,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["send", "a", "MoveRobot", "distance=[-1e400]"], "-1e400 does not fit a float64"),
         (["call", "a", "--set", "distance"], "--set 'distance': expected name=value"),
         (["send", "a", "MoveRobot", "distance"], "field 'distance': expected name=value"),
-        (["completion", "tcsh"], "invalid choice: 'tcsh'"),
+        (["check", "--format", "xml", "a"], "invalid choice: 'xml'"),
         (["--nonsense"], "--nonsense"),
     ],
 )
