@@ -8,7 +8,7 @@ from typing import Any
 from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.simulation import robot
-from bt_actions.simulation.execution import Finish
+from bt_actions.simulation.goal_meaning import Finish
 from bt_actions.simulation.robot import RobotSimulator, RobotStatus
 from bt_actions.simulation.server import SimulatedServer
 from bt_actions.simulation.world import World
