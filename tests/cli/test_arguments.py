@@ -86,6 +86,13 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["call", "a", "--set", "distance"], "--set 'distance': expected name=value"),
         (["send", "a", "MoveRobot", "distance"], "field 'distance': expected name=value"),
         (["check", "--format", "xml", "a"], "invalid choice: 'xml'"),
+        (
+            ["send", "move robot", "MoveRobot"],
+            "SERVER: 'move robot' cannot be the name of an action",
+        ),
+        (["cleanup", "/a", "g h"], "ACTION: 'g h' cannot be the name of an action server: a space"),
+        (["control", "/run tree", "pause"], "SERVER: '/run tree' cannot be the name of an action"),
+        (["call", "t", "--server", "1st"], "--server: '1st' cannot be the name of an action"),
         (["--nonsense"], "--nonsense"),
     ],
 )

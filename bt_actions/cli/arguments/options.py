@@ -74,6 +74,15 @@ def node_name(text: str) -> str:
     return text
 
 
+def action_name(text: str) -> str:
+    """Read the name of an action, which may be relative."""
+    from bt_actions.document.language.ros_names import why_not
+
+    if why := why_not(text):
+        raise argparse.ArgumentTypeError(f"{text!r} cannot be the name of an action server: {why}")
+    return text
+
+
 _SHARED: dict[str, dict[str, Any]] = {
     "--set": {
         "metavar": "NAME=VALUE",
@@ -103,6 +112,8 @@ _SHARED: dict[str, dict[str, Any]] = {
         "action": "store_true",
         "help": "show only what went wrong; the exit code tells",
     },
+    "--fault": {"metavar": "SPEC", "action": "append", "default": []},
+    "--speed": {"metavar": "N", "type": speed},
     "--seed": {"metavar": "N", "type": int, "help": "seed of faults that happen by chance"},
 }
 _SHORT = {"--quiet": "-q"}

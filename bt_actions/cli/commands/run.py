@@ -10,7 +10,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.loading import load
-from bt_actions.cli.arguments.options import add_option, metres, node_name, speed
+from bt_actions.cli.arguments.options import add_option, metres, node_name
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart
@@ -89,17 +89,14 @@ def add_parser(subparsers: Subparsers) -> None:
     simulated.add_argument(
         "--sim", action="store_true", help="run simulated action servers in this process"
     )
-    simulated.add_argument(
+    add_option(
+        simulated,
         "--fault",
-        metavar="SPEC",
-        action="append",
-        default=[],
         help="make a simulated server misbehave: SERVER:N|*|P%%:FAULT[=VALUE]; repeatable",
     )
-    simulated.add_argument(
+    add_option(
+        simulated,
         "--speed",
-        metavar="N",
-        type=speed,
         help="speed of the simulation (not of the tree's deadlines); 1 where not given",
     )
     add_option(simulated, "--seed")
@@ -195,14 +192,8 @@ def _clean_up(wanted: list[str]) -> Exit:
 def _refuse_without_sim(args: argparse.Namespace) -> None:
     if args.sim:
         return
-    given = {
-        "--fault": bool(args.fault),
-        "--speed": args.speed is not None,
-        "--seed": args.seed is not None,
-        "--check-part": args.check_part is not None,
-    }
-    for option, is_given in given.items():
-        if is_given:
+    for option in ("--fault", "--speed", "--seed", "--check-part"):
+        if getattr(args, option[2:].replace("-", "_")) not in (None, []):
             raise BadInput(f"{option} is about the simulation; it needs --sim")
 
 
