@@ -14,7 +14,7 @@ from typing import Any
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault, FaultKind
 from bt_actions.simulation.goal_meaning import Motion
-from bt_actions.simulation.intake import Fate, Intake
+from bt_actions.simulation.intake import Intake
 from bt_actions.simulation.journal import Event, Journal
 from bt_actions.simulation.live_goal import LiveGoal, Owner
 from bt_actions.simulation.platform import Platform, Request, Wire
@@ -210,13 +210,16 @@ class SimulatedServer(Owner):
         request = self._intake.receive(taken.goal, taken.goal_id)
         if request.faults:
             self._log.info(f"{self.name}: goal {request.number} meets {request.faults}")
-        if request.fate is Fate.DIE:
+        if request.faults.dies("accept"):
             self.die("fault: die=accept")
-        elif request.fate in {Fate.LATER, Fate.SILENT}:
-            silent = request.fate is Fate.SILENT
-            due = self.stepper.now() + request.delay
-            self.stepper.call_at(due, lambda now: wire.answer_soon(taken, silent=silent))
-        return request.fate is Fate.ANSWER
+        if request.is_lost:
+            return False
+        silent = FaultKind.DROP_ACCEPT in request.faults
+        if not silent and FaultKind.DELAY_ACCEPT not in request.faults:
+            return True
+        due = self.stepper.now() + (request.faults.number(FaultKind.DELAY_ACCEPT) or 0.0)
+        self.stepper.call_at(due, lambda now: wire.answer_soon(taken, silent=silent))
+        return False
 
     def _on_cancel_request(self, goal_id: str) -> bool:
         asked = list(self._live) if goal_id == _ALL_GOALS else [goal_id]

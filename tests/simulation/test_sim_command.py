@@ -180,11 +180,11 @@ def test_bad_input_is_one_line_and_exit_code_2(
 
 def test_help_lists_every_fault(capsys: pytest.CaptureFixture[str]) -> None:
     from bt_actions.cli import main
-    from bt_actions.simulation.faults import KINDS
+    from bt_actions.simulation.faults import FaultKind
 
     with pytest.raises(SystemExit):
         main(["sim", "--help"])
     text = capsys.readouterr().out
-    for kind in KINDS:
+    for kind in FaultKind:
         assert f"  {kind}" in text
     assert "examples:" in text

@@ -66,11 +66,11 @@ def _rules(**_others: object) -> dict[str, str]:
 
 def _faults(prefix: str, **_others: object) -> dict[str, str]:
     from bt_actions.cli.driving.simulated import SERVED
-    from bt_actions.simulation.faults import KINDS
+    from bt_actions.simulation.faults import FaultKind
 
     which = prefix.rpartition(":")[0]
     if ":" in which:
-        return {f"{which}:{kind}": meaning.does for kind, meaning in KINDS.items()}
+        return {f"{which}:{kind}": kind.does for kind in FaultKind}
     return {f"{server}:": kind for kind, server in SERVED.items()}
 
 
