@@ -11,22 +11,6 @@ from bt_actions.utilities.streams import open_closed_streams as _open_closed_str
 
 _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout's encoding
 
-
-class _XmlTags:
-    """Makes the tags of our leaves known where py_trees' parsers of XML trees are imported."""
-
-    @staticmethod
-    def find_spec(name: str, *_: object) -> None:
-        """Find nothing: the usual finders do."""
-        if name == "py_trees.parsers":
-            _import_module("bt_actions.behaviours.ports")
-
-
-if "py_trees.parsers" in _sys.modules:
-    _XmlTags.find_spec("py_trees.parsers")
-else:
-    _sys.meta_path.insert(0, _XmlTags())
-
 if _TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour, Progress
     from bt_actions.behaviours.robot import Gripper, MoveRobot
@@ -87,3 +71,19 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+class _XmlTags:
+    """Makes the tags of our leaves known where py_trees' parsers of XML trees are imported."""
+
+    @staticmethod
+    def find_spec(name: str, *_: object) -> None:
+        """Find nothing: the usual finders do."""
+        if name == "py_trees.parsers":
+            _import_module("bt_actions.behaviours.ports")
+
+
+if "py_trees.parsers" in _sys.modules:
+    _XmlTags.find_spec("py_trees.parsers")
+else:
+    _sys.meta_path.insert(0, _XmlTags())
