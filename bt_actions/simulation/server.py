@@ -144,7 +144,7 @@ class SimulatedServer(Owner):
         with self.stepper.lock:
             self.record_death(reason)
             for live in self._live.values():
-                self.stepper.stop(live)
+                self.stepper.stop(live.step)
                 live.abandon()
             self._live.clear()
             self._intake.clear()
@@ -172,7 +172,7 @@ class SimulatedServer(Owner):
 
     def ended(self, goal: LiveGoal, result: Any) -> None:
         """Send the result of a goal that has reached its terminal state."""
-        self.stepper.stop(goal)
+        self.stepper.stop(goal.step)
         self._live.pop(goal.goal_id, None)
         if self._wire is not None:
             self._wire.finish(goal.goal_id, result)
@@ -268,7 +268,7 @@ class SimulatedServer(Owner):
                 self.broken(goal_id, problem)
                 live.give_up(problem)
             else:
-                self.stepper.start(live)
+                self.stepper.start(live.step)
 
     def _begin(self, goal: Any) -> tuple[Motion, str]:
         try:
