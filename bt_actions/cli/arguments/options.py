@@ -9,7 +9,10 @@ import argparse
 import math
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bt_actions.simulation.faults import Fault
 
 MOST = 1000
 """Goals, robots and the like that one server can be asked for."""
@@ -74,6 +77,16 @@ def action_name(text: str) -> str:
     return text
 
 
+def fault(text: str) -> Fault:
+    """Read a fault of a simulated server."""
+    from bt_actions.simulation.faults import Fault, FaultError
+
+    try:
+        return Fault.parse(text)
+    except FaultError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
 _SHARED: dict[str, dict[str, Any]] = {
     "--set": {
         "metavar": "NAME=VALUE",
@@ -103,7 +116,7 @@ _SHARED: dict[str, dict[str, Any]] = {
         "action": "store_true",
         "help": "show only what went wrong; the exit code tells",
     },
-    "--fault": {"metavar": "SPEC", "action": "append", "default": []},
+    "--fault": {"metavar": "SPEC", "type": fault, "action": "append", "default": []},
     "--speed": {"metavar": "N", "type": speed},
     "--seed": {"metavar": "N", "type": int, "help": "seed of faults that happen by chance"},
 }

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from bt_actions.cli.arguments.loading import load
 from bt_actions.cli.arguments.options import add_option, metres, node_name
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.driving.sweep import sweep
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
     from bt_actions.ros.arguments import Given
     from bt_actions.ros.naming import Outlook
-    from bt_actions.simulation.faults import Fault
 
 _EPILOG = """\
 examples:
@@ -113,7 +113,6 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         keep_results_apart()
     _refuse_without_sim(args)
-    faults = _faults(args.fault)
     root = load(
         args.tree,
         args.set,
@@ -129,14 +128,15 @@ def run(args: argparse.Namespace) -> int:
         from bt_actions.document import tree_name
 
         if cleans_up:
-            code = _clean_up(servers)
+            # Told on standard error: standard output is the run's.
+            code = sweep(5.0, 5.0, servers, first="run without --cleanup-first")
             if code is not Exit.SUCCESS:
                 outlook.close()
                 return code
     except BaseException:
         outlook.close()
         raise
-    wish = SimulationWish(args.speed or 1.0, faults, args.seed) if args.sim else None
+    wish = SimulationWish(args.speed or 1.0, args.fault, args.seed) if args.sim else None
     with Session(
         root,
         executor=args.executor,
@@ -182,25 +182,9 @@ def _servers(args: argparse.Namespace, root: Behaviour) -> list[str]:
         return server_names(actions, name, args.namespace)
 
 
-def _clean_up(wanted: list[str]) -> Exit:
-    """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
-    from bt_actions.cli.driving.sweep import sweep
-
-    return sweep(look=5.0, patience=5.0, wanted=wanted, first="run without --cleanup-first")
-
-
 def _refuse_without_sim(args: argparse.Namespace) -> None:
     if args.sim:
         return
     for option in ("--fault", "--speed", "--seed", "--check-part"):
         if getattr(args, option[2:].replace("-", "_")) not in (None, []):
             raise BadInput(f"{option} is about the simulation; it needs --sim")
-
-
-def _faults(texts: list[str]) -> list[Fault]:
-    from bt_actions.simulation.faults import Fault, FaultError
-
-    try:
-        return [Fault.parse(text) for text in texts]
-    except FaultError as error:
-        raise BadInput(f"--fault {error}") from error
