@@ -30,24 +30,11 @@ def as_json(findings: Sequence[Finding]) -> str:
 
 
 def _plain(finding: Finding) -> dict[str, object]:
-    plain: dict[str, object] = {
-        "file": finding.file,
-        "line": finding.line,
-        "column": finding.column,
-        "end_line": finding.end_line,
-        "end_column": finding.end_column,
-        "code": finding.code,
-        "severity": finding.severity.value,
-        "message": finding.message,
-    }
+    names = ("file", "line", "column", "end_line", "end_column", "code", "severity", "message")
+    plain = {name: getattr(finding, name) for name in names}
     if finding.hint:
         plain["hint"] = finding.hint
     if finding.related is not None:
-        place = finding.related.place
-        plain["related"] = {
-            "file": place.file,
-            "line": place.line,
-            "column": place.column,
-            "message": finding.related.message,
-        }
+        related = finding.related
+        plain["related"] = {**related.place._asdict(), "message": related.message}
     return plain
