@@ -11,13 +11,11 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.traffic.backend import Backend
-from bt_actions.traffic.host import Record
+from bt_actions.traffic.state import Record
 
 if TYPE_CHECKING:
     from bt_actions.ros.log import Log
     from bt_actions.ros.spinning import Spinner
-
-__all__ = ["backend_of", "ended_by_signals", "log", "spinner"]
 
 
 def backend_of(node: Any) -> Backend:

@@ -1,8 +1,9 @@
 """A py_trees leaf that sends a goal to a ROS action and stays RUNNING until it stands.
 
-It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
+The leaf keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-goals/ decides what happens to the goal; here stand the visit to the leaf and its attempts.
+Here stand the visit to the leaf and its attempts. What happens to a goal is decided in goals/; how
+it goes out, and an answer comes back, is told at the head of traffic/__init__.py.
 """
 
 from __future__ import annotations
@@ -20,15 +21,15 @@ from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.messages.conversion import MessageError, fill
+from bt_actions.messages.fields import fields_in_words
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.drain import drain
 from bt_actions.utilities.places import root_of
-from bt_actions.utilities.shorten import shorten, shorten_fields
+from bt_actions.utilities.shorten import shorten
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.endpoint import ActionEndpoint
-    from bt_actions.traffic.handle import GoalHandle
+    from bt_actions.traffic.state import Endpoint, GoalHandle
 
 
 _PLAIN = {bool, int, float, str}
@@ -36,7 +37,7 @@ _PLAIN = {bool, int, float, str}
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What an action is doing at this moment."""
+    """The work of an action at this moment."""
 
     state: str
     """A goal's state, or IDLE before the first visit, BACKOFF between two attempts."""
@@ -49,7 +50,7 @@ class Progress:
     """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
 
 
-class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
+class ActionBehaviour(Connected["Endpoint"], Behaviour):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
     While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
@@ -205,11 +206,11 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.action_type = action
         super().setup(**kwargs)
 
-    def _make(self, backend: Backend) -> ActionEndpoint:
+    def _make(self, backend: Backend) -> Endpoint:
         return backend.traffic.endpoint(self.action_type, self.action_name)
 
     def initialise(self) -> None:
-        """Begin a visit. What an earlier one left behind is drained beside it."""
+        """Begin a visit. Goals that an earlier visit left behind are drained beside it."""
         backend, _ = self._there()
         ActionBehaviour.terminate(self, Status.INVALID)  # where the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._reading.when)
@@ -292,21 +293,21 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     # What a leaf for actions of one type may know better
 
     def names(self, result: Any) -> Mapping[str, object]:
-        """What expressions may name, of a result; of None, with any value."""
+        """Return what expressions may name, of a result; of None, with any value."""
         return {"result": result}
 
     def settles(self, result: Any) -> bool:
-        """Whether a result says that nothing the goal began still runs; else its end is UNKNOWN.
+        """Return whether nothing the goal began still runs, by its result; else its end is UNKNOWN.
 
         Asked with None where the goal was aborted, and its result was lost. Called under the lock
-        of all goals: it looks at the result, and does nothing else.
+        of all goals: look at the result, and do nothing else.
         """
         return True
 
     def explain(self, outcome: Outcome, result: Any) -> str:
-        """What to add to the reason of a goal that has not succeeded, or nothing."""
+        """Return what to add to the reason of a goal that has not succeeded, or nothing."""
         told = outcome is Outcome.ABORTED and result is not None
-        return f"its result is: {shorten(result)}" if told else ""
+        return f"its result is: {shorten(result, 150)}" if told else ""
 
     # Within
 
@@ -325,16 +326,16 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         return self._handle
 
     def _is_over(self) -> bool:
-        """Whether code of the user's has ended the visit: stopped this leaf, or shut it down."""
+        """Return whether the user's code has ended the visit: by stop, or by shutdown."""
         return self._outcome is not None or self._backend is None
 
     def _filed(self, handle: GoalHandle) -> bool:
-        """Whether this attempt is over and in the history."""
+        """Return whether this attempt is over and in the history."""
         history = self.history  # a new visit begins a new one
         return bool(history) and history[-1].goal is handle.goal
 
     def _is_plain(self) -> bool:
-        """Whether no code of the user's can run where the goal is made into a message."""
+        """Return whether no code of the user's can run where the goal is made into a message."""
         goal = self.goal
         return type(goal) is dict and all(type(each) in _PLAIN for each in goal.values())
 
@@ -358,7 +359,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self, handle: GoalHandle, outcome: Outcome, reason: str, backend: Backend
     ) -> AttemptRecord:
         goal, begun, ended = handle.goal, handle.begun_at.ros, backend.now().ros
-        goal.message = None  # as large as the user's data
+        goal.forget_message()
         return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:
@@ -377,7 +378,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
         feedback = handle.goal.feedback
         if feedback is not self._shown_feedback[0]:
-            told = f": {shorten_fields(feedback)}" if feedback is not None else ""
+            told = f": {fields_in_words(feedback)}" if feedback is not None else ""
             self._shown_feedback = feedback, told
         state = handle.goal.state.shown.lower().replace("_", " ")
         return f"{state}{tries}{self._shown_feedback[1]}"

@@ -1,4 +1,4 @@
-"""What a ROS message consists of, as plain values: for filling one, and for checking a tree.
+"""The fields of ROS messages as plain values: for filling a message, and for checking a tree.
 
 Read from the classes that rosidl generates; imports no rclpy.
 """
@@ -13,6 +13,7 @@ from typing import Any
 
 from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.plain_data import scalar
+from bt_actions.utilities.shorten import fit
 from bt_actions.utilities.suggest import what_it_has
 
 _BITS = (8, 16, 32, 64)
@@ -27,11 +28,8 @@ FLOATS = {"float32": 3.402823466e38, "float64": float("inf")}
 _NAMES = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
 
 
-_MESSAGES: dict[type, Message] = {}
-
-
 class FieldType:
-    """What a value is."""
+    """The type of a value."""
 
     __slots__ = ()
 
@@ -47,19 +45,11 @@ class Scalar(FieldType):
         return self.name if self.limit is None else f"{self.name}<={self.limit}"
 
 
+@dataclass(frozen=True, slots=True)
 class Message(FieldType):
-    """A message inside a message; there is one such object of each class."""
+    """A message inside a message."""
 
-    __slots__ = ("cls",)
     cls: type
-
-    def __new__(cls, of: type) -> Message:
-        made = _MESSAGES.get(of)
-        if made is None:
-            made = super().__new__(cls)
-            made.cls = of
-            made = _MESSAGES.setdefault(of, made)
-        return made
 
     def __str__(self) -> str:
         return short_name(self.cls)
@@ -81,7 +71,7 @@ class Listing(FieldType):
 
 @lru_cache(maxsize=4096)
 def describe(cls: type) -> Mapping[str, FieldType]:
-    """The fields of a message class in order, with their types."""
+    """Return the fields of a message class in order, with their types."""
     generated: Any = cls
     names = generated.get_fields_and_field_types()
     return {name: _type(slot) for name, slot in zip(names, generated.SLOT_TYPES, strict=True)}
@@ -95,13 +85,39 @@ def no_field(cls: type, name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def constants(cls: type) -> Mapping[str, object]:
-    """The constants that a message class declares; one that is a byte as a number."""
+    """Return the constants that a message class declares; a byte is a number."""
     # rosidl keeps them on the metaclass, as properties and in a private dictionary.
     return {
         name: scalar(getattr(cls, name))
         for name in vars(type(cls))
         if name.isupper() and not name.startswith("_") and not name.endswith("__DEFAULT")
     }
+
+
+def constant_name(message: object, field: str, value: int) -> str:
+    """Return the constant FIELD_X of the message's type that has `value`, as X; else the number."""
+    start = f"{field.upper()}_"
+    cls: type = type(message)
+    for name, known in constants(cls).items():
+        if name.startswith(start) and known == value:
+            return name.removeprefix(start)
+    return str(value)
+
+
+def fields_in_words(message: object, most: int = 4) -> str:
+    """Return the first scalar fields of a ROS message: names, values, constants by their name."""
+    parts: list[str] = []
+    for field in getattr(message, "get_fields_and_field_types", dict[str, str])():
+        value = getattr(message, field)
+        if isinstance(value, float):
+            parts.append(f"{field} {value:.2f}")
+        elif isinstance(value, str):
+            parts.append(f"{field} {fit(value, 80)}")
+        elif isinstance(value, bool):
+            parts.append(f"{field} {str(value).lower()}")
+        elif isinstance(value, int):
+            parts.append(f"{field} {constant_name(message, field, value)}")
+    return ", ".join(parts[:most])
 
 
 def _type(slot: Any) -> FieldType:

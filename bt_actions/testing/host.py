@@ -1,4 +1,4 @@
-"""What goals that run in virtual time have in common: the Host of traffic/host.py.
+"""What goals that run in virtual time have in common: the Host of traffic/state.py.
 
 One for each process that is played. All happens on one thread, so nothing has to be guarded; ids
 come from a seed, and a mistake of ours is raised where it happens.
@@ -12,9 +12,8 @@ from contextlib import nullcontext
 from bt_actions.servers.stalls import Stalls
 from bt_actions.testing.network import Lines
 from bt_actions.testing.timeline import Alarm, Timeline
-from bt_actions.traffic.handle import Domain
-from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduled, Scheduler
+from bt_actions.traffic.state import Domain, Record, Trace
 
 
 class VirtualHost:
@@ -37,15 +36,12 @@ class VirtualHost:
         self._runs = False
 
     def domain(self, number: int) -> Domain:
-        """Return what is shared in the ROS domain of this number."""
         return self._domains.setdefault(number, Domain())
 
     def steady(self) -> float:
-        """Return the virtual time."""
         return self._timeline.now
 
     def new_goal_id(self) -> bytes:
-        """Return the next 16 bytes of the seed."""
         return self.randomness.randbytes(16)
 
     def wait(self, timeout: float) -> bool:

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 from bt_actions.document.findings import Finding, Severity
 
-__all__ = ["as_json", "as_text"]
-
 
 def as_text(findings: Sequence[Finding], width: int = 200) -> str:
     """Write findings as a compiler does: errors first, source lines cut to `width`, and a count."""
