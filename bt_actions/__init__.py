@@ -3,15 +3,13 @@
 Each is imported when it is first asked for: a program pays for what it uses.
 """
 
+import sys as _sys
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from bt_actions.utilities.streams import open_closed_streams as _open_closed_streams
 
 _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout's encoding
-
-# ruff: noqa: E402 - see above
-import bt_actions.behaviours.ports as _ports  # noqa: F401 - makes the tags of XML trees known
 
 if _TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour, Progress
@@ -73,3 +71,19 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+class _XmlTags:
+    """Makes the tags of our leaves known where py_trees' parsers of XML trees are imported."""
+
+    @staticmethod
+    def find_spec(name: str, *_: object) -> None:
+        """Find nothing: the usual finders do."""
+        if name == "py_trees.parsers":
+            _import_module("bt_actions.behaviours.ports")
+
+
+if "py_trees.parsers" in _sys.modules:
+    _XmlTags.find_spec("py_trees.parsers")
+else:
+    _sys.meta_path.insert(0, _XmlTags())

@@ -1,31 +1,54 @@
-"""The tags `MoveRobot` and `Gripper` of py_trees' own XML trees, with their ports.
+"""`MoveRobot` and `Gripper` as tags of py_trees' own XML trees, with ports.
 
-`import bt_actions` makes them known to `py_trees.parsers.behaviour_tree_xml`; the leaf that stands
-for both, in robot.py, is imported when a tree has one. py_trees marks ports as experimental.
+After `import bt_actions` this file is imported with `py_trees.parsers`, to which it makes the tags
+known. py_trees marks ports as experimental.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from py_trees.behaviour import Behaviour
+from py_trees.common import Status
 from py_trees.ports import PortInformation, PortsMixin
 
-
-class _Tag(PortsMixin, Behaviour):
-    """Makes a leaf in place of an object of its own."""
-
-    update: Any = None
-    """Not abstract, as py_trees wants its classes; there is none that it is called of."""
-
-    def __new__(cls, *args: Any, **settings: Any) -> Any:
-        """Make the leaf."""
-        from bt_actions.behaviours.robot import leaf_of
-
-        return leaf_of(cls)(*args, **settings)
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.utilities.units import parse_duration
 
 
-class MoveRobot(_Tag):
+class _ActionWithPorts(PortsMixin, ActionBehaviour):
+    """An action whose goal's fields are input ports, and its result's fields output ports."""
+
+    ACTION_TYPE: str
+    SERVER: str
+
+    def __init__(
+        self,
+        name: str,
+        action_name: str = "",
+        timeout: float | str | None = None,
+        attempts: int | str = 1,
+        **ports: Any,
+    ) -> None:
+        super().__init__(
+            name,
+            self.ACTION_TYPE,
+            action_name or self.SERVER,
+            # A port without data makes it INVALID_GOAL
+            lambda: {port: self.get_input(port) for port in self.input_ports()},
+            timeout=None if timeout is None else parse_duration(timeout),
+            retry=int(attempts),  # an XML attribute is a text
+            **ports,
+        )
+
+    def update(self) -> Status:
+        status = super().update()
+        if status is Status.SUCCESS:
+            for port in self.output_ports():
+                self._set_output(port, getattr(self.result, port))
+        return status
+
+
+class MoveRobotWithPorts(_ActionWithPorts, tag="MoveRobot"):
     """``<MoveRobot name="To the part" distance="2.0" final_pose="{at}" timeout="30"/>``"""
 
     ACTION_TYPE, SERVER = "robot_control_interfaces/action/MoveRobot", "move_robot"
@@ -37,7 +60,7 @@ class MoveRobot(_Tag):
     }
 
 
-class Gripper(_Tag):
+class GripperWithPorts(_ActionWithPorts, tag="Gripper"):
     """``<Gripper name="Close" position="0.0" stalled="{held}" timeout="10"/>``"""
 
     ACTION_TYPE, SERVER = "robot_control_interfaces/action/Gripper", "gripper_control"

@@ -34,7 +34,6 @@ COMMANDS = {
     "format": "format_trees",
     "schema": "schema",
     "render": "render",
-    "completion": "completion",
 }
 """Each with its module in `commands/`, in the order in which --help lists them."""
 
@@ -61,7 +60,7 @@ class _Version(argparse.Action):
 
 
 def build_parser(only: str = "") -> Parser:
-    """Return the parser of every command, or of one."""
+    """Return the parser of every command, or of `only` one."""
     parser = Parser(
         prog="bt-actions",
         description="Run behaviour trees whose leaves are ROS 2 actions. Every goal is accounted "
@@ -72,7 +71,7 @@ def build_parser(only: str = "") -> Parser:
         "--version", action=_Version, nargs=0, help="show program's version number and exit"
     )
     subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
-    for name in [only] if only else COMMANDS:
+    for name in [only] if only in COMMANDS else COMMANDS:
         _module(name).add_parser(subparsers)
     return parser
 
@@ -84,6 +83,10 @@ def _module(command: str) -> ModuleType:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code. Never lets a traceback of bad input reach the user."""
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what it may offer
+        from bt_actions.cli.arguments.completing import complete
+
+        complete(build_parser)
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
@@ -113,9 +116,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _dispatch(argv: Sequence[str] | None) -> int:
     arguments = sys.argv[1:] if argv is None else list(argv)
-    wanted = arguments[0] if arguments else ""
-    alone = wanted in COMMANDS and wanted != "completion"  # which tells of all of them
-    parser = build_parser(wanted if alone else "")
+    parser = build_parser(arguments[0] if arguments else "")
     if not arguments:
         parser.print_help()
         return Exit.BAD_INPUT

@@ -5,31 +5,29 @@ makes documents; above them, side by side, `checking/`, `building/` and `formatt
 puts them together. Importing this imports neither rclpy nor any message package.
 """
 
-from bt_actions.document.findings import (
-    NODE,
-    DocumentError,
-    Finding,
-    Place,
-    Related,
-    Severity,
-    Span,
-)
-from bt_actions.document.findings.rules import RULES, Rule
-from bt_actions.document.load import (
-    Tree,
-    check_file,
-    check_source,
-    given_inputs,
-    load_tree,
-    open_tree,
-    sources_of,
-    tree_inputs,
-    tree_name,
-    tree_outputs,
-)
-from bt_actions.document.reading.find import TreeNotFoundError, find_tree, installed_trees
-from bt_actions.document.reading.inputs import InputError, TreeInput, parse_input
-from bt_actions.document.yaml.source import Source, read_source, source_of
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from bt_actions.document.findings import NODE, Place
+
+if TYPE_CHECKING:
+    from bt_actions.document.findings import DocumentError, Finding, Related, Severity, Span
+    from bt_actions.document.findings.rules import RULES, Rule
+    from bt_actions.document.load import (
+        Tree,
+        check_file,
+        check_source,
+        given_inputs,
+        load_tree,
+        open_tree,
+        sources_of,
+        tree_inputs,
+        tree_name,
+        tree_outputs,
+    )
+    from bt_actions.document.reading.find import TreeNotFoundError, find_tree, installed_trees
+    from bt_actions.document.reading.inputs import InputError, TreeInput, parse_input
+    from bt_actions.document.yaml.source import Source, read_source, source_of
 
 __all__ = [
     "RULES",
@@ -61,6 +59,17 @@ __all__ = [
     "tree_name",
     "tree_outputs",
 ]
+
+_PLACES = ("findings", "findings.rules", "yaml.source", "reading.find", "reading.inputs", "load")
+"""Where those names are that are imported when they are asked for; the quickest ones come first."""
+
+
+def __getattr__(name: str) -> object:
+    for place in _PLACES if name in __all__ else ():
+        module = import_module(f"{__name__}.{place}")
+        if hasattr(module, name):
+            return getattr(module, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def place_of(behaviour: object) -> Place | None:

@@ -110,18 +110,37 @@ class Tree:
         """Raise InputError where `build` would."""
         check_inputs(self._document, inputs, types=self._types)
 
-    def build(self, inputs: Mapping[str, object] | None = None) -> Behaviour:
+    def build(self, inputs: Mapping[str, object] | None = None, *, once: bool = False) -> Behaviour:
         """New behaviours, with variables of their own; needs no node and no server.
 
-        Raises InputError for inputs that do not fit, DocumentError for a class of a ``python:``
-        node that fails when it is made.
+        With `once` this is the last call: what was read is let go of on the way. Raises InputError
+        for inputs that do not fit, DocumentError for a class of a ``python:`` node that fails when
+        it is made.
         """
         with self._building:
-            return _built(
-                self._workspace, self._document, inputs, types=self._types, python=self._python
-            )
+            return self._build(inputs or {}, once=once)
+
+    @_no_collecting
+    def _build(self, inputs: Mapping[str, object], *, once: bool) -> Behaviour:
+        from bt_actions.document.building.build import build
+        from bt_actions.document.building.scope import Scope
+
+        document, types = self._document, self._types
+        values = check_inputs(document, inputs, types=types)
+        scope = Scope.of_load(document.name)
+        scope.write_all(values)
+        with self._workspace.as_it_was():
+            try:
+                root = build(document, scope, types=types, python=self._python, once=once)
+            except TooManyErrors:
+                raise DocumentError(_errors(self._workspace)) from None
+            _refuse(self._workspace)  # a class of one's own may fail when it is made
+        sources = {str(path): text for path, text in self._workspace.files.items()}
+        setattr(root, LOADED, Loaded(document, scope, sources))
+        return root
 
 
+@_no_collecting
 def open_tree(
     path: PathLike,
     *,
@@ -137,7 +156,19 @@ def open_tree(
 
     Raises DocumentError with everything that is wrong with the tree.
     """
-    workspace, document = _open(path, types=types, python=python, within=within)
+    workspace = Workspace(within)
+    try:
+        found = _found(path)
+        document = workspace.open(found, _shown(path, found))
+    except TooManyErrors:
+        raise DocumentError(_errors(workspace)) from None
+    _checked(workspace, types=types, python=python)
+    _refuse(workspace)
+    assert document is not None
+    if document.root is None:
+        message = "this file is for trees to import: it holds no tree itself"
+        document.source.report("BT106", Span(1, 1, 1, 2), message)
+        raise DocumentError(_errors(workspace))
     return Tree(workspace, document, types=types, python=python)
 
 
@@ -158,46 +189,12 @@ def load_tree(
     Raises DocumentError with everything that is wrong with the tree, InputError for inputs that do
     not fit; both are ValueErrors.
     """
-    workspace, document = _open(path, types=types, python=python)
-    return _built(workspace, document, inputs, types=types, python=python, once=True)
-
-
-@_no_collecting
-def _built(
-    workspace: Workspace,
-    document: Document,
-    inputs: Mapping[str, object] | None,
-    *,
-    types: bool,
-    python: Python,
-    once: bool = False,
-) -> Behaviour:
-    from bt_actions.document.building.build import build
-    from bt_actions.document.building.scope import Scope
-
-    values = check_inputs(document, inputs or {}, types=types)
-    scope = Scope.of_load(document.name)
-    scope.write_all(values)
-    with workspace.as_it_was():
-        try:
-            root = build(document, scope, types=types, python=python, once=once)
-        except TooManyErrors:
-            raise DocumentError(_errors(workspace)) from None
-        _refuse(workspace)  # a class of one's own may fail when it is made
-    sources = {str(path): text for path, text in workspace.files.items()}
-    setattr(root, LOADED, Loaded(document, scope, sources))
-    return root
+    return open_tree(path, types=types, python=python).build(inputs, once=True)
 
 
 def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
     """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
-    return tree_head(path)[1]
-
-
-def tree_head(path: PathLike) -> tuple[str, dict[str, TreeInput]]:
-    """The name that its file gives a tree, and its inputs; as `tree_inputs`."""
-    _, document = _open(path, types=False)
-    return document.name, inputs_of(document)
+    return open_tree(path, types=False).inputs
 
 
 def given_inputs(root: Behaviour) -> dict[str, tuple[TreeInput, object]]:
@@ -279,30 +276,6 @@ def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> lis
 def _all_tried(document: Document, doubts: Doubts) -> bool:
     has_unread = document.root is None and document.node.get("root") is not None
     return not has_unread and not doubts.any
-
-
-@_no_collecting
-def _open(
-    path: PathLike,
-    *,
-    types: bool,
-    python: Python = True,
-    within: Iterable[Path] | None = None,
-) -> tuple[Workspace, Document]:
-    workspace = Workspace(within)
-    try:
-        found = _found(path)
-        document = workspace.open(found, _shown(path, found))
-    except TooManyErrors:
-        raise DocumentError(_errors(workspace)) from None
-    _checked(workspace, types=types, python=python)
-    _refuse(workspace)
-    assert document is not None
-    if document.root is None:
-        message = "this file is for trees to import: it holds no tree itself"
-        document.source.report("BT106", Span(1, 1, 1, 2), message)
-        raise DocumentError(_errors(workspace))
-    return workspace, document
 
 
 def _refuse(workspace: Workspace) -> None:

@@ -3,45 +3,29 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from bt_actions.simulation.faults import Fault, FaultError, FaultKind, Value
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 
-class GoalFaults:
-    """The faults that strike one goal."""
-
-    def __init__(self, values: Mapping[FaultKind, Value] | None = None) -> None:
-        self._values = dict(values or {})
-
-    def __repr__(self) -> str:
-        return f"<GoalFaults {self}>"
+class GoalFaults(dict[FaultKind, Value]):
+    """The faults that strike one goal, with their values."""
 
     def __str__(self) -> str:
         return ", ".join(
-            str(kind) if value is None else f"{kind}={value}"
-            for kind, value in self._values.items()
+            str(kind) if value is None else f"{kind}={value}" for kind, value in self.items()
         )
-
-    def __contains__(self, kind: FaultKind) -> bool:
-        return kind in self._values
-
-    def __bool__(self) -> bool:
-        return bool(self._values)
 
     def number(self, kind: FaultKind) -> float | None:
         """Return the value of `kind` where it strikes and has one."""
-        value = self._values.get(kind)
+        value = self.get(kind)
         return value if isinstance(value, float) else None
 
     def dies(self, phase: str) -> bool:
         """Say whether the server dies in `phase`, one of PHASES."""
-        return self._values.get(FaultKind.DIE) == phase
-
-
-NO_FAULTS = GoalFaults()
+        return self.get(FaultKind.DIE) == phase
 
 
 @dataclass(slots=True)
@@ -79,7 +63,7 @@ class FaultPlan:
 
     def strike(self, server: str, number: int) -> GoalFaults:
         """Return the faults of goal `number` (from 1) of `server`; later ones win over earlier."""
-        struck: dict[FaultKind, Value] = {}
+        struck = GoalFaults()
         for index, fault in enumerate(self.faults):
             if not fault.fits(server) or fault.number not in {None, number}:
                 continue
@@ -88,4 +72,4 @@ class FaultPlan:
                 if dice.random() >= fault.probability:
                     continue
             struck[fault.kind] = fault.value
-        return GoalFaults(struck) if struck else NO_FAULTS
+        return struck

@@ -2,8 +2,8 @@
 
 A fault is written ``SERVER:WHEN:FAULT[=VALUE]``: ``move_robot:2:abort`` aborts the second goal that
 move_robot is asked for, ``gripper_control:5%:stall`` stalls one goal in twenty,
-``/r1/move_robot:*:slow=3`` slows every goal of one robot. KINDS is the one list of faults: parsing,
-help and documentation read it.
+``/r1/move_robot:*:slow=3`` slows every goal of one robot. FaultKind is the one list of faults:
+parsing, help and documentation read it.
 
 Times in faults are wall seconds, as the deadlines they are meant to break are; only the motion
 follows the simulation's speed.
@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Self
 
 from bt_actions.utilities.suggest import did_you_mean
 
@@ -46,70 +46,54 @@ PHASES = ("accept", "execute", "cancel")
 class FaultKind(StrEnum):
     """The faults, by the name they are written with."""
 
-    REJECT = "reject"
-    DELAY_ACCEPT = "delay_accept"
-    DROP_GOAL = "drop_goal"
-    DROP_ACCEPT = "drop_accept"
-    ABORT = "abort"
-    SLOW = "slow"
-    STALL = "stall"
-    NO_FEEDBACK = "no_feedback"
-    FLOOD = "flood"
-    REJECT_CANCEL = "reject_cancel"
-    IGNORE_CANCEL = "ignore_cancel"
-    DROP_CANCEL = "drop_cancel"
-    DELAY_CANCEL = "delay_cancel"
-    SUCCEED_ON_CANCEL = "succeed_on_cancel"
-    ABORT_ON_CANCEL = "abort_on_cancel"
-    DELAY_RESULT = "delay_result"
-    DROP_RESULT = "drop_result"
-    DROP_PART = "drop_part"
-    DIE = "die"
-    RESTART = "restart"
-
-
-@dataclass(frozen=True, slots=True)
-class Meaning:
-    """What a fault does, and what its value is when none is given."""
+    def __new__(
+        cls, name: str, does: str = "", unit: Unit = Unit.NONE, default: Value = None
+    ) -> Self:
+        """Make a member that says what the fault does, and what its value is when none is given."""
+        kind = str.__new__(cls, name)
+        kind._value_ = name
+        kind.does, kind.unit, kind.default = does, unit, default
+        return kind
 
     does: str
-    unit: Unit = Unit.NONE
-    default: Value = None
+    unit: Unit
+    default: Value
 
-
-KINDS: Mapping[FaultKind, Meaning] = {
-    FaultKind.REJECT: Meaning("refuses the goal"),
-    FaultKind.DELAY_ACCEPT: Meaning("answers the goal request late", Unit.SECONDS, 1.0),
-    FaultKind.DROP_GOAL: Meaning("loses the goal request: no answer, no motion"),
-    FaultKind.DROP_ACCEPT: Meaning("executes the goal, but loses the answer to its request"),
-    FaultKind.ABORT: Meaning("aborts half-way, or so long after acceptance", Unit.SECONDS),
-    FaultKind.SLOW: Meaning("moves so many times slower", Unit.FACTOR, 5.0),
-    FaultKind.STALL: Meaning(
+    REJECT = "reject", "refuses the goal"
+    DELAY_ACCEPT = "delay_accept", "answers the goal request late", Unit.SECONDS, 1.0
+    DROP_GOAL = "drop_goal", "loses the goal request: no answer, no motion"
+    DROP_ACCEPT = "drop_accept", "executes the goal, but loses the answer to its request"
+    ABORT = "abort", "aborts half-way, or so long after acceptance", Unit.SECONDS
+    SLOW = "slow", "moves so many times slower", Unit.FACTOR, 5.0
+    STALL = (
+        "stall",
         "half-way, or so long after acceptance, neither moves nor gives feedback until canceled",
         Unit.SECONDS,
-    ),
-    FaultKind.NO_FEEDBACK: Meaning("moves without giving feedback"),
-    FaultKind.FLOOD: Meaning("gives feedback that often", Unit.HERTZ, 1000.0),
-    FaultKind.REJECT_CANCEL: Meaning("refuses to cancel"),
-    FaultKind.IGNORE_CANCEL: Meaning("agrees to cancel, and goes on to the end"),
-    FaultKind.DROP_CANCEL: Meaning("never answers the cancel request, and goes on to the end"),
-    FaultKind.DELAY_CANCEL: Meaning(
-        "stops when asked to cancel, and is canceled that much later", Unit.SECONDS, 1.0
-    ),
-    FaultKind.SUCCEED_ON_CANCEL: Meaning("agrees to cancel, and succeeds at once nevertheless"),
-    FaultKind.ABORT_ON_CANCEL: Meaning("agrees to cancel, and aborts"),
-    FaultKind.DELAY_RESULT: Meaning("sends the result that long after the end", Unit.SECONDS, 1.0),
-    FaultKind.DROP_RESULT: Meaning("loses the result, or the first so many answers", Unit.COUNT),
-    FaultKind.DROP_PART: Meaning(
-        "loses the part half-way, or so long after acceptance", Unit.SECONDS
-    ),
-    FaultKind.DIE: Meaning(
-        f"dies half-way, or when asked to {PHASES[0]} or {PHASES[2]}", Unit.PHASE, "execute"
-    ),
-    FaultKind.RESTART: Meaning(
-        "dies half-way and is back that much later, its goals forgotten", Unit.SECONDS, 1.0
-    ),
-}
+    )
+    NO_FEEDBACK = "no_feedback", "moves without giving feedback"
+    FLOOD = "flood", "gives feedback that often", Unit.HERTZ, 1000.0
+    REJECT_CANCEL = "reject_cancel", "refuses to cancel"
+    IGNORE_CANCEL = "ignore_cancel", "agrees to cancel, and goes on to the end"
+    DROP_CANCEL = "drop_cancel", "never answers the cancel request, and goes on to the end"
+    DELAY_CANCEL = (
+        "delay_cancel",
+        "stops when asked to cancel, and is canceled that much later",
+        Unit.SECONDS,
+        1.0,
+    )
+    SUCCEED_ON_CANCEL = "succeed_on_cancel", "agrees to cancel, and succeeds at once nevertheless"
+    ABORT_ON_CANCEL = "abort_on_cancel", "agrees to cancel, and aborts"
+    DELAY_RESULT = "delay_result", "sends the result that long after the end", Unit.SECONDS, 1.0
+    DROP_RESULT = "drop_result", "loses the result, or the first so many answers", Unit.COUNT
+    DROP_PART = "drop_part", "loses the part half-way, or so long after acceptance", Unit.SECONDS
+    DIE = "die", "dies half-way, or when asked to accept or cancel", Unit.PHASE, "execute"
+    RESTART = (
+        "restart",
+        "dies half-way and is back that much later, its goals forgotten",
+        Unit.SECONDS,
+        1.0,
+    )
+
 
 _LISTED = "`bt-actions sim --help` lists the faults"
 _SERVER = re.compile(r"\*|/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
@@ -135,9 +119,8 @@ class Fault:
             raise FaultError(f"goals are counted from 1, not {self.number}")
         if not 0.0 < self.probability <= 1.0:
             raise FaultError(f"a probability lies between 0 and 1, not {self.probability}")
-        meaning = KINDS[self.kind]
-        given = meaning.default if self.value is None else self.value
-        object.__setattr__(self, "value", _checked(str(self.kind), meaning.unit, given))
+        given = self.kind.default if self.value is None else self.value
+        object.__setattr__(self, "value", _checked(self.kind, given))
 
     @classmethod
     def parse(cls, text: str) -> Fault:
@@ -176,7 +159,7 @@ class Fault:
         if self.probability < 1.0:
             when = f"{self.probability * 100:g}%"
         value = f"{self.value:g}" if isinstance(self.value, float) else self.value
-        shown = f"={value}" if self.value != KINDS[self.kind].default else ""
+        shown = f"={value}" if self.value != self.kind.default else ""
         return f"{self.server}:{when}:{self.kind}{shown}"
 
     def fits(self, server: str) -> bool:
@@ -191,16 +174,14 @@ class Fault:
 def table() -> str:
     """Return all faults, one a line, with what they do and their defaults."""
     rows = []
-    for kind, meaning in KINDS.items():
-        default = meaning.default
-        shown = f" ({default:g})" if isinstance(default, float) else ""
-        rows.append(f"  {_signature(kind):24}{meaning.does}{shown}")
+    for kind in FaultKind:
+        shown = f" ({kind.default:g})" if isinstance(kind.default, float) else ""
+        rows.append(f"  {_signature(kind):24}{kind.does}{shown}")
     return "\n".join(rows)
 
 
 def _signature(kind: FaultKind) -> str:
-    unit = KINDS[kind].unit
-    return f"{kind}[={unit}]" if unit else str(kind)
+    return f"{kind}[={kind.unit}]" if kind.unit else str(kind)
 
 
 def _when(text: str, when: str) -> tuple[int | None, float]:
@@ -220,7 +201,7 @@ def _kind(text: str, name: str) -> FaultKind:
     try:
         return FaultKind(name.replace("-", "_").lower())
     except ValueError:
-        close = did_you_mean(name, map(str, KINDS)) or f"; {_LISTED}"
+        close = did_you_mean(name, map(str, FaultKind)) or f"; {_LISTED}"
         raise FaultError(f"{text!r}: there is no fault {name!r}{close}") from None
 
 
@@ -229,17 +210,17 @@ _MOST = 1e6
 
 
 def _read_value(kind: FaultKind, given: str) -> Value:
-    unit = KINDS[kind].unit
-    if unit in {Unit.NONE, Unit.PHASE}:
+    if kind.unit in {Unit.NONE, Unit.PHASE}:
         return given
-    number = given.removesuffix("s").strip() if unit is Unit.SECONDS else given
+    number = given.removesuffix("s").strip() if kind.unit is Unit.SECONDS else given
     try:
         return float(number)
     except ValueError:
-        raise FaultError(f"{kind} takes {unit}, a number, not {given!r}") from None
+        raise FaultError(f"{kind} takes {kind.unit}, a number, not {given!r}") from None
 
 
-def _checked(kind: str, unit: Unit, value: Value) -> Value:
+def _checked(kind: FaultKind, value: Value) -> Value:
+    unit = kind.unit
     if value is None:
         return None
     if unit is Unit.NONE:

@@ -4,11 +4,37 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
-
-from bt_actions.simulation.execution import Finish, Motion
+from enum import Enum
+from typing import Any, Protocol
 
 # Messages are Any in this package: rosidl gives them no common base.
+
+
+class Motion(Protocol):
+    """What a goal makes its server do."""
+
+    @property
+    def progress(self) -> float:
+        """How much of the way is behind it, 0 to 1."""
+
+    @property
+    def done(self) -> bool:
+        """It has arrived: nothing moves any more."""
+
+    def step(self, share: float) -> None:
+        """Move for one step of simulated time; with `share` under 1, by so much less."""
+
+
+class Finish(Enum):
+    """Why a goal ended."""
+
+    COMPLETED = "completed"
+    CANCELED = "canceled"
+    TIMEOUT = "timeout"
+    """The server's own limit on how long a goal may take."""
+    REPLACED = "replaced"
+    """A newer goal took its place."""
+    FAULT = "fault"
 
 
 class GoalMeaning(ABC):

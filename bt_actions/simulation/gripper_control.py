@@ -8,7 +8,7 @@ from typing import Any
 from robot_control_interfaces.action import Gripper
 
 from bt_actions.simulation import gripper
-from bt_actions.simulation.execution import Finish
+from bt_actions.simulation.goal_meaning import Finish
 from bt_actions.simulation.gripper import GripperSimulator
 from bt_actions.simulation.move_robot import TIME_LIMIT
 from bt_actions.simulation.server import SimulatedServer

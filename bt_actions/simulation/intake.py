@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 from bt_actions.simulation.fault_plan import FaultPlan, GoalFaults
@@ -17,20 +16,8 @@ from bt_actions.simulation.journal import Event
 from bt_actions.utilities.plain_text import raised
 
 
-class Fate(Enum):
-    """What becomes of a goal request."""
-
-    ANSWER = "answer"
-    LATER = "later"
-    """Answered when its delay is over."""
-    SILENT = "silent"
-    """Accepted, but the answer is lost; after its delay, if it has one."""
-    LOST = "lost"
-    DIE = "die"
-
-
 @dataclass(frozen=True, slots=True)
-class Request:
+class GoalRequest:
     """A goal that was asked for."""
 
     goal_id: str
@@ -38,20 +25,9 @@ class Request:
     faults: GoalFaults
 
     @property
-    def fate(self) -> Fate:
-        """What becomes of it."""
-        if self.faults.dies("accept"):
-            return Fate.DIE
-        if FaultKind.DROP_GOAL in self.faults:
-            return Fate.LOST
-        if FaultKind.DROP_ACCEPT in self.faults:
-            return Fate.SILENT
-        return Fate.LATER if FaultKind.DELAY_ACCEPT in self.faults else Fate.ANSWER
-
-    @property
-    def delay(self) -> float:
-        """Seconds until it is answered."""
-        return self.faults.number(FaultKind.DELAY_ACCEPT) or 0.0
+    def is_lost(self) -> bool:
+        """No goal will come of it: the server dies of it, or never decides."""
+        return self.faults.dies("accept") or FaultKind.DROP_GOAL in self.faults
 
 
 class Intake:
@@ -71,17 +47,17 @@ class Intake:
         self._plan = plan
         self._record = record
         self._warn = warn
-        self._undecided: dict[int, Request] = {}
-        self._accepted: dict[str, Request] = {}
+        self._undecided: dict[int, GoalRequest] = {}
+        self._accepted: dict[str, GoalRequest] = {}
 
-    def receive(self, goal: object, goal_id: str) -> Request:
+    def receive(self, goal: object, goal_id: str) -> GoalRequest:
         """Take in a request for `goal`, whose message lives until the decision."""
         self.count += 1
         faults = self._plan.strike(self._server, self.count)
-        request = Request(goal_id, self.count, faults)
+        request = GoalRequest(goal_id, self.count, faults)
         more = {"faults": str(faults)} if faults else {}
         self._record(goal_id, Event.RECEIVED, number=request.number, **more)
-        if request.fate not in {Fate.DIE, Fate.LOST}:
+        if not request.is_lost:
             self._undecided[id(goal)] = request
         return request
 
@@ -110,7 +86,7 @@ class Intake:
             self._reject(request, "its id is already in use")
         return goal_id in self._accepted
 
-    def start(self, goal_id: str) -> Request | None:
+    def start(self, goal_id: str) -> GoalRequest | None:
         """Return the request of an accepted goal, once."""
         request = self._accepted.pop(goal_id, None)
         if request is not None:
@@ -122,6 +98,6 @@ class Intake:
         self._undecided.clear()
         self._accepted.clear()
 
-    def _reject(self, request: Request, reason: str) -> None:
+    def _reject(self, request: GoalRequest, reason: str) -> None:
         self._warn(f"{self._server}: goal {request.number} refused: {reason}")
         self._record(request.goal_id, Event.REJECTED, reason=reason)

@@ -11,6 +11,7 @@ import json
 import os
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -240,9 +241,4 @@ def ends(
 
 def executions(entries: Iterable[Entry]) -> dict[tuple[str, str], int]:
     """Return how often each goal, by server and id, was accepted: twice is executed twice."""
-    counted: dict[tuple[str, str], int] = {}
-    for entry in entries:
-        if entry.event is Event.ACCEPTED:
-            key = (entry.server, entry.goal)
-            counted[key] = counted.get(key, 0) + 1
-    return counted
+    return Counter((entry.server, entry.goal) for entry in entries if entry.event is Event.ACCEPTED)

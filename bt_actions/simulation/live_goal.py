@@ -1,136 +1,225 @@
-"""One accepted goal on its server: carries out what its execution decides, and writes it down."""
+"""One accepted goal on its server: what each step does, when and how it ends, what is written down.
+
+The faults act here, once for all servers. No ROS and no clock: times are passed in, in seconds of
+one steady clock. A goal never ends twice.
+"""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from abc import abstractmethod
+from typing import Any
 
 from bt_actions.goals.terms import STATUS_ABORTED, STATUS_CANCELED, STATUS_SUCCEEDED
 from bt_actions.messages.interfaces import short_name
-from bt_actions.simulation.execution import CancelAnswer, Execution, Finish, Happened
-from bt_actions.simulation.goal_meaning import GoalMeaning
+from bt_actions.simulation.fault_plan import GoalFaults
+from bt_actions.simulation.faults import FaultKind
+from bt_actions.simulation.goal_meaning import Finish, GoalMeaning, Motion
 from bt_actions.simulation.journal import Event
 from bt_actions.simulation.platform import Wire
 from bt_actions.utilities.plain_text import raised
 
+FLOOD_AT_ONCE = 1000
+"""A flood never gives more feedback than this in one step."""
 _STATUSES = {Finish.COMPLETED: STATUS_SUCCEEDED, Finish.CANCELED: STATUS_CANCELED}
 _EVENTS = {STATUS_SUCCEEDED: Event.SUCCEEDED, STATUS_CANCELED: Event.CANCELED}
 
 
-class Owner(Protocol):
-    """What a live goal asks of its server."""
+class Owner(GoalMeaning):
+    """What a live goal asks of its server, beside what the goal means."""
 
+    @abstractmethod
     def record(self, goal_id: str, event: Event, **more: object) -> None:
         """Write a line into the journal."""
 
+    @abstractmethod
     def broken(self, goal_id: str, reason: str) -> None:
-        """What a goal means has raised: a line into the log."""
+        """Write into the log why a goal is aborted for which its script, or subclass, raised."""
 
+    @abstractmethod
     def ended(self, goal: LiveGoal, result: Any) -> None:
-        """The goal has reached its terminal state."""
+        """Send the result of a goal that has reached its terminal state."""
 
+    @abstractmethod
     def die(self, reason: str) -> None:
-        """A fault kills the server."""
+        """Be gone: a fault kills the server."""
 
+    @abstractmethod
     def restart(self, seconds: float) -> None:
-        """A fault takes the server away for so many seconds."""
+        """Be gone for so many wall seconds."""
 
 
 class LiveGoal:
-    """A goal from its acceptance to its end. Used under the lock of its server's stepper."""
+    """A goal from its acceptance to its end. Used under the lock of its server's stepper.
+
+    Call `step` every step of simulated time until it returns False, and `poll` when `due` has come
+    and after a cancel was granted.
+    """
 
     def __init__(
         self,
         owner: Owner,
-        meaning: GoalMeaning,
         goal_id: str,
         wire: Wire,
-        run: Execution,
+        motion: Motion,
+        faults: GoalFaults,
         *,
+        now: float,
         step_period: float,
+        time_limit: float | None,
     ) -> None:
-        """`run` decides, `meaning` makes the messages, `owner` is told."""
+        """Begin at `now`; period and limit are in seconds of simulated time."""
         self.goal_id = goal_id
-        self._wire = wire
-        self.run = run
+        self.motion = motion
+        self.faults = faults
         self._owner = owner
-        self._meaning = meaning
+        self._wire = wire
+        self._accepted = self._last_feedback = now
         self._step_period = step_period
+        self._limit = time_limit
+        self._elapsed = 0.0
+        self._over = self._stalled = self._part_dropped = False
+        self._cancel_at: float | None = None
 
     def __repr__(self) -> str:
-        return f"<LiveGoal {self.goal_id[:8]} {self.run!r}>"
+        state = "over" if self._over else "moving" if self._moving else "standing"
+        return f"<LiveGoal {self.goal_id[:8]} {state} {self.motion.progress:.0%} {self.faults}>"
+
+    @property
+    def due(self) -> float | None:
+        """When `poll` has to be called although nothing moves; None: never."""
+        return None if self._over else self._cancel_at
 
     def step(self, now: float) -> bool:
-        try:
-            happened = self.run.step(now, self._step_period)
-        except Exception as error:  # noqa: BLE001 - the goal must end whatever its motion does
-            happened = self.run.give_up(self._broken(f"it could not go on: {raised(error)}"))
-        self._owner.record(self.goal_id, Event.STEP, **self._meaning.state(self.run.motion))
-        self._carry_out(happened)
-        return self.run.moving
+        """Move for one step of simulated time; return whether it still moves."""
+        problem = self._move() if self._moving else ""
+        self._record(Event.STEP)
+        if problem:
+            self.give_up(problem)
+        elif self._moving and not self._strike(now):
+            self._send_feedback(now)
+            self._end_in_time()
+        return self._moving
 
     def poll(self, now: float) -> None:
         """End, where a cancel's time has come."""
-        self._carry_out(self.run.poll(now))
+        if self._cancel_at is None or now < self._cancel_at:
+            return
+        if FaultKind.SUCCEED_ON_CANCEL in self.faults:
+            self._end(Finish.COMPLETED, "finished before it could be canceled")
+        elif FaultKind.ABORT_ON_CANCEL in self.faults:
+            self._end(Finish.FAULT, "fault: abort_on_cancel")
+        else:
+            self._end(Finish.CANCELED)
 
     def cancel(self, now: float) -> bool:
         """Say whether a request to cancel is granted; it is carried out by `poll`."""
-        accepted = self.run.cancel(now) is CancelAnswer.ACCEPT
-        event = Event.CANCEL_ACCEPTED if accepted else Event.CANCEL_REJECTED
+        granted = not self._over and FaultKind.REJECT_CANCEL not in self.faults
+        if granted and self._cancel_at is None and FaultKind.IGNORE_CANCEL not in self.faults:
+            self._cancel_at = now + (self.faults.number(FaultKind.DELAY_CANCEL) or 0.0)
+        event = Event.CANCEL_ACCEPTED if granted else Event.CANCEL_REJECTED
         self._owner.record(self.goal_id, event)
-        return accepted
+        return granted
 
     def replace(self) -> None:
         """Abort: a newer goal takes its place."""
-        self._carry_out(self.run.replace())
+        self._end(Finish.REPLACED, "replaced by a newer goal")
 
     def give_up(self, reason: str) -> None:
         """Abort, because the server cannot go on."""
-        self._carry_out(self.run.give_up(reason))
+        self._end(Finish.FAULT, reason)
 
-    def abandon(self, reason: str) -> None:
+    def abandon(self) -> None:
         """Stop without an end that any client hears of: the server has died."""
-        self.run.give_up(reason)
-        self._meaning.halt(self.run.motion)
+        self._over = True
+        self._owner.halt(self.motion)
 
-    def _carry_out(self, happened: Happened) -> None:
-        if happened.drop_part:
-            self._meaning.drop_part()
-        if happened.feedback:
-            self._send_feedback(happened.feedback)
-        if happened.finish is not None:
-            self._finish(happened.finish, happened.reason)
-        if happened.restart_after is not None:
-            self._owner.restart(happened.restart_after)
-        elif happened.die:
-            self._owner.die("fault: die")
+    @property
+    def _moving(self) -> bool:
+        return not (self._over or self._stalled or self._cancel_at is not None)
 
-    def _broken(self, reason: str) -> str:
-        self._owner.broken(self.goal_id, reason)
-        return reason
+    @property
+    def _half_way(self) -> bool:
+        return self.motion.done or self.motion.progress >= 0.5
 
-    def _send_feedback(self, times: int) -> None:
+    def _move(self) -> str:
+        """Move by one step; return why it cannot."""
+        self._elapsed += self._step_period
         try:
-            message = self._meaning.feedback(self.run.motion)
+            if not self.motion.done:
+                self.motion.step(1.0 / (self.faults.number(FaultKind.SLOW) or 1.0))
+        except Exception as error:  # noqa: BLE001 - the goal must end whatever its motion does
+            return self._broken(f"it could not go on: {raised(error)}")
+        return ""
+
+    def _strike(self, now: float) -> bool:
+        """Let the faults strike whose time has come; return whether that is all of this step."""
+        if self._time_for(FaultKind.DIE, now) and self.faults.dies("execute"):
+            self._owner.die("fault: die")
+        elif FaultKind.RESTART in self.faults and self._half_way:
+            self._owner.restart(self.faults.number(FaultKind.RESTART) or 0.0)
+        elif self._time_for(FaultKind.ABORT, now):
+            self.give_up("fault: abort")
+        else:
+            dropped = self._time_for(FaultKind.DROP_PART, now) and not self._part_dropped
+            self._part_dropped |= dropped
+            self._stalled = self._time_for(FaultKind.STALL, now)
+            if dropped:  # the goal itself goes on; one feedback less is not missed
+                self._owner.drop_part()
+            return dropped or self._stalled
+        return True
+
+    def _time_for(self, kind: FaultKind, now: float) -> bool:
+        if kind not in self.faults:
+            return False
+        seconds = self.faults.number(kind)
+        if seconds is None:
+            return self._half_way
+        return self.motion.done or now - self._accepted >= seconds
+
+    def _send_feedback(self, now: float) -> None:
+        hertz = self.faults.number(FaultKind.FLOOD)
+        times = 0 if FaultKind.NO_FEEDBACK in self.faults else 1
+        if times and hertz is not None:
+            times = max(1, min(FLOOD_AT_ONCE, int((now - self._last_feedback) * hertz)))
+            self._last_feedback = now
+        try:
+            message = self._owner.feedback(self.motion) if times else None
             for _ in range(times):
                 self._wire.feedback(self.goal_id, message)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
             self.give_up(self._broken(f"it has no feedback: {raised(error)}"))
 
-    def _finish(self, finish: Finish, reason: str) -> None:
-        motion = self.run.motion
+    def _end_in_time(self) -> None:
+        if self.motion.done:
+            self._end(Finish.COMPLETED)
+        elif self._limit is not None and self._elapsed > self._limit - self._step_period / 2:
+            reason = f"not finished within {self._limit:g} s of simulated time"
+            self._end(Finish.TIMEOUT, reason)
+
+    def _end(self, finish: Finish, reason: str = "") -> None:
+        if self._over:
+            return
+        self._over = True
+        action_type = self._owner.action_type
         try:
-            if finish is Finish.COMPLETED and (why := self._meaning.failure(motion)):
+            if finish is Finish.COMPLETED and (why := self._owner.failure(self.motion)):
                 finish, reason = Finish.FAULT, why
             if finish is not Finish.COMPLETED:
-                self._meaning.halt(motion)
-            result = self._meaning.result(motion, finish, reason)
-            if not isinstance(result, self._meaning.action_type.Result):
-                raise TypeError(f"{result!r} is no {short_name(self._meaning.action_type.Result)}")
+                self._owner.halt(self.motion)
+            result = self._owner.result(self.motion, finish, reason)
+            if not isinstance(result, action_type.Result):
+                raise TypeError(f"{result!r} is no {short_name(action_type.Result)}")
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
             finish, reason = Finish.FAULT, self._broken(f"it has no result: {raised(error)}")
-            result = self._meaning.action_type.Result()
+            result = action_type.Result()
         status = self._wire.end(self.goal_id, _STATUSES.get(finish, STATUS_ABORTED))
-        event = _EVENTS.get(status, Event.ABORTED)
         more = {"reason": reason} if reason else {}
-        self._owner.record(self.goal_id, event, **self._meaning.state(motion), **more)
+        self._record(_EVENTS.get(status, Event.ABORTED), **more)
         self._owner.ended(self, result)
+
+    def _broken(self, reason: str) -> str:
+        self._owner.broken(self.goal_id, reason)
+        return reason
+
+    def _record(self, event: Event, **more: object) -> None:
+        self._owner.record(self.goal_id, event, **self._owner.state(self.motion), **more)

@@ -8,7 +8,7 @@ from typing import Any
 from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.simulation import robot
-from bt_actions.simulation.execution import Finish
+from bt_actions.simulation.goal_meaning import Finish
 from bt_actions.simulation.robot import RobotSimulator, RobotStatus
 from bt_actions.simulation.server import SimulatedServer
 from bt_actions.simulation.world import World
@@ -20,8 +20,6 @@ _STATUS = {
     Finish.COMPLETED: MoveRobot.Result.STATUS_COMPLETED,
     Finish.CANCELED: MoveRobot.Result.STATUS_CANCELED,
     Finish.TIMEOUT: MoveRobot.Result.STATUS_TIMEOUT,
-    Finish.REPLACED: MoveRobot.Result.STATUS_FAULT,
-    Finish.FAULT: MoveRobot.Result.STATUS_FAULT,
 }
 
 
@@ -69,9 +67,9 @@ class MoveRobotServer(SimulatedServer):
         )
 
     def result(self, motion: Any, finish: Finish, reason: str) -> Any:
-        return MoveRobot.Result(
-            final_pose=self.world.robot.current_pose, status=_STATUS[finish], message=reason
-        )
+        status = _STATUS.get(finish, MoveRobot.Result.STATUS_FAULT)
+        pose = self.world.robot.current_pose
+        return MoveRobot.Result(final_pose=pose, status=status, message=reason)
 
     def halt(self, motion: Any) -> None:
         self.world.robot.stop()

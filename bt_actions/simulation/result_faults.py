@@ -5,20 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from bt_actions.simulation.fault_plan import GoalFaults
 from bt_actions.simulation.faults import FaultKind
-
-
-class Alarm(Protocol):
-    """Rings: what this needs of a Stepper."""
-
-    def now(self) -> float:
-        """Return the time in seconds of a steady clock."""
-
-    def call_at(self, when: float, callback: Callable[[float], None]) -> None:
-        """Call `callback` at `when`."""
+from bt_actions.simulation.stepper import Stepper
 
 
 class _Kept:
@@ -34,9 +25,9 @@ class _Kept:
 class ResultFaults:
     """Knows the goals whose results are lost or late, from their acceptance until forgotten."""
 
-    def __init__(self, alarm: Alarm, answer: Callable[[Any], None]) -> None:
+    def __init__(self, stepper: Stepper, answer: Callable[[Any], None]) -> None:
         """`answer` is called with a request once its time has come."""
-        self._alarm = alarm
+        self._stepper = stepper
         self._answer = answer
         self._goals: dict[str, _Kept] = {}
 
@@ -59,7 +50,7 @@ class ResultFaults:
             kept.waiting.append(taken)
             return False
         due = kept.ended + kept.delay
-        if self._alarm.now() >= due:
+        if self._stepper.now() >= due:
             return True
         self._answer_at(due, taken)
         return False
@@ -74,10 +65,10 @@ class ResultFaults:
             self._answer_at(now + kept.delay, taken)
         kept.waiting.clear()
         forget = now + kept.delay + remembered
-        self._alarm.call_at(forget, partial(self._forget, goal_id))
+        self._stepper.call_at(forget, partial(self._forget, goal_id))
 
     def _answer_at(self, when: float, taken: Any) -> None:
-        self._alarm.call_at(when, lambda now: self._answer(taken))
+        self._stepper.call_at(when, lambda now: self._answer(taken))
 
     def _forget(self, goal_id: str, now: float) -> None:
         self._goals.pop(goal_id, None)

@@ -7,13 +7,16 @@ from typing import Any
 
 from sensor_msgs.msg import BatteryState
 
-from bt_actions.simulation.battery import Battery
 from bt_actions.simulation.gripper_control import GripperServer
 from bt_actions.simulation.move_robot import MoveRobotServer
 from bt_actions.simulation.platform import Platform
 from bt_actions.simulation.world import HOME, World, WorldEvent
 
 VOLTAGE = 24.0
+PER_METRE = 0.001
+"""Charge that one metre takes, of 1."""
+PER_SECOND_AT_HOME = 0.01
+"""Charge that comes back in one simulated second at home, of 1."""
 
 
 class RobotCell:
@@ -32,7 +35,7 @@ class RobotCell:
         prefix = f"{namespace.rstrip('/')}/" if namespace else ""
         name = namespace.strip("/") or "the robot"
         self.world = World(name=name, on_event=on_event)
-        self.battery = Battery()
+        self.charge = 1.0
         self._pose = self.world.robot.current_pose
         self.move_robot = MoveRobotServer(platform, self.world, f"{prefix}move_robot", **settings)
         self.gripper = GripperServer(platform, self.world, f"{prefix}gripper_control", **settings)
@@ -50,13 +53,13 @@ class RobotCell:
         """Publish the charge, `seconds` of simulated time after the last call."""
         pose = self.world.robot.current_pose
         if pose != self._pose:
-            self.battery.drive(pose - self._pose)
+            self.charge = max(0.0, self.charge - PER_METRE * abs(pose - self._pose))
         elif self.world.station_at(pose) == HOME:
-            self.battery.rest_at_home(seconds)
+            self.charge = min(1.0, self.charge + PER_SECOND_AT_HOME * seconds)
         self._pose = pose
         message = BatteryState(
             voltage=VOLTAGE,
-            percentage=self.battery.charge,
+            percentage=self.charge,
             present=True,
             power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
         )

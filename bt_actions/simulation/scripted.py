@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bt_actions.simulation.execution import Finish
+from bt_actions.simulation.goal_meaning import Finish
 from bt_actions.simulation.server import SimulatedServer
 
 # Messages are Any here: rosidl gives them no common base.

@@ -1,7 +1,7 @@
 """What all simulated action servers share: goals from request to end, their faults, their journal.
 
 A subclass says what a goal means (GoalMeaning); what may go wrong is decided by `faults`, and how,
-by `intake`, `execution` and `result_faults`. The same code serves on an rclpy node and on the
+by `intake`, `live_goal` and `result_faults`. The same code serves on an rclpy node and on the
 virtual network (`platform`): nothing here blocks, raises into an executor, or has a thread.
 """
 
@@ -11,13 +11,12 @@ import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from bt_actions.simulation.execution import Execution, Motion
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault, FaultKind
-from bt_actions.simulation.goal_meaning import GoalMeaning
-from bt_actions.simulation.intake import Fate, Intake
+from bt_actions.simulation.goal_meaning import Motion
+from bt_actions.simulation.intake import Intake
 from bt_actions.simulation.journal import Event, Journal
-from bt_actions.simulation.live_goal import LiveGoal
+from bt_actions.simulation.live_goal import LiveGoal, Owner
 from bt_actions.simulation.platform import Platform, Request, Wire
 from bt_actions.simulation.result_faults import ResultFaults
 from bt_actions.simulation.stepper import Stepper
@@ -29,7 +28,7 @@ RESULT_TIMEOUT = 5.0
 _ALL_GOALS = "0" * 32
 
 
-class SimulatedServer(GoalMeaning):
+class SimulatedServer(Owner):
     """An action server on `node` whose goals move in simulated time, with faults on request."""
 
     def __init__(
@@ -145,8 +144,8 @@ class SimulatedServer(GoalMeaning):
         with self.stepper.lock:
             self.record_death(reason)
             for live in self._live.values():
-                self.stepper.stop(live)
-                live.abandon(reason)
+                self.stepper.stop(live.step)
+                live.abandon()
             self._live.clear()
             self._intake.clear()
             self._results.clear()
@@ -158,7 +157,7 @@ class SimulatedServer(GoalMeaning):
         """Write into the journal that the server and its goals end here."""
         with self.stepper.lock:
             for live in self._live.values():
-                state = self.state(live.run.motion)
+                state = self.state(live.motion)
                 self.record(live.goal_id, Event.DIED, **state, reason=reason)
             if self._wire is not None:
                 self.record("", Event.CLOSED, reason=reason)
@@ -170,7 +169,7 @@ class SimulatedServer(GoalMeaning):
         self._log.warning(f"{self.name}: goal {goal_id[:8]} aborted: {reason}")
 
     def ended(self, goal: LiveGoal, result: Any) -> None:
-        self.stepper.stop(goal)
+        self.stepper.stop(goal.step)
         self._live.pop(goal.goal_id, None)
         if self._wire is not None:
             self._wire.finish(goal.goal_id, result)
@@ -196,8 +195,8 @@ class SimulatedServer(GoalMeaning):
             elif request.kind == "cancel":
                 for live in list(self._live.values()):
                     live.poll(self.stepper.now())
-                    if live.run.due is not None:
-                        self.stepper.call_at(live.run.due, live.poll)
+                    if live.due is not None:
+                        self.stepper.call_at(live.due, live.poll)
 
     def _on_goal_request(self, taken: Request) -> bool:
         wire = self._wire
@@ -206,19 +205,22 @@ class SimulatedServer(GoalMeaning):
         request = self._intake.receive(taken.goal, taken.goal_id)
         if request.faults:
             self._log.info(f"{self.name}: goal {request.number} meets {request.faults}")
-        if request.fate is Fate.DIE:
+        if request.faults.dies("accept"):
             self.die("fault: die=accept")
-        elif request.fate in {Fate.LATER, Fate.SILENT}:
-            silent = request.fate is Fate.SILENT
-            due = self.stepper.now() + request.delay
-            self.stepper.call_at(due, lambda now: wire.answer_soon(taken, silent=silent))
-        return request.fate is Fate.ANSWER
+        if request.is_lost:
+            return False
+        silent = FaultKind.DROP_ACCEPT in request.faults
+        if not silent and FaultKind.DELAY_ACCEPT not in request.faults:
+            return True
+        due = self.stepper.now() + (request.faults.number(FaultKind.DELAY_ACCEPT) or 0.0)
+        self.stepper.call_at(due, lambda now: wire.answer_soon(taken, silent=silent))
+        return False
 
     def _on_cancel_request(self, goal_id: str) -> bool:
         asked = list(self._live) if goal_id == _ALL_GOALS else [goal_id]
         for each in asked:
             self.record(each, Event.CANCEL_REQUESTED)
-        faults = [self._live[each].run.faults for each in asked if each in self._live]
+        faults = [self._live[each].faults for each in asked if each in self._live]
         if any(of_goal.dies("cancel") for of_goal in faults):
             self.die("fault: die=cancel")
             return False
@@ -243,18 +245,23 @@ class SimulatedServer(GoalMeaning):
                 for older in list(self._live.values()):
                     older.replace()
             motion, problem = self._begin(goal)
-            now = self.stepper.now()
-            run = Execution(motion, request.faults, now=now, time_limit=self._time_limit)
-            period = self.stepper.step_period
-            live = LiveGoal(self, self, goal_id, wire, run, step_period=period)
-            self._live[goal_id] = live
+            live = self._live[goal_id] = LiveGoal(
+                self,
+                goal_id,
+                wire,
+                motion,
+                request.faults,
+                now=self.stepper.now(),
+                step_period=self.stepper.step_period,
+                time_limit=self._time_limit,
+            )
             self._results.expect(goal_id, request.faults)
             wire.start(goal_id)
             if problem:
                 self.broken(goal_id, problem)
                 live.give_up(problem)
             else:
-                self.stepper.start(live)
+                self.stepper.start(live.step)
 
     def _begin(self, goal: Any) -> tuple[Motion, str]:
         try:

@@ -10,8 +10,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from bt_actions.simulation.fault_plan import FaultPlan
 from bt_actions.simulation.faults import Fault
@@ -91,17 +90,6 @@ class Simulation:
 
     def __repr__(self) -> str:
         return f"<Simulation {len(self._cells)} robots, speed {self._speed:g}>"
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     @property
     def seed(self) -> int:

@@ -12,7 +12,7 @@ import itertools
 import math
 import threading
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 from bt_actions.simulation.platform import Platform
 from bt_actions.utilities.plain_text import raised
@@ -24,16 +24,11 @@ SHORTEST_RING = 0.008
 """Wall seconds between two rings for steps: a higher speed makes more steps at once. Each ring has
 the executor rebuild its wait set, which for 100 servers takes milliseconds."""
 
-
-class Stepped(Protocol):
-    """Something that moves."""
-
-    def step(self, now: float) -> bool:
-        """Move for one step of simulated time; return whether it still moves."""
+Step = Callable[[float], bool]
 
 
 class Stepper:
-    """Calls `step` of everything that moves each `step_period` of simulated time."""
+    """Calls the steps of everything that moves each `step_period` of simulated time."""
 
     def __init__(self, platform: Platform, *, speed: float = 1.0, step_period: float = 0.1) -> None:
         """Use one timer of `platform`. `speed` is simulated seconds in one wall second."""
@@ -45,7 +40,7 @@ class Stepper:
         self.step_period = step_period
         self._wall_period = step_period / speed
         self._most_steps = max(1, math.ceil(CATCH_UP / self._wall_period))
-        self._moving: dict[Stepped, None] = {}
+        self._moving: dict[Step, None] = {}
         self._since, self._made = 0.0, 0  # when the motion began, and the steps since then
         self._alarms: list[tuple[float, int, Callable[[float], None]]] = []
         self._counter = itertools.count()
@@ -58,18 +53,18 @@ class Stepper:
         """Return the seconds of the platform's steady clock."""
         return self.platform.now()
 
-    def start(self, stepped: Stepped) -> None:
-        """Step `stepped` from now on, until its `step` returns False."""
+    def start(self, step: Step) -> None:
+        """Call `step` from now on with the time, until it returns False: nothing moves any more."""
         with self.lock:
             if not self._moving:
                 self._since, self._made = self.now(), 0
-            self._moving[stepped] = None
+            self._moving[step] = None
             self._arm()
 
-    def stop(self, stepped: Stepped) -> None:
-        """Step it no more."""
+    def stop(self, step: Step) -> None:
+        """Call it no more."""
         with self.lock:
-            self._moving.pop(stepped, None)
+            self._moving.pop(step, None)
 
     def call_at(self, when: float, callback: Callable[[float], None]) -> None:
         """Call `callback` with the time once the steady clock has reached `when`."""
@@ -100,9 +95,9 @@ class Stepper:
             if steps:
                 self._last_ring = now
             for _ in range(steps):
-                for stepped in list(self._moving):
-                    if stepped in self._moving and not self._guarded(stepped.step, now):
-                        self._moving.pop(stepped, None)
+                for step in list(self._moving):
+                    if step in self._moving and not self._guarded(step, now):
+                        self._moving.pop(step, None)
             self._arm()
 
     def _due_steps(self, now: float) -> int:

@@ -163,7 +163,7 @@ RUN = ("imported", "made", "set up", "ticked", "terminated", "shut down", "at ex
     ("command", "when"),
     [
         ("run --json", RUN),
-        ("check --format sarif", ("imported", "at exit")),
+        ("check --format json", ("imported", "at exit")),
         ("render", ("imported", "made", "at exit")),
     ],
     ids=["run", "check", "render"],

@@ -50,6 +50,15 @@ def test_a_file_that_is_not_there_is_told_where_an_installed_tree_is_taken(
     assert capsys.readouterr().err == ""
 
 
+def test_a_tree_from_a_pipe_takes_inputs(capsys: pytest.CaptureFixture[str]) -> None:
+    read, write = os.pipe()
+    os.write(write, b"tree: t\ninputs: {n: {type: float64}}\nroot: {log: hello}\n")
+    os.close(write)
+    assert main(["render", f"/dev/fd/{read}", "--set", "n=2"]) == 0
+    os.close(read)
+    assert capsys.readouterr().out == "--> log hello  (log)\n"
+
+
 def test_direction_is_respected(tmp_path: Path) -> None:
     path = tmp_path / "tree.dot"
     assert main(["render", TREE, "-o", str(path), "--direction", "right"]) == 0

@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import pytest
 
-from bt_actions.cli import main
 from tests.cli.conftest import Start
 from tests.support.processes import Journal, Process
 from tests.support.waiting import until
@@ -83,8 +82,3 @@ def test_a_goal_that_is_left_says_that_its_end_is_not_known(
     assert send.wait() == 3, send
     assert any(line.startswith("CANCELED, end not known") for line in send.lines), send
     assert not any("final_pose" in line for line in send.lines)
-
-
-def test_a_name_that_ros_does_not_take_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["send", "move robot", "MoveRobot", "distance=1.0"]) == 2
-    assert "'move robot' cannot be the name of an action server: a space" in capsys.readouterr().err

@@ -43,11 +43,14 @@ def test_the_tags_stand_for_our_leaves_with_their_settings(tmp_path: Path) -> No
     assert (there.retry.attempts, there.timeouts.result) == (2, 30.0)
 
 
-def test_importing_the_package_is_enough(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "imports", ["bt_actions, py_trees.parsers", "py_trees.parsers, bt_actions"]
+)
+def test_importing_the_package_is_enough(imports: str, tmp_path: Path) -> None:
     path = tmp_path / "tree.xml"
     path.write_text(XML)
     code = (
-        "import bt_actions, sys\n"
+        f"import sys, {imports}\n"
         "from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml as parse\n"
         "print([type(child).__name__ for child in parse(sys.argv[1]).children])\n"
     )

@@ -212,7 +212,6 @@ def test_control_says_where_there_is_no_server(control: Control, space: str) -> 
     [
         (["/run_tree", "pause", "xyz"], "'xyz' is no goal's id: 32 hexadecimal digits"),
         (["/run_tree", "pause", "0" * 33], "is no goal's id"),
-        (["/run tree", "pause"], "cannot be the name of an action"),
     ],
 )
 def test_a_wrong_word_of_control_is_told(

@@ -87,6 +87,13 @@ def test_abort_half_way(serve: Any, bench: Bench) -> None:
     assert bench.entries()[-1].reason == "fault: abort"
 
 
+def test_abort_so_long_after_acceptance(serve: Any, bench: Bench) -> None:
+    began = bench.now()
+    goal = serve("1:abort=0.1", script=Script(duration=30.0)).send().until_ended()
+    assert goal.status == ABORTED
+    assert bench.now() - began < 10.0, "half of the way takes 15 s"
+
+
 def test_a_goal_that_is_done_at_once_still_meets_its_fault(serve: Any) -> None:
     assert serve("1:abort", script=Script(duration=0.0)).send().until_ended().status == ABORTED
 

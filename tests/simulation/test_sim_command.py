@@ -154,7 +154,7 @@ def test_it_goes_on_when_nobody_reads_its_output(bench: Bench, space: str) -> No
         (["--fault", "move_robot:2:abrot"], "did you mean 'abort'"),
         (["--fault", "move_robt:2:abort"], "did you mean 'move_robot'"),
         (["--journal", "/dev/null/j"], "Not a directory"),
-        (["--speed", "0"], "'0' is no positive"),
+        (["--speed", "0"], "'0' is no factor from 1e-05 to 100000"),
         (["--step-period", "-1"], "'-1' is no positive"),
         (["--robots", "0"], "no number of robots"),
         (["--robots", "2", "--namespace", "/r1"], "not allowed with"),
@@ -180,11 +180,11 @@ def test_bad_input_is_one_line_and_exit_code_2(
 
 def test_help_lists_every_fault(capsys: pytest.CaptureFixture[str]) -> None:
     from bt_actions.cli import main
-    from bt_actions.simulation.faults import KINDS
+    from bt_actions.simulation.faults import FaultKind
 
     with pytest.raises(SystemExit):
         main(["sim", "--help"])
     text = capsys.readouterr().out
-    for kind in KINDS:
+    for kind in FaultKind:
         assert f"  {kind}" in text
     assert "examples:" in text

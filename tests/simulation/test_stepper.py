@@ -54,8 +54,8 @@ def test_what_raises_is_dropped_and_the_others_go_on(bench: Bench, stepper: Step
             raise RuntimeError("a bug")
 
     broken, going = Broken(), Walker(5)
-    stepper.start(broken)
-    stepper.start(going)
+    stepper.start(broken.step)
+    stepper.start(going.step)
     stepper.call_at(0.0, lambda now: 1 / 0)
     bench.until(lambda: going.left == 0)
     assert len(broken.times) == 1
@@ -64,13 +64,13 @@ def test_what_raises_is_dropped_and_the_others_go_on(bench: Bench, stepper: Step
 def test_a_late_timer_makes_up_for_a_moment_but_not_for_ever(ros_bench: RosBench) -> None:
     bench, walker = ros_bench, Walker()
     stepper = Stepper(platform_of(bench.node), speed=1.0, step_period=0.02)
-    stepper.start(walker)
+    stepper.start(walker.step)
     bench.until(lambda: walker.times)
     with stepper.lock:  # as a process that was stopped with SIGSTOP
         before = len(walker.times)
         bench.go_on_for(1.0)
     bench.until(lambda: len(walker.times) > before)
-    stepper.stop(walker)
+    stepper.stop(walker.step)
     most = CATCH_UP / 0.02
     assert most / 2 <= len(walker.times) - before <= most + 5, "1 s would be 50 steps"
     stepper.close()
@@ -79,12 +79,12 @@ def test_a_late_timer_makes_up_for_a_moment_but_not_for_ever(ros_bench: RosBench
 def test_closing_ends_everything_and_may_be_done_twice(bench: Bench, stepper: Stepper) -> None:
     walker = Walker()
     rung: list[float] = []
-    stepper.start(walker)
+    stepper.start(walker.step)
     stepper.call_at(stepper.now() + 0.05, rung.append)
     stepper.close()
     stepper.close()
     count = len(walker.times)
-    stepper.start(walker)
+    stepper.start(walker.step)
     bench.go_on_for(0.15)
     assert len(walker.times) == count
     assert rung == []

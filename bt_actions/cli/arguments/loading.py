@@ -39,10 +39,9 @@ def load(
         InputError,
         TreeNotFoundError,
         find_tree,
-        load_tree,
+        open_tree,
         parse_input,
     )
-    from bt_actions.document.load import tree_head
 
     texts: dict[str, str] = {}
     for word in settings:
@@ -54,15 +53,16 @@ def load(
         found = find_tree(tree)
         if Path(tree).suffix and found != Path(tree) and "://" not in tree:
             note(f"bt-actions: there is no {tree} in this folder; taking the installed {found}")
-        name, declared = tree_head(tree) if texts or parameters else ("", {})
-        inputs = as_inputs(parameters(name), declared, name) if parameters else {}
+        opened = open_tree(tree, python=python)  # once: it may be a pipe
+        declared = opened.inputs
+        inputs = as_inputs(parameters(opened.name), declared, opened.name) if parameters else {}
         for name, text in texts.items():
             kind = declared[name].type if name in declared else "string"
             try:
                 inputs[name] = parse_input(text, kind)
             except ValueError as error:
                 raise BadInput(f"--set {name}={text}: {error}") from error
-        return load_tree(tree, inputs, python=python)
+        return opened.build(inputs, once=True)
     except DocumentError as error:
         raise BadInput(findings_text(error), prefixed=False) from error
     except InputError as error:

@@ -9,10 +9,11 @@ import argparse
 import math
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-FASTEST = 1e5
-"""The largest factor for the simulation's time, and one by the smallest."""
+if TYPE_CHECKING:
+    from bt_actions.simulation.faults import Fault
+
 MOST = 1000
 """Goals, robots and the like that one server can be asked for."""
 
@@ -24,7 +25,7 @@ def number(
 
     def read(text: str) -> Any:
         try:
-            value = kind(text)
+            value = kind(text) if text.isascii() else math.nan
         except ValueError:
             value = math.nan
         if not math.isfinite(value) or not least <= value <= most:
@@ -36,14 +37,7 @@ def number(
 
 seconds = number("positive number of seconds", least=math.ulp(0.0))
 metres = number("number of metres")
-
-
-def speed(text: str) -> float:
-    """Read a factor, with which timers can still be made."""
-    value: float = number("positive factor", least=math.ulp(0.0))(text)
-    if not 1.0 / FASTEST <= value <= FASTEST:
-        raise argparse.ArgumentTypeError(f"{text!r} is not from {1.0 / FASTEST:g} to {FASTEST:g}")
-    return value
+speed = number("factor from 1e-05 to 100000", least=1e-5, most=1e5)
 
 
 def count(what: str) -> Callable[[str], Any]:
@@ -72,6 +66,25 @@ def node_name(text: str) -> str:
             f"{text!r} is no name of a node: letters, digits and _, at most 100, no digit first"
         )
     return text
+
+
+def action_name(text: str) -> str:
+    """Read the name of an action, which may be relative."""
+    from bt_actions.document.language.ros_names import why_not
+
+    if why := why_not(text):
+        raise argparse.ArgumentTypeError(f"{text!r} cannot be the name of an action server: {why}")
+    return text
+
+
+def fault(text: str) -> Fault:
+    """Read a fault of a simulated server."""
+    from bt_actions.simulation.faults import Fault, FaultError
+
+    try:
+        return Fault.parse(text)
+    except FaultError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 _SHARED: dict[str, dict[str, Any]] = {
@@ -103,6 +116,8 @@ _SHARED: dict[str, dict[str, Any]] = {
         "action": "store_true",
         "help": "show only what went wrong; the exit code tells",
     },
+    "--fault": {"metavar": "SPEC", "type": fault, "action": "append", "default": []},
+    "--speed": {"metavar": "N", "type": speed},
     "--seed": {"metavar": "N", "type": int, "help": "seed of faults that happen by chance"},
 }
 _SHORT = {"--quiet": "-q"}

@@ -12,7 +12,7 @@ import sys
 import uuid
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.arguments.options import add_option
+from bt_actions.cli.arguments.options import action_name, add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.arguments.values import goal_fields, nested
 from bt_actions.cli.exits import BadInput, Exit
@@ -48,7 +48,11 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument("tree", metavar="TREE", help="name of the tree at the server")
     add_option(parser, "--set")
     parser.add_argument(
-        "--server", metavar="NAME", default="run_tree", help="its action; run_tree if not given"
+        "--server",
+        metavar="NAME",
+        type=action_name,
+        default="run_tree",
+        help="its action; run_tree if not given",
     )
     add_option(parser, "--namespace", help="namespace of the server")
     add_option(parser, "--timeout")
@@ -92,10 +96,7 @@ def run(args: argparse.Namespace) -> int:
 def _leaf(tree: str, server: str, inputs: dict[str, object], goal_name: str) -> RunTree:
     """Check what can be checked without a server."""
     from bt_actions.behaviours.run_tree import RunTree, inputs_text
-    from bt_actions.document.language.ros_names import why_not
 
-    if why := why_not(server):
-        raise BadInput(f"--server: {server!r} cannot be the name of an action: {why}")
     try:
         inputs_text(inputs)
     except ValueError as error:

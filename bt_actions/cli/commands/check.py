@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _EPILOG = """\
 examples:
   bt-actions check trees/*.yaml
-  bt-actions check --no-types --format github trees/pick_and_place.yaml
+  bt-actions check --no-types --format json trees/pick_and_place.yaml
   bt-actions check - < tree.yaml
 
 exit codes:
@@ -46,7 +46,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add_option(parser, "--no-python")
     parser.add_argument(
         "--format",
-        choices=("text", "json", "github", "sarif"),
+        choices=("text", "json"),
         default="text",
         help="how findings are written (default: text)",
     )
@@ -55,7 +55,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check the trees that `args` name."""
     keep_results_apart()
-    from bt_actions.document.findings.reports import REPORTS, as_text
+    from bt_actions.document.findings.reports import as_json, as_text
 
     findings: list[Finding] = []
     seen = set()
@@ -66,10 +66,8 @@ def run(args: argparse.Namespace) -> int:
                 seen.add(finding)
                 findings.append(finding)
                 unreadable |= finding.code in ("BT100", "BT101")
-    if args.format == "text":
-        write(as_text(findings, columns(results())))
-    else:
-        write(REPORTS[args.format](findings))
+    is_text = args.format == "text"
+    write(as_text(findings, columns(results())) if is_text else as_json(findings))
     if unreadable:
         return Exit.BAD_INPUT
     return Exit.FAILURE if findings else Exit.SUCCESS

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.arguments.options import seconds
+from bt_actions.cli.arguments.options import action_name, seconds
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.driving.sweep import sweep
-from bt_actions.cli.exits import BadInput, importing_ros, starting_ros
+from bt_actions.cli.exits import importing_ros, starting_ros
 
 if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
@@ -51,6 +51,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "actions",
         metavar="ACTION",
+        type=action_name,
         nargs="*",
         help="wait for its server for up to 30 s, and fail where that is not in sight",
     )
@@ -76,11 +77,6 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from bt_actions.document.language.ros_names import why_not
-
-    for name in args.actions:
-        if why := why_not(name):
-            raise BadInput(f"{name!r} cannot be the name of an action server: {why}")
     with importing_ros():
         from bt_actions.ros.naming import server_names
         from bt_actions.ros.onlooker import NODE

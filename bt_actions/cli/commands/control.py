@@ -6,7 +6,7 @@ import argparse
 import re
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.arguments.options import add_option
+from bt_actions.cli.arguments.options import action_name, add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.writing import note, write
@@ -37,7 +37,9 @@ def add_parser(subparsers: Subparsers) -> None:
         description="Pause, resume or halt a run of a server of trees (`bt-actions serve`).",
         epilog=_EPILOG,
     )
-    parser.add_argument("server", metavar="SERVER", help="its action, such as /r1/run_tree")
+    parser.add_argument(
+        "server", metavar="SERVER", type=action_name, help="its action, such as /r1/run_tree"
+    )
     parser.add_argument(
         "wish", metavar="pause|resume|halt", choices=tuple(_DONE), help="what to do with the run"
     )
@@ -48,10 +50,6 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask the server, and say what it did."""
-    from bt_actions.document.language.ros_names import why_not
-
-    if why := why_not(args.server):
-        raise BadInput(f"{args.server!r} cannot be the name of an action: {why}")
     beginning = args.goal.lower().replace("-", "")
     if not re.fullmatch("[0-9a-f]{0,32}", beginning):
         raise BadInput(

@@ -67,31 +67,23 @@ def run(args: argparse.Namespace) -> int:
 
 def tree_data(tree: Any) -> dict[str, Any]:
     """A TreeInfo as plain data; no text in it holds what a terminal obeys."""
-    return {
-        "name": clean(tree.name),
-        "description": clean(tree.description),
-        "file": clean(tree.file),
-        "digest": clean(tree.digest),
-        "state": _STATES[tree.state] if tree.state < len(_STATES) else str(tree.state),
-        "findings": [
-            {"code": clean(one.code), "message": clean(one.message), "place": clean(one.place)}
-            for one in tree.findings
-        ],
-        "running": [bytes(each.uuid).hex() for each in tree.running],
-        "paused": [bytes(each.uuid).hex() for each in tree.paused],
-        "waiting": [bytes(each.uuid).hex() for each in tree.waiting],
-        "inputs": [
-            {
-                "name": clean(one.name),
-                "type": clean(one.type),
-                "unit": clean(one.unit),
-                "description": clean(one.description),
-                "required": one.required,
-                "default_json": clean(one.default_json),
-            }
-            for one in tree.inputs
-        ],
+    from bt_actions.messages.conversion import to_plain
+
+    state = _STATES[tree.state] if tree.state < len(_STATES) else str(tree.state)
+    goals = {
+        sort: [bytes(each.uuid).hex() for each in getattr(tree, sort)]
+        for sort in ("running", "paused", "waiting")
     }
+    data: dict[str, Any] = _cleaned(to_plain(tree))
+    return data | {"state": state} | goals
+
+
+def _cleaned(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _cleaned(each) for name, each in data.items()}
+    if isinstance(data, list):
+        return [_cleaned(each) for each in data]
+    return clean(data) if isinstance(data, str) else data
 
 
 def text_of(servers: dict[str, list[dict[str, Any]] | None]) -> list[str]:

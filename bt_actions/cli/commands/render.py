@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.loading import load
-from bt_actions.cli.arguments.options import add_option
+from bt_actions.cli.arguments.options import add_option, number
 from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.results import keep_results_apart, results
 from bt_actions.cli.streams.writing import write
@@ -53,18 +53,12 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--depth",
         metavar="LEVELS",
-        type=_levels,
+        type=number("number of levels: 0, 1, 2 ...", int, 0, 999_999),
         help="show so many levels below the root and say how many nodes are left out; "
         "an .html file has all and starts folded to it",
     )
     add_option(parser, "--set")
     add_option(parser, "--no-python")
-
-
-def _levels(text: str) -> int:
-    if not text.isdecimal() or not text.isascii() or len(text) > 6:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of levels: 0, 1, 2 ...")
-    return int(text)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -10,8 +10,9 @@ import argparse
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.loading import load
-from bt_actions.cli.arguments.options import add_option, metres, node_name, speed
+from bt_actions.cli.arguments.options import add_option, metres, node_name
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.driving.sweep import sweep
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
     from bt_actions.ros.arguments import Given
     from bt_actions.ros.naming import Outlook
-    from bt_actions.simulation.faults import Fault
 
 _EPILOG = """\
 examples:
@@ -89,17 +89,14 @@ def add_parser(subparsers: Subparsers) -> None:
     simulated.add_argument(
         "--sim", action="store_true", help="run simulated action servers in this process"
     )
-    simulated.add_argument(
+    add_option(
+        simulated,
         "--fault",
-        metavar="SPEC",
-        action="append",
-        default=[],
         help="make a simulated server misbehave: SERVER:N|*|P%%:FAULT[=VALUE]; repeatable",
     )
-    simulated.add_argument(
+    add_option(
+        simulated,
         "--speed",
-        metavar="N",
-        type=speed,
         help="speed of the simulation (not of the tree's deadlines); 1 where not given",
     )
     add_option(simulated, "--seed")
@@ -116,7 +113,6 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         keep_results_apart()
     _refuse_without_sim(args)
-    faults = _faults(args.fault)
     root = load(
         args.tree,
         args.set,
@@ -132,14 +128,15 @@ def run(args: argparse.Namespace) -> int:
         from bt_actions.document import tree_name
 
         if cleans_up:
-            code = _clean_up(servers)
+            # Told on standard error: standard output is the run's.
+            code = sweep(5.0, 5.0, servers, first="run without --cleanup-first")
             if code is not Exit.SUCCESS:
                 outlook.close()
                 return code
     except BaseException:
         outlook.close()
         raise
-    wish = SimulationWish(args.speed or 1.0, faults, args.seed) if args.sim else None
+    wish = SimulationWish(args.speed or 1.0, args.fault, args.seed) if args.sim else None
     with Session(
         root,
         executor=args.executor,
@@ -185,31 +182,9 @@ def _servers(args: argparse.Namespace, root: Behaviour) -> list[str]:
         return server_names(actions, name, args.namespace)
 
 
-def _clean_up(wanted: list[str]) -> Exit:
-    """As `bt-actions cleanup` does, told on standard error: standard output is the run's."""
-    from bt_actions.cli.driving.sweep import sweep
-
-    return sweep(look=5.0, patience=5.0, wanted=wanted, first="run without --cleanup-first")
-
-
 def _refuse_without_sim(args: argparse.Namespace) -> None:
     if args.sim:
         return
-    given = {
-        "--fault": bool(args.fault),
-        "--speed": args.speed is not None,
-        "--seed": args.seed is not None,
-        "--check-part": args.check_part is not None,
-    }
-    for option, is_given in given.items():
-        if is_given:
+    for option in ("--fault", "--speed", "--seed", "--check-part"):
+        if getattr(args, option[2:].replace("-", "_")) not in (None, []):
             raise BadInput(f"{option} is about the simulation; it needs --sim")
-
-
-def _faults(texts: list[str]) -> list[Fault]:
-    from bt_actions.simulation.faults import Fault, FaultError
-
-    try:
-        return [Fault.parse(text) for text in texts]
-    except FaultError as error:
-        raise BadInput(f"--fault {error}") from error

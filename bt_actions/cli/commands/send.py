@@ -10,7 +10,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from bt_actions.cli.arguments.options import add_option
+from bt_actions.cli.arguments.options import action_name, add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.arguments.values import goal_fields
 from bt_actions.cli.exits import BadInput
@@ -42,7 +42,9 @@ def add_parser(subparsers: Subparsers) -> None:
         description="Send one goal to an action server; show its feedback, outcome and result.",
         epilog=_EPILOG,
     )
-    parser.add_argument("server", metavar="SERVER", help="name of the action server")
+    parser.add_argument(
+        "server", metavar="SERVER", type=action_name, help="name of the action server"
+    )
     parser.add_argument(
         "type", metavar="TYPE", help="its action type: MoveRobot, pkg/MoveRobot or the full name"
     )
@@ -85,19 +87,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _leaf(server: str, type_name: str, data: dict[str, object]) -> ActionBehaviour:
     """Check everything that can be checked without a server."""
-    from bt_actions.document.language.ros_names import why_not
     from bt_actions.messages.conversion import MessageError, fill
     from bt_actions.messages.interfaces import UnknownInterface, called
 
-    why = why_not(server)
-    if why:
-        raise BadInput(f"{server!r} cannot be the name of an action server: {why}")
     try:
         action_type = called(type_name, "action")
         goal = fill(action_type.Goal, data)  # type: ignore[attr-defined]  # made by rosidl
-    except UnknownInterface as error:
-        raise BadInput(str(error)) from error
-    except MessageError as error:
+    except (UnknownInterface, MessageError) as error:
         raise BadInput(str(error)) from error
 
     from bt_actions.behaviours.action import ActionBehaviour

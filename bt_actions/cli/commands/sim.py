@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from bt_actions.cli.arguments.options import add_option, count, seconds, speed
+from bt_actions.cli.arguments.options import add_option, count, seconds
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, no_parameters
 from bt_actions.cli.driving.serving import say, serve
 from bt_actions.cli.exits import BadInput, Exit
@@ -58,13 +58,7 @@ def add_parser(subparsers: Subparsers) -> None:
     which.add_argument(
         "--robots", metavar="N", type=count("robots"), help="serve so many robots, in /r1, /r2, ..."
     )
-    parser.add_argument(
-        "--speed",
-        metavar="N",
-        type=speed,
-        default=1.0,
-        help="simulated seconds in one second (default 1)",
-    )
+    add_option(parser, "--speed", default=1.0, help="simulated seconds in one second (default 1)")
     parser.add_argument(
         "--step-period",
         metavar="S",
@@ -72,13 +66,7 @@ def add_parser(subparsers: Subparsers) -> None:
         default=0.1,
         help="simulated seconds between two steps (default 0.1)",
     )
-    parser.add_argument(
-        "--fault",
-        metavar="SPEC",
-        action="append",
-        default=[],
-        help="make a server misbehave; repeatable, see below",
-    )
+    add_option(parser, "--fault", help="make a server misbehave; repeatable, see below")
     add_option(parser, "--seed")
     parser.add_argument(
         "--journal",

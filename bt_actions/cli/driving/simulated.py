@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from py_trees.behaviour import Behaviour
-
-from bt_actions import render
+if TYPE_CHECKING:
+    from py_trees.behaviour import Behaviour
 
 SERVED = {"MoveRobot": "move_robot", "Gripper": "gripper_control"}
 """What a simulated robot serves: names by types."""
@@ -29,6 +29,8 @@ class Wanted:
 
 def wanted(root: Behaviour, namespace: str = "") -> Wanted:
     """Return what `root` wants when it runs on a node in `namespace` ("" or with a slash)."""
+    from bt_actions import render
+
     namespaces: dict[str, None] = {}
     others: dict[str, None] = {}
     for row in render.rows(root):

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Mapping
 from types import MappingProxyType
 
-from py_trees.timers import Timer
-
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.value_types import FLOAT, INTEGER, named
 from bt_actions.document.findings import Related
@@ -241,6 +239,8 @@ def _log(checker: Checker, node: TreeNode) -> None:
 
 def _python(checker: Checker, node: TreeNode) -> None:
     path, arguments = node.values.get("python"), node.values.get("arguments", {})
+    from py_trees.timers import Timer
+
     from bt_actions.document.language.classes import (
         ClassError,
         find_behaviour,

@@ -1,24 +1,15 @@
-"""Findings in the four forms that people and tools read: text, JSON, GitHub, SARIF.
-
-Pure functions from findings to text.
-"""
+"""Findings as text for people and as JSON for programs."""
 
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import PurePath
-from types import MappingProxyType
-from urllib.parse import quote
+from collections.abc import Sequence
 
 from bt_actions.document.findings import Finding, Severity
-from bt_actions.document.findings.rules import RULES
 
 
 def as_text(findings: Sequence[Finding], width: int = 200) -> str:
-    """As a compiler prints them, errors first, with a count at the end; source lines are cut to
-    `width`. The forms for tools keep the order of places."""
+    """Write findings as a compiler does: errors first, source lines cut to `width`, and a count."""
     if not findings:
         return ""
     findings = sorted(findings, key=lambda one: one.severity is not Severity.ERROR)
@@ -31,115 +22,17 @@ def as_text(findings: Sequence[Finding], width: int = 200) -> str:
 
 
 def as_json(findings: Sequence[Finding]) -> str:
-    """One list of objects."""
+    """Write one list of objects, in the order of places."""
     plain = [_plain(finding) for finding in findings]
     return json.dumps(plain, indent=2, ensure_ascii=False) + "\n"
 
 
-def as_github(findings: Sequence[Finding]) -> str:
-    """Workflow commands, which GitHub Actions turns into annotations of the changed lines."""
-    return "".join(
-        f"::{finding.severity} file={_escaped(finding.file, ':,')},line={finding.line},"
-        f"col={finding.column},endLine={finding.end_line},endColumn={finding.end_column},"
-        f"title={finding.code}::{_escaped(_with_hint(finding), '')}\n"
-        for finding in findings
-    )
-
-
-def as_sarif(findings: Sequence[Finding]) -> str:
-    """SARIF 2.1.0 (OASIS), which code-scanning services read."""
-    used = sorted({finding.code for finding in findings})
-    rules = [
-        {
-            "id": code,
-            "shortDescription": {"text": RULES[code].title},
-            "defaultConfiguration": {"level": RULES[code].severity.value},
-        }
-        for code in used
-    ]
-    log = {
-        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
-        "version": "2.1.0",
-        "runs": [
-            {
-                "tool": {"driver": {"name": "bt-actions", "rules": rules}},
-                "columnKind": "unicodeCodePoints",
-                "results": [_sarif_result(finding, used) for finding in findings],
-            }
-        ],
-    }
-    return json.dumps(log, indent=2, ensure_ascii=False) + "\n"
-
-
-REPORTS: Mapping[str, Callable[[Sequence[Finding]], str]] = MappingProxyType(
-    {"text": as_text, "json": as_json, "github": as_github, "sarif": as_sarif}
-)
-"""The forms by name."""
-
-
 def _plain(finding: Finding) -> dict[str, object]:
-    plain: dict[str, object] = {
-        "file": finding.file,
-        "line": finding.line,
-        "column": finding.column,
-        "end_line": finding.end_line,
-        "end_column": finding.end_column,
-        "code": finding.code,
-        "severity": finding.severity.value,
-        "message": finding.message,
-    }
+    names = ("file", "line", "column", "end_line", "end_column", "code", "severity", "message")
+    plain = {name: getattr(finding, name) for name in names}
     if finding.hint:
         plain["hint"] = finding.hint
     if finding.related is not None:
-        place = finding.related.place
-        plain["related"] = {
-            "file": place.file,
-            "line": place.line,
-            "column": place.column,
-            "message": finding.related.message,
-        }
+        related = finding.related
+        plain["related"] = {**related.place._asdict(), "message": related.message}
     return plain
-
-
-def _with_hint(finding: Finding) -> str:
-    return f"{finding.message} ({finding.hint})" if finding.hint else finding.message
-
-
-def _escaped(text: str, more: str) -> str:
-    """As workflow commands want it: percent, line ends, and in properties also `more`."""
-    for char in "%\r\n" + more:
-        text = text.replace(char, f"%{ord(char):02X}")
-    return text
-
-
-def _sarif_result(finding: Finding, used: list[str]) -> dict[str, object]:
-    result: dict[str, object] = {
-        "ruleId": finding.code,
-        "ruleIndex": used.index(finding.code),
-        "level": finding.severity.value,
-        "message": {"text": _with_hint(finding)},
-        "locations": [
-            _sarif_place(
-                finding.file,
-                {
-                    "startLine": finding.line,
-                    "startColumn": finding.column,
-                    "endLine": finding.end_line,
-                    "endColumn": finding.end_column,
-                },
-            )
-        ],
-    }
-    if finding.related is not None:
-        place = finding.related.place
-        region = {"startLine": place.line, "startColumn": place.column}
-        related = _sarif_place(place.file, region)
-        result["relatedLocations"] = [
-            {**related, "message": {"text": finding.related.message}},
-        ]
-    return result
-
-
-def _sarif_place(file: str, region: dict[str, int]) -> dict[str, object]:
-    uri = quote(os.fsencode(PurePath(file).as_posix()))
-    return {"physicalLocation": {"artifactLocation": {"uri": uri}, "region": region}}

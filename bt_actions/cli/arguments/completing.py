@@ -1,0 +1,78 @@
+"""What a shell offers at TAB: argcomplete asks the parsers, and the functions here for some values.
+
+A user waits for each answer, so nothing here imports py_trees or the checker. Where a function
+raises an error, as for a tree that is not there, the shell offers nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import argcomplete
+from argcomplete.completers import FilesCompleter
+
+if TYPE_CHECKING:
+    from bt_actions.cli.arguments.parser import Parser
+
+
+def complete(parser_of: Callable[[str], Parser]) -> None:
+    """Answer the shell, and leave. `parser_of` gives the parser of one command, or of all ("")."""
+    typed = os.environ["COMP_LINE"][: int(os.environ["COMP_POINT"])] + "."
+    command = typed.split()[1] if len(typed.split()) > 2 else ""
+    parser = parser_of(command)
+    for each in (parser, *parser.commands.values()):
+        for action in each._actions:  # noqa: SLF001 - argparse has no public way to read a parser
+            if isinstance(action.metavar, str) and action.metavar in _VALUES:
+                action.completer = _VALUES[action.metavar]  # type: ignore[attr-defined]
+    argcomplete.autocomplete(parser, always_complete_options=not command)
+
+
+def _trees(prefix: str, **_others: object) -> Iterable[str]:
+    from bt_actions.document import installed_trees
+
+    names = (name for name, path in installed_trees().items() if _holds_tree(path))
+    return [*names, *FilesCompleter()(prefix)]
+
+
+def _holds_tree(path: Path) -> bool:
+    """Whether a file is no library for trees to import, as far as its text tells at a glance."""
+    try:
+        return re.search(rb"^tree:", path.read_bytes(), re.MULTILINE) is not None
+    except OSError:
+        return False
+
+
+def _inputs(parsed_args: argparse.Namespace, **_others: object) -> Iterable[str]:
+    from bt_actions.document import find_tree, read_source
+    from bt_actions.document.yaml.compose import compose
+    from bt_actions.document.yaml.nodes import Mapping
+
+    node = compose(read_source(find_tree(parsed_args.tree)))
+    top = {key.text: value for key, value in node.pairs} if isinstance(node, Mapping) else {}
+    inputs = top.get("inputs")
+    return [f"{key.text}=" for key, _ in inputs.pairs] if isinstance(inputs, Mapping) else []
+
+
+def _rules(**_others: object) -> dict[str, str]:
+    from bt_actions.document import RULES
+
+    return {code: rule.title for code, rule in RULES.items()}
+
+
+def _faults(prefix: str, **_others: object) -> dict[str, str]:
+    from bt_actions.cli.driving.simulated import SERVED
+    from bt_actions.simulation.faults import FaultKind
+
+    which = prefix.rpartition(":")[0]
+    if ":" in which:
+        return {f"{which}:{kind}": kind.does for kind in FaultKind}
+    return {f"{server}:": kind for kind, server in SERVED.items()}
+
+
+_VALUES = {"TREE": _trees, "NAME=VALUE": _inputs, "CODE": _rules, "SPEC": _faults}
+"""By the words that stand for values in help."""
