@@ -168,10 +168,7 @@ class TreeServer:
         self._is_drained = True
 
     def close(self) -> None:
-        """Drain, where that has not been done, and be gone.
-
-        Who can, drains, stops the executor, then closes: rclpy's executors fail over what is gone.
-        """
+        """Drain, where that has not been done, and be gone; whether or not the node is spun."""
         if not self._is_drained:
             self.drain()
         self._say.close()
