@@ -15,9 +15,10 @@ from bt_actions.traffic.host import Record
 
 if TYPE_CHECKING:
     from bt_actions.ros.log import Log
+    from bt_actions.ros.rosout import Rosout
     from bt_actions.ros.spinning import Spinner
 
-__all__ = ["backend_of", "ended_by_signals", "log", "spinner"]
+__all__ = ["backend_of", "declare_input", "ended_by_signals", "log", "rosout", "spinner"]
 
 
 def backend_of(node: Any) -> Backend:
@@ -67,3 +68,17 @@ def log() -> Log:
     from bt_actions.ros.log import log
 
     return log
+
+
+def rosout(node: Any) -> Rosout:
+    """Return what speaks on `/rosout` for a node, and prints nothing."""
+    from bt_actions.ros.rosout import Rosout
+
+    return Rosout(node)
+
+
+def declare_input(node: Any, *given: Any) -> bool:
+    """Show an input as a parameter of a node; see ros/parameters.py."""
+    from bt_actions.ros.parameters import declare_input
+
+    return declare_input(node, *given)

@@ -15,6 +15,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected
+from bt_actions.behaviours.places import root_of
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
@@ -23,7 +24,6 @@ from bt_actions.messages.conversion import MessageError, fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.drain import drain
-from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten, shorten_fields
 
 if TYPE_CHECKING:

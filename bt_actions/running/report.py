@@ -16,9 +16,10 @@ from py_trees.composites import Selector
 
 from bt_actions import document
 from bt_actions.behaviours.decorators import Gate
+from bt_actions.behaviours.places import path_of, told_apart
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeStarted
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.utilities.places import path_of, told_apart
+from bt_actions.utilities.plain_text import clean
 
 DONE = "DONE"
 UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
@@ -238,6 +239,19 @@ class Report:
             )
             for leaf in self._failed_leaves(self.root)
         ]
+
+    def summary(self) -> list[str]:
+        """Say why the tree failed: for each culprit its path, attempts, outcome, reason, place."""
+        lines: list[str] = []
+        for culprit in self.culprits():
+            how, why, row = "failed", culprit.message, culprit.row
+            if row is not None and row.outcome is not None:
+                tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
+                how, why = f"{row.outcome} after {tries}", row.reason or why
+            lines += [" / ".join(culprit.path), f"  {how}{f': {clean(why)}' if why else ''}"]
+            if culprit.place:
+                lines.append(f"  {culprit.place}")
+        return lines
 
     def _culprit(self, node: Behaviour, message: str) -> Culprit:
         return Culprit(node, path_of(node), message, place_of(node), self._rows.get(node))

@@ -14,6 +14,7 @@ from py_trees.behaviours import Failure
 from py_trees.common import Status
 
 from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.places import path_of
 from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import Event, NodeChanged
 from bt_actions.messages.conversion import to_plain
@@ -21,7 +22,6 @@ from bt_actions.ros.naming import server_name
 from bt_actions.running.report import Report
 from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
-from bt_actions.utilities.places import path_of
 from bt_actions.utilities.plain_text import as_json
 
 __all__ = ["Leaf", "Run"]

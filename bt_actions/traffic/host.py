@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from bt_actions.goals.terms import Command, Event
-from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.handle import Domain, GoalHandle
 from bt_actions.traffic.scheduler import Scheduler
+from bt_actions.traffic.stalls import Stalls
 
 
 class Log(Protocol):

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from bt_actions.goals.ids import author_of
 from bt_actions.traffic.host import Log
+from bt_actions.utilities.ids import author_of
 
 TOLD_AT_MOST = 10
 """Goals of one action that are named; who left more left them in the same way."""

@@ -13,9 +13,9 @@ import contextlib
 from bt_actions.goals.terms import NEVER, Event, State
 from bt_actions.servers.presence import LEASE, Server
 from bt_actions.servers.reachability import TWICE, Reachability
-from bt_actions.servers.stalls import ANSWERS_TAKE
 from bt_actions.traffic.handle import Endpoint
 from bt_actions.traffic.host import Host
+from bt_actions.traffic.stalls import ANSWERS_TAKE
 from bt_actions.traffic.transport import ActionTransport, Opener, probe
 
 LAST_WORD = 0.5

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
-__all__ = ["given_fields", "shorten", "shorten_fields"]
+__all__ = ["brief", "given_fields", "shorten", "shorten_fields"]
 
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
@@ -19,7 +19,18 @@ Part = tuple[str, object]
 """A text, and a value that stands behind it (or `_NOTHING`)."""
 
 
-def shorten(value: object, limit: int = 300) -> str:
+LONG = 300
+"""Characters of a value; longer ones are cut."""
+
+
+def brief(value: object) -> str:
+    """Return a value as people read it, short however large it is; a text without quotes."""
+    if not isinstance(value, str):
+        return shorten(value)
+    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
+
+
+def shorten(value: object, limit: int = LONG) -> str:
     """Return a value as people write it in a tree: ``{x: 1.0, on: true, name: 'a'}``.
 
     A long list is ``[7, 7, 7, … 4000000 items]``; a text of more than `limit` characters is cut,

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_actions.behaviours.places import path_of
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished, TreeStarted
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.utilities.places import path_of
 
 
 @dataclass

@@ -16,7 +16,7 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Inverter
 
 from bt_actions.cli.exits import Exit
-from bt_actions.cli.views.table import summary, table, verdict
+from bt_actions.cli.views.table import table, verdict
 from bt_actions.cli.views.words import Closing, goal_text, last_words
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import NODE
@@ -116,7 +116,7 @@ def test_a_failure_tells_the_attempts_of_its_last_visit(leaf: FakeAction, story:
         *fail(story, leaf),
         story.finish(Status.FAILURE),
     )
-    assert "  ABORTED after 1 attempt" in "\n".join(summary(report))
+    assert "  ABORTED after 1 attempt" in "\n".join(report.summary())
 
 
 def test_a_leaf_that_is_visited_again_adds_to_its_row(leaf: FakeAction, story: Story) -> None:
@@ -244,7 +244,7 @@ def test_the_summary_names_path_attempts_outcome_reason_and_place(story: Story) 
         story.node(root, Status.FAILURE),
         story.finish(Status.FAILURE),
     )
-    assert summary(report) == [
+    assert report.summary() == [
         "Deliver / Move",
         "  ABORTED after 2 attempts: a fault",
         "  trees/x.yaml:14:9",

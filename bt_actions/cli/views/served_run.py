@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from bt_actions.behaviours.places import told_apart
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.one_goal import GoalView
-from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class CallView(GoalView):
     def result_lines(self) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""
         from bt_actions.cli.views.table import columns
-        from bt_actions.cli.views.words import brief
+        from bt_actions.utilities.shorten import brief
 
         result = self._leaf.result
         if result is None:

@@ -1,10 +1,9 @@
-"""A run's actions as a table, and why its tree failed, as lines. Looks at the report alone."""
+"""A run's actions as a table. Looks at the report alone."""
 
 from __future__ import annotations
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
-from bt_actions.utilities.plain_text import clean
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
@@ -64,23 +63,3 @@ def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None
 
 def _cut(cell: str, size: int) -> str:
     return cell if len(cell) <= size else cell[: size - 2] + ".."
-
-
-def summary(report: Report) -> list[str]:
-    """Return why the tree failed: for each leaf its path, attempts, outcome, reason and place."""
-    lines: list[str] = []
-    for culprit in report.culprits():
-        lines.append(" / ".join(culprit.path))
-        row = culprit.row
-        if row is None or row.outcome is None:
-            lines.append(f"  failed{_because(culprit.message)}")
-        else:
-            tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
-            lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
-        if culprit.place:
-            lines.append(f"  {culprit.place}")
-    return lines
-
-
-def _because(reason: str) -> str:
-    return f": {clean(reason)}" if reason else ""

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from py_trees.common import Status
 
 from bt_actions.cli.exits import Exit
-from bt_actions.cli.views.table import summary, table
+from bt_actions.cli.views.table import table
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.shorten import brief
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -35,8 +35,6 @@ MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
 MANY = 20
 """Items of a list that is shown whole."""
-LONG = 300
-"""Characters of a value; longer ones are cut."""
 CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
 
 
@@ -78,17 +76,10 @@ def outputs_of(report: Report) -> dict[str, object]:
     return tree_outputs(report.root)
 
 
-def brief(value: object) -> str:
-    """Return a value as people read it, short however large it is; a text without quotes."""
-    if not isinstance(value, str):
-        return shorten(value, LONG)
-    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
-
-
 def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     warned = [f"{' / '.join(each.path)}: {each.message}" for each in report.warnings]
-    lines = [f"warning: {clean(line)}" for line in warned] + summary(report)
+    lines = [f"warning: {clean(line)}" for line in warned] + report.summary()
     if report.servers_gone and not closing.verdict:
         lines.append(stood_still(report))
     lines += [line for line in (closing.complaint, closing.error) if line]

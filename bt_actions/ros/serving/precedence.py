@@ -15,10 +15,10 @@ from collections.abc import Callable
 from builtin_interfaces.msg import Time
 from rclpy.exceptions import InvalidHandle
 
-from bt_actions.goals.ids import author_of, new_goal_id
 from bt_actions.ros import graph
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.ros.serving.telling import Telling
+from bt_actions.utilities.ids import author_of, new_id
 
 LOOK = 1.0
 """Seconds in which a new server is shown one that is there (0.04 to 0.6 measured)."""
@@ -42,7 +42,7 @@ class Precedence:
         self.regained: Callable[[], None] = lambda: None
         """Called when another server had to answer, and this one is to answer now."""
         self._action = self._node.resolve_topic_name(action, only_expand=True)
-        self._mine = f"/_since/t{time.time_ns():020d}_{new_goal_id().hex()}"
+        self._mine = f"/_since/t{time.time_ns():020d}_{new_id().hex()}"
         endpoints.publisher(Time, f"{self._action}{self._mine}", 1)
         self._begun = time.monotonic()
         self._unclaimed_since: float | None = None

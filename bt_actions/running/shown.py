@@ -1,6 +1,6 @@
 """What ROS sees of a run beside its goals: its inputs as parameters, and its life on `/rosout`.
 
-What it says is also what the run prints, so nothing here prints anything but a warning.
+What is said on `/rosout` is printed by nothing here. Knows ROS by wiring.py alone.
 """
 
 from __future__ import annotations
@@ -11,26 +11,22 @@ from typing import TYPE_CHECKING
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.cli.streams.writing import note
-from bt_actions.cli.views.table import summary
-from bt_actions.cli.views.words import brief
+from bt_actions import wiring
 from bt_actions.document import given_inputs, place_of, tree_name
+from bt_actions.document.language.types import parse_type
 from bt_actions.events import Event, TreeStarted
 from bt_actions.running.report import Report
 from bt_actions.utilities.plain_text import clean, in_words
+from bt_actions.utilities.shorten import brief
 
 if TYPE_CHECKING:
     from bt_actions.running.runner import TreeRunner
 
 
-class Presence:
+class ShownRun:
     """Shows one run on its node, which `close` has to find alive."""
 
     def __init__(self, runner: TreeRunner, root: Behaviour) -> None:
-        from bt_actions.document.language.types import parse_type
-        from bt_actions.ros.parameters import declare_input
-        from bt_actions.ros.rosout import Rosout
-
         self._runner = runner
         self._report = Report(root)  # of its own: the views' is read on the main thread
         self._name = tree_name(root)
@@ -46,10 +42,13 @@ class Presence:
             unit = f" ({each.unit})" if each.unit else ""
             kind = parse_type(each.type)
             description = f"{each.description}{unit}".strip()
-            if kind is not None and not declare_input(runner.node, name, kind, value, description):
-                note(f"bt-actions: the input {name!r} is shown as no parameter of the node: ROS has"
-                     " one of that name; --set gives it a value")  # fmt: skip
-        self._rosout = Rosout(runner.node)
+            given_as = runner.node, name, kind, value, description
+            if kind is not None and not wiring.declare_input(*given_as):
+                wiring.log().warning(
+                    f"the input {name!r} is shown as no parameter of the node: ROS has one of that "
+                    "name; its value is the tree's all the same"
+                )
+        self._rosout = wiring.rosout(runner.node)
         runner.observe(self._observe)
 
     def _observe(self, event: Event) -> None:
@@ -68,7 +67,7 @@ class Presence:
             self._rosout.close()
             return
         status = self._report.status
-        failed = "\n".join(summary(self._report)) if error is None else in_words(error)
+        failed = "\n".join(self._report.summary()) if error is None else in_words(error)
         if failed:
             self._rosout.say("error", f"{self._name}: {failed}")
         word = status.value if status is not Status.INVALID else "STOPPED"

@@ -1,4 +1,4 @@
-"""Where a behaviour stands in its tree. No ROS."""
+"""Where a behaviour stands in its tree."""
 
 from __future__ import annotations
 
