@@ -30,7 +30,7 @@ class Fate(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class GoalRequest:
     """A goal that was asked for."""
 
     goal_id: str
@@ -71,14 +71,14 @@ class Intake:
         self._plan = plan
         self._record = record
         self._warn = warn
-        self._undecided: dict[int, Request] = {}
-        self._accepted: dict[str, Request] = {}
+        self._undecided: dict[int, GoalRequest] = {}
+        self._accepted: dict[str, GoalRequest] = {}
 
-    def receive(self, goal: object, goal_id: str) -> Request:
+    def receive(self, goal: object, goal_id: str) -> GoalRequest:
         """Take in a request for `goal`, whose message lives until the decision."""
         self.count += 1
         faults = self._plan.strike(self._server, self.count)
-        request = Request(goal_id, self.count, faults)
+        request = GoalRequest(goal_id, self.count, faults)
         more = {"faults": str(faults)} if faults else {}
         self._record(goal_id, Event.RECEIVED, number=request.number, **more)
         if request.fate not in {Fate.DIE, Fate.LOST}:
@@ -110,7 +110,7 @@ class Intake:
             self._reject(request, "its id is already in use")
         return goal_id in self._accepted
 
-    def start(self, goal_id: str) -> Request | None:
+    def start(self, goal_id: str) -> GoalRequest | None:
         """Return the request of an accepted goal, once."""
         request = self._accepted.pop(goal_id, None)
         if request is not None:
@@ -122,6 +122,6 @@ class Intake:
         self._undecided.clear()
         self._accepted.clear()
 
-    def _reject(self, request: Request, reason: str) -> None:
+    def _reject(self, request: GoalRequest, reason: str) -> None:
         self._warn(f"{self._server}: goal {request.number} refused: {reason}")
         self._record(request.goal_id, Event.REJECTED, reason=reason)

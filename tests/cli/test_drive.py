@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from bt_actions.cli.driving.drive import Drive, Ended
+from bt_actions.cli.driving.drive import Drive, RunEnd
 from bt_actions.cli.driving.signals import SAME_WISH, Signals
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.lines import LineView
@@ -41,7 +41,7 @@ class Run:
         self.timeout = timeout
         self.code: Exit | None = None
 
-    def go(self, *kicks: object) -> Ended:
+    def go(self, *kicks: object) -> RunEnd:
         with Signals() as signals:
             drive = Drive(
                 self.runner,

@@ -38,7 +38,7 @@ class Option:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class CommandWords:
     """What a shell needs to know of one command."""
 
     name: str
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     return Exit.SUCCESS
 
 
-def _command(name: str, text: str, parser: argparse.ArgumentParser) -> Command:
+def _command(name: str, text: str, parser: argparse.ArgumentParser) -> CommandWords:
     options: list[Option] = []
     words: tuple[str, ...] = ()
     files = False
@@ -95,7 +95,7 @@ def _command(name: str, text: str, parser: argparse.ArgumentParser) -> Command:
             words, files = tuple(_inputs_of_trees()), True
         elif action.metavar == "CODE":
             words = _codes()
-    return Command(name, text, tuple(options), words, files)
+    return CommandWords(name, text, tuple(options), words, files)
 
 
 @functools.cache
@@ -117,7 +117,7 @@ def _codes() -> tuple[str, ...]:
     return tuple(RULES)
 
 
-def _bash(commands: list[Command]) -> str:
+def _bash(commands: list[CommandWords]) -> str:
     names = " ".join(command.name for command in commands)
     lines = [
         "# bash completion for bt-actions",
@@ -219,7 +219,7 @@ def _offer(*words: str, files: bool = False) -> str:
     return f'mapfile -t COMPREPLY < <(compgen {source} -- "$word")'
 
 
-def _zsh(commands: list[Command]) -> str:
+def _zsh(commands: list[CommandWords]) -> str:
     lines = [
         "#compdef bt-actions",
         "# zsh completion for bt-actions",
@@ -267,7 +267,7 @@ def _joined(name: str, option: Option) -> str:
     return "=" if option.takes_value and name.startswith("--") else ""
 
 
-def _fish(commands: list[Command]) -> str:
+def _fish(commands: list[CommandWords]) -> str:
     lines = ["# fish completion for bt-actions"]
     for command in commands:
         lines.append(

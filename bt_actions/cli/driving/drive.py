@@ -83,7 +83,7 @@ class _Stop:
 
 
 @dataclass(slots=True)
-class Ended:
+class RunEnd:
     """How a run ended."""
 
     code: Exit
@@ -131,7 +131,7 @@ class Drive:
         self._watched = _pipe_of_stdout()
         runner.observe(self._observe)
 
-    def run(self) -> Ended:
+    def run(self) -> RunEnd:
         """Run the tree to its end; return how it ended. Main thread only."""
         thread = threading.Thread(target=self._tree, name="tree", daemon=True)
         began = self._clock()
@@ -168,7 +168,7 @@ class Drive:
         if self._abandoned:
             self._await_the_list()
         self._settle()
-        return Ended(self._code(), self._cause(), self._abandoned, self._error)
+        return RunEnd(self._code(), self._cause(), self._abandoned, self._error)
 
     def _tree(self) -> None:
         try:

@@ -16,23 +16,23 @@ from bt_actions.cli.streams.writing import note
 from bt_actions.utilities.plain_text import raised
 
 
-class Server(Protocol):
+class Served(Protocol):
     """What is served."""
 
     def close(self) -> None:
         """Be gone; nothing spins its node any more."""
 
 
-AnyServer = TypeVar("AnyServer", bound=Server)
+AnyServed = TypeVar("AnyServed", bound=Served)
 
 
 def serve(
     command: str,
-    make: Callable[[Any], AnyServer],
+    make: Callable[[Any], AnyServed],
     *,
-    announce: Callable[[AnyServer], None],
-    drain: Callable[[AnyServer, Signals], None] = lambda server, signals: None,
-    conclude: Callable[[AnyServer, Exit], Exit],
+    announce: Callable[[AnyServed], None],
+    drain: Callable[[AnyServed, Signals], None] = lambda server, signals: None,
+    conclude: Callable[[AnyServed, Exit], Exit],
     name: str,
     namespace: str = "",
     executor: str | None = None,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self, TypeVar
 
 from py_trees.behaviour import Behaviour
 
-from bt_actions.cli.driving.drive import Drive, Ended
+from bt_actions.cli.driving.drive import Drive, RunEnd
 from bt_actions.cli.driving.signals import Signals
 from bt_actions.cli.driving.simulated import Wanted, remark, wanted
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, starting_ros
@@ -170,7 +170,7 @@ class Session:
         finally:
             self._runner.shutdown()
 
-    def _close(self, ended: Ended, part_at: float | None) -> Closing:
+    def _close(self, ended: RunEnd, part_at: float | None) -> Closing:
         """Let the simulated world say what became of the part, and settle the exit code."""
         error = _bug(ended.error)
         if self._simulator is None or not self._simulator.parts:

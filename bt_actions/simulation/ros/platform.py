@@ -19,7 +19,7 @@ from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
 from bt_actions.ros.workarounds.closable import closable
-from bt_actions.simulation.platform import Log, Server
+from bt_actions.simulation.platform import RequestHandler, SimulationLog
 from bt_actions.simulation.ros.wire import InterceptedActionServer
 
 SHORTEST_WAIT = 0.0001
@@ -34,9 +34,9 @@ class NodePlatform:
         self._group = MutuallyExclusiveCallbackGroup()
 
     @property
-    def log(self) -> Log:
+    def log(self) -> SimulationLog:
         """The node's logger."""
-        logger: Log = self._node.get_logger()
+        logger: SimulationLog = self._node.get_logger()
         return logger
 
     def now(self) -> float:
@@ -52,7 +52,7 @@ class NodePlatform:
         return str(expand_topic_name(name, self._node.get_name(), self._node.get_namespace()))
 
     def serve(
-        self, action_type: Any, name: str, server: Server, result_timeout: float
+        self, action_type: Any, name: str, server: RequestHandler, result_timeout: float
     ) -> InterceptedActionServer:
         """Serve an action on the node."""
         return InterceptedActionServer(

@@ -1,6 +1,6 @@
 """The server side of an action on rclpy: an action server whose requests others see first.
 
-What the middleware brings is shown to a `Server`, which may keep it: to lose it, or to give it
+What the middleware brings is shown to a `RequestHandler`, which may keep it: to lose it, or give it
 back later. Goals are executed by that server: `start` only changes the state, `finish` sends the
 result. Nothing is decided here.
 """
@@ -20,7 +20,7 @@ from rclpy.task import Future
 
 from bt_actions.goals.terms import STATUS_CANCELED, STATUS_SUCCEEDED
 from bt_actions.ros.workarounds.action_server import ClosableActionServer
-from bt_actions.simulation.platform import Request, Server
+from bt_actions.simulation.platform import Request, RequestHandler
 from bt_actions.utilities.plain_text import raised
 
 
@@ -48,7 +48,7 @@ class InterceptedActionServer(ClosableActionServer):
     """See the head of this file."""
 
     def __init__(
-        self, node: Node, action_type: Any, name: str, server: Server, **settings: Any
+        self, node: Node, action_type: Any, name: str, server: RequestHandler, **settings: Any
     ) -> None:
         """Serve on `node`; `settings` are those of rclpy's ActionServer."""
         self._server = server
