@@ -20,12 +20,11 @@ from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
 
 from bt_actions.document import Tree
 from bt_actions.document.reading.find import tree_folder
-from bt_actions.ros.rosout import Level
+from bt_actions.ros.rosout import Level, Rosout
 from bt_actions.ros.serving.action_server import DeferredActionServer
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.ros.serving.lifecycle import Lifecycle
 from bt_actions.ros.serving.precedence import Precedence
-from bt_actions.ros.serving.telling import Telling
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.control import Control
 from bt_actions.serving.diagnostics import Diagnostics, Standing
@@ -114,7 +113,8 @@ class TreeServer:
         self._underway = Underway(node.context.get_domain_id())
         self._worker = ThreadPoolExecutor(1, "bt_actions-check")
         self._endpoints = endpoints = Endpoints(node)
-        self._say = Telling(node)
+        self._rosout = Rosout(node)
+        self._say = self._rosout.tell
         self._rejections = Rejections(endpoints, self._say)
         self.precedence = Precedence(endpoints, "run_tree", self._say)
         self._action = DeferredActionServer(
@@ -171,7 +171,7 @@ class TreeServer:
         """Drain, where that has not been done, and be gone; whether or not the node is spun."""
         if not self._is_drained:
             self.drain()
-        self._say.close()
+        self._rosout.close()
         self._endpoints.close()
         self._action.destroy()
         if self.lifecycle is not None:

@@ -68,12 +68,12 @@ class ClosableActionServer(ActionServer):  # type: ignore[misc]
     async def execute(self, taken_data: dict[str, Any]) -> None:
         """Answer what was taken, each request on its own."""
         for kind, taken in taken_data.items():
-            await self.guarded(super().execute({kind: taken}))
+            await self.guarded(super().execute, {kind: taken})
 
-    async def guarded(self, work: Awaitable[object]) -> None:
+    async def guarded(self, work: Callable[..., Awaitable[object]], *arguments: Any) -> None:
         """Await what would end the executor's spin where it raises."""
         try:
-            await work
+            await work(*arguments)
         except Exception as error:  # noqa: BLE001 - see above
             if not self.gone:
                 log.error(f"{self._name}: {raised(error)}")

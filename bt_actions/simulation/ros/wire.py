@@ -21,7 +21,6 @@ from rclpy.task import Future
 from bt_actions.goals.terms import STATUS_CANCELED, STATUS_SUCCEEDED
 from bt_actions.ros.workarounds.action_server import ClosableActionServer
 from bt_actions.simulation.platform import Request, RequestHandler
-from bt_actions.utilities.plain_text import raised
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +66,8 @@ class InterceptedActionServer(ClosableActionServer):
         for kind, taken in taken_data.items():
             if kind == "expired":
                 await super().execute({kind: taken})
-            elif self._shown(request := Taken(kind, *taken)):
-                await self._answer(request)
+            else:
+                await self.guarded(self._show, Taken(kind, *taken))
 
     # For the server
 
@@ -113,23 +112,29 @@ class InterceptedActionServer(ClosableActionServer):
         Of a coroutine that it has and never begins Python would warn.
         """
         if not self.gone and (executor := self._node.executor) is not None:
-            executor.create_task(partial(_to_its_end, work, *arguments))
+            executor.create_task(partial(_to_its_end, self.guarded, work, *arguments))
 
     async def _finish(self, goal_id: str, result: Any) -> None:
         # The server may go, or the goal expire, between `finish` and this task of the executor.
         handle = self._goal_handles.get(bytes.fromhex(goal_id))
         if not self.gone and handle is not None:
-            await self.guarded(self._execute_goal(lambda handle: result, handle))
+            await self._execute_goal(lambda handle: result, handle)
+
+    async def _show(self, request: Taken) -> None:
+        if not self.gone and self._server.on_request(request):
+            await self._answer(request)
 
     async def _answer(self, request: Taken) -> None:
-        if not self.gone:
-            await super().execute({request.kind: (request.header, request.message)})
-            self._tell(request)
+        await super().execute({request.kind: (request.header, request.message)})
+        self._tell(request)
 
     async def _accept_silently(self, request: Taken) -> None:
+        await self._accept_unanswered(request.message)
+        self._tell(request)
+
+    def _tell(self, request: Taken) -> None:
         if not self.gone:
-            await self.guarded(self._accept_unanswered(request.message))
-            self._tell(request)
+            self._server.on_answered(request)
 
     async def _accept_unanswered(self, request: Any) -> None:
         """Do what rclpy's _execute_goal_request does, without its answer."""
@@ -158,23 +163,6 @@ class InterceptedActionServer(ClosableActionServer):
     def _canceled(self, handle: ServerGoalHandle) -> CancelResponse:
         granted = self._server.cancel(_hex(handle.goal_id))
         return CancelResponse.ACCEPT if granted else CancelResponse.REJECT
-
-    def _shown(self, request: Taken) -> bool:
-        if self.gone:
-            return False
-        try:
-            return self._server.on_request(request)
-        except Exception as error:  # noqa: BLE001 - it would end spin()
-            self._logger.error(f"simulation: at a {request.kind} request: {raised(error)}")
-            return True
-
-    def _tell(self, request: Taken) -> None:
-        if self.gone:
-            return
-        try:
-            self._server.on_answered(request)
-        except Exception as error:  # noqa: BLE001 - it would end spin()
-            self._logger.error(f"simulation: after a {request.kind} request: {raised(error)}")
 
 
 def _to_its_end(work: Callable[..., Coroutine[Any, Any, None]], *arguments: Any) -> None:
