@@ -104,7 +104,6 @@ class TreeServer:
         self.stuck: list[str] = []
         """A line for each run that was left, as it did not end after `abandon`."""
         self._abandoned = threading.Event()
-        self._is_drained = False
         self._turns: Turns[Goal] = Turns(Policy(policy), most)
         self._goals: dict[bytes, Goal] = {}
         self._canceled_early: set[bytes] = set()
@@ -153,11 +152,11 @@ class TreeServer:
             self._configure()
             self._activate()
 
-    def drain(self) -> None:
-        """Accept nothing more for good, end all runs, and answer their goals.
+    def close(self) -> None:
+        """Accept nothing more, end all runs, answer their goals, and be gone.
 
         Returns when every goal has ended, or its `timeout.cancel` has passed; not on a thread of
-        the node's executor, which is to be spun.
+        the node's executor.
         """
         if self.lifecycle is not None:
             self.lifecycle.stop()
@@ -165,12 +164,6 @@ class TreeServer:
         with contextlib.suppress(RuntimeError):  # of an interpreter that ends
             wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
         time.sleep(_LINGER)
-        self._is_drained = True
-
-    def close(self) -> None:
-        """Drain, where that has not been done, and be gone; whether or not the node is spun."""
-        if not self._is_drained:
-            self.drain()
         self._rosout.close()
         self._endpoints.close()
         self._action.destroy()
@@ -358,6 +351,8 @@ class TreeServer:
         self._last[goal.tree] = outcome
         if outcome.settled:
             self._underway.ends(goal.id)
+        with self._lock:  # its client may send the next goal as soon as it is answered
+            begun = self._turns.leave(goal)
         try:
             self._answer(goal, outcome)
         except Exception as error:  # noqa: BLE001 - the context was shut down before; by version
@@ -366,7 +361,6 @@ class TreeServer:
             self.unaccounted += outcome.unaccounted
             self._goals.pop(goal.id, None)
             self._answered.notify_all()
-            begun = self._turns.leave(goal)
         self._begin(begun)
 
     def _tell_of(self, goal: Goal, text: str, level: Level = "info") -> None:

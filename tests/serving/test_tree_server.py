@@ -7,6 +7,7 @@ import json
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import AsyncMock
 
@@ -18,6 +19,7 @@ from bt_actions_interfaces.srv import CheckTree, ListTrees
 from rclpy.action.server import RCLError
 
 from bt_actions.serving import TreeServer
+from bt_actions.serving.outcome import Code, RunOutcome
 from tests.serving.conftest import MOVE, Serve
 from tests.support.processes import Journal, Process
 from tests.support.tree_client import PATIENCE, TreeClient
@@ -251,6 +253,19 @@ def test_a_cancel_is_forgotten_with_a_goal_whose_client_vanished(
     monkeypatch.setattr(type(server._action._handle), "send_goal_response", vanish)
     asyncio.run(server._action._execute_goal_request((None, request)))
     assert not server._canceled_early
+    server.close()
+
+
+def test_who_has_a_result_may_send_the_next_goal_at_once(
+    node: Any, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, refusals = TreeServer(node, trees=folder), list[str]()
+    goal: Any = SimpleNamespace(id=bytes(16), tree="empty", label="it", begun_at=None)
+    server._turns.running.append(goal)
+    assert server._turns.refusal()
+    monkeypatch.setattr(server, "_answer", lambda *_: refusals.append(server._turns.refusal()))
+    server._ended(goal, RunOutcome(int(Code.NONE), ""))
+    assert refusals == [""]
     server.close()
 
 

@@ -94,16 +94,16 @@ def run(args: argparse.Namespace) -> int:
         "serve",
         lambda node: _server(node, options),
         announce=lambda server: _announce(server, managed=options["managed"]),
-        drain=_drain,
+        close=_close,
         conclude=_conclude,
         name=NAME,
         namespace=args.namespace,
     )
 
 
-def _drain(server: TreeServer, signals: Signals) -> None:
-    """Drain all; one more signal ends the wait, and a run that does not end then is left."""
-    signals.during(server.drain, lambda _: server.abandon())
+def _close(server: TreeServer, signals: Signals) -> None:
+    """Close the server; one more signal ends the wait, and a run that does not end then is left."""
+    signals.during(server.close, lambda _: server.abandon())
     if server.stuck:
         _tell((*server.unaccounted, *server.stuck))
         leave(Exit.UNKNOWN)
