@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.driving.signals import Signals
-from bt_actions.cli.exits import BadInput, Exit, importing_ros, refuse_domain
+from bt_actions.cli.exits import Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note, write
 from bt_actions.utilities.suggest import listing
 
@@ -71,9 +71,6 @@ def _sweep(
     """Look, and cancel; return what was seen, and say meanwhile what is `found`."""
     with importing_ros():
         from bt_actions.recovery.sweep import Cleanup
-        from bt_actions.ros.onlooker import CannotStart
-
-    refuse_domain()
 
     def tell(left: LeftBehind) -> None:
         found.append(left)
@@ -92,7 +89,7 @@ def _sweep(
     def waits(names: list[str]) -> None:
         note(f"waiting for {listing(names)}, where something may have been left")
 
-    try:
+    with starting_ros():
         return Cleanup(
             look=look,
             patience=patience,
@@ -102,8 +99,6 @@ def _sweep(
             waits=waits,
             stopped=stopped,
         ).run()
-    except CannotStart as error:
-        raise BadInput(f"ROS 2 cannot start: {error}") from error
 
 
 def _tell(swept: Swept, code: Exit, say: Callable[[str], object]) -> None:
