@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from bt_actions.ros.rosout import Rosout
     from bt_actions.ros.spinning import Spinner
 
-__all__ = ["backend_of", "declare_input", "ended_by_signals", "log", "rosout", "spinner"]
-
 
 def backend_of(node: Any) -> Backend:
     """Return what a node gives; what is a Backend itself is returned as it is.

@@ -1,4 +1,4 @@
-"""What a leaf makes of a result: whether it is as expected, and what of it is saved. No ROS.
+"""How a leaf reads a result: whether it is as expected, and what of it is saved. No ROS.
 
 Conditions and places may be given as functions of the result, or as text: there ``$x`` is a
 variable on the blackboard, and ``result`` what the server gave.
@@ -13,7 +13,8 @@ from typing import Any
 from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.variables import key, read
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 
@@ -34,7 +35,7 @@ class Reading:
         when: Given | None,
         names: Names,
     ) -> None:
-        """Raises ValueError for what is neither a function nor an expression."""
+        """Compile; raises ValueError for what is neither a function nor an expression."""
         self._names = names
         self._written: list[tuple[str, Expression]] = []  # what was given as text
         self._expect = None if expect is None else self._function(expect, "expect")

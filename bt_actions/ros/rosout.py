@@ -1,4 +1,4 @@
-"""What is said of runs on `/rosout`, in the name of their node, and of served ones on the log, too.
+"""Lines about runs on `/rosout`, in the name of their node; those of served runs are in the log, too.
 
 rclpy's own loggers would print it all, and hold up the process where nobody reads (log.py).
 """

@@ -31,7 +31,7 @@ _made_by: tuple[int, bytes, itertools.count[int]] | None = None
 
 @dataclass(frozen=True, slots=True)
 class Author:
-    """Who chose an id."""
+    """The process that chose an id."""
 
     here: bool
     """On this machine, where its process can be looked for."""

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from bt_actions.document import DocumentError, source_of
 from bt_actions.document.findings.pages import PAGES
-from bt_actions.document.formatting.format import FormatError, format_source
+from bt_actions.document.formatting.format import format_source
+from bt_actions.document.formatting.layout import FormatError
 from tests.document.test_wrong_documents import CASES
 
 TREES = Path(__file__).parents[2] / "trees"

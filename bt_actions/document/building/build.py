@@ -33,8 +33,6 @@ from bt_actions.document.reading.writes import writes_of
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["BUILDERS", "build"]
-
 
 def build(
     document: Document,
@@ -98,7 +96,7 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
         behaviour = BUILDERS[node.kind.name](node, context)
     if context.topics and not isinstance(behaviour, WaitUntil):  # which waits anyway
         written = settings_of(node, context.document) if node.is_action else node.values
-        names = {name for each in computed_in(written) for name in each.expression.names}
+        names = {name for each in computed_in(written) for name in each.expression.variables}
         if read := [topic for name, topic in context.topics.items() if name in names]:
             patient(behaviour, read)
     setattr(behaviour, NODE, node)

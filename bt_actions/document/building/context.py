@@ -22,9 +22,6 @@ from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
 
-__all__ = ["Condition", "Context", "plain_name", "table_of", "written_text"]
-
-
 Root = str | Callable[[Any], Mapping[str, object]] | None
 """The bare name that an expression has for what it is a function of; or what gives several."""
 

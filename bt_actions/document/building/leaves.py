@@ -24,8 +24,6 @@ from bt_actions.document.yaml.nodes import span_of
 from bt_actions.goals.policy import Busy, Retry, Timeouts
 from bt_actions.messages.interfaces import interface
 
-__all__ = ["LEAVES", "build_action"]
-
 
 def build_action(node: TreeNode, context: Context) -> Behaviour:
     """The behaviour of an action, by its name in the document or in place."""

@@ -12,8 +12,6 @@ from collections.abc import Mapping
 
 from py_trees.blackboard import Blackboard
 
-__all__ = ["Scope"]
-
 _ODD = re.compile(r"[^A-Za-z0-9_]")
 _LOADS = "/bt/loads"
 """The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""

@@ -21,8 +21,6 @@ from bt_actions.document.yaml.source import Source
 from bt_actions.messages.conversion import Problem, examine
 from bt_actions.messages.fields import FieldType, Message
 
-__all__ = ["check_actions", "check_defaults", "check_use"]
-
 
 def check_actions(checker: Checker) -> None:
     """The actions that are declared here, and of those imported what the nodes take over."""

@@ -9,8 +9,6 @@ from bt_actions.document.checking.kinds import CHECKS
 from bt_actions.document.checking.names import check_names
 from bt_actions.document.reading.tree import TreeNode
 
-__all__ = ["check_document"]
-
 
 def check_document(checker: Checker) -> None:
     """Report everything that is wrong with names and types to the documents' own sources."""

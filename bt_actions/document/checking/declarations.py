@@ -10,8 +10,6 @@ from bt_actions.document.reading.tree import Declared
 from bt_actions.document.yaml.nodes import span_of
 from bt_actions.messages.fields import FieldType, Message
 
-__all__ = ["check_declarations"]
-
 
 def check_declarations(checker: Checker) -> None:
     """Report what is wrong, and make what is declared known to the checker."""

@@ -20,8 +20,6 @@ from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
 from bt_actions.messages.interfaces import RUN_TREE
 from bt_actions.utilities.suggest import did_you_mean, listing
 
-__all__ = ["CHECKS"]
-
 
 def _subtree(checker: Checker, node: TreeNode) -> None:
     included = node.included

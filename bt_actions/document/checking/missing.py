@@ -19,8 +19,6 @@ from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import span_of
 
-__all__ = ["find_missing"]
-
 _READ_FIRST = {
     "action": "goal", "run_tree": "inputs", "service": "request", "publish": "message",
     "set": "set", "wait": "wait", "check": "check", "while": "while", "subtree": "with",
@@ -124,7 +122,7 @@ class _Missing:
         there = {*self._writes(node), *(need.name for need in needs)}
         kind = _kind(node)
         if kind in ("check", "wait_until"):
-            there.update(*(one.expression.names for one in computed_in(node.values.get(kind))))
+            there.update(*(one.expression.variables for one in computed_in(node.values.get(kind))))
         inner = [self._needs(child) for child in node.children]
         if kind == "fallback" and inner:
             in_all = [{need.name for need in each} for each, _ in inner]

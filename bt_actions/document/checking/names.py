@@ -17,8 +17,6 @@ from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.yaml.nodes import Node, span_of
 from bt_actions.messages.interfaces import RUN_TREE
 
-__all__ = ["check_names"]
-
 _WORDS = {"action": "the action server", "srv": "the service", "msg": "the topic"}
 _KINDS = {"action": ("action", "server"), "service": ("srv", "server"),
           "publish": ("msg", "publish"), "wait_for_message": ("msg", "topic")}  # fmt: skip

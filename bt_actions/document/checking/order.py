@@ -19,8 +19,6 @@ from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import span_of
 
-__all__ = ["find_early_reads"]
-
 _NOTHING: frozenset[str] = frozenset()
 _LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
 _STRAIGHT = frozenset({"sequence", "timeout", "while", "run_once"})

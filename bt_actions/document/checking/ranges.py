@@ -10,8 +10,6 @@ from collections.abc import Mapping
 
 from bt_actions.messages.interfaces import interface_name
 
-__all__ = ["never_held"]
-
 _Range = tuple[float, float]
 _FRACTION, _UNIT = (0.0, 1.0), (-1.0, 1.0)
 _LIMITLESS = float("inf")

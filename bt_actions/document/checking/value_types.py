@@ -8,11 +8,6 @@ from bt_actions.document.language.types import Either, Record
 from bt_actions.expressions.functions import KNOWN
 from bt_actions.messages.fields import FLOATS, INTEGERS, FieldType, Listing, Scalar
 
-__all__ = [
-    "BOOL", "FLOAT", "INTEGER", "ONE_VALUE", "TEXT", "common_type", "comparable", "has_length",
-    "is_float", "is_number", "is_text", "joined", "named", "type_of_literal", "unjoinable",
-]  # fmt: skip
-
 _NUMBERS = frozenset({*INTEGERS, *FLOATS})
 BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
 

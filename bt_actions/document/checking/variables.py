@@ -16,8 +16,6 @@ from bt_actions.expressions.expression import Expression
 from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
 from bt_actions.messages.interfaces import RUN_TREE
 
-__all__ = ["Known", "infer_variables", "items_inside", "root_type", "type_of"]
-
 Types = Mapping[str, FieldType | None]
 _ROUNDS = 8
 """How far a type is followed from variable to variable, before none is taken for known."""

@@ -9,8 +9,6 @@ from bt_actions.document.language.values import computed_in
 from bt_actions.document.reading.settings import settings_of
 from bt_actions.document.reading.tree import Document, TreeNode
 
-__all__ = ["BEGUN", "Can", "Verdicts"]
-
 
 class Can(NamedTuple):
     """Whether a node can succeed, and whether it can fail."""

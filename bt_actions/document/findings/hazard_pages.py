@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 from bt_actions.document.findings.page import SUCCESS, Page, moving, tree
 
-__all__ = ["HAZARD_PAGES"]
-
 HAZARD_PAGES: Mapping[str, Page] = {
     "BT301": Page(
         "An action without a result timeout waits for ever on a server that hangs. Where that is "

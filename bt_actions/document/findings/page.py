@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["MOVE", "SUCCESS", "Page", "moving", "tree"]
-
 
 @dataclass(frozen=True, slots=True)
 class Page:

@@ -12,8 +12,6 @@ from bt_actions.document.findings.hazard_pages import HAZARD_PAGES
 from bt_actions.document.findings.page import MOVE, SUCCESS, Page, moving, tree
 from bt_actions.document.findings.rules import RULES
 
-__all__ = ["PAGES", "page"]
-
 
 def page(code: str) -> str:
     """The page of a rule as plain text."""

@@ -11,8 +11,6 @@ from types import MappingProxyType
 
 from bt_actions.document.findings import Severity
 
-__all__ = ["RULES", "Rule"]
-
 
 @dataclass(frozen=True, slots=True)
 class Rule:

@@ -18,8 +18,6 @@ from bt_actions.document.yaml.compose import compose, compose_written
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["FormatError", "format_source"]
-
 
 def format_source(source: Source) -> str:
     """The text of a document in canonical form.

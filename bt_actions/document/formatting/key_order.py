@@ -11,8 +11,6 @@ from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 
-__all__ = ["forms", "in_order", "item_shape", "shapes_of"]
-
 
 def shapes_of(node: Mapping, shape: Shape | None) -> MappingType[str, Shape | None]:
     """The form of what stands under each key of a mapping, in the order that the model has.

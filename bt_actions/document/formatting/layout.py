@@ -18,8 +18,6 @@ from bt_actions.document.yaml.ignores import is_ignore
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["FormatError", "Layout"]
-
 _STEP = 2
 _DASHES = re.compile(r"\s*-(\s+-)*\s*")
 

@@ -13,8 +13,6 @@ from bt_actions.document.yaml.ignores import is_ignore
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["trailing_comments"]
-
 Block = Mapping | Listing
 
 

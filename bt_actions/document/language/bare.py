@@ -6,8 +6,6 @@ from bt_actions.document.yaml.nodes import Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.utilities.units import TURN, spoken_duration
 
-__all__ = ["warn_bare_angle", "warn_bare_duration"]
-
 _LONGEST = 40
 """Characters of a number in a message."""
 _LONG = 500.0

@@ -12,8 +12,6 @@ from itertools import chain
 
 from bt_actions.utilities.plain_data import numbers_only
 
-__all__ = ["MAX_CHARACTERS", "MAX_ITEMS", "MAX_LEVELS", "refuse_large"]
-
 MAX_ITEMS = 1_000_000
 """Numbers, texts, lists and mappings in one value, each counted as often as it can be reached."""
 MAX_CHARACTERS = 10_000_000

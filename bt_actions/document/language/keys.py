@@ -25,13 +25,6 @@ from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import AnyValue, Key, ListOf, Record, Table, Values
 from bt_actions.goals.policy import RETRYABLE, Busy
 
-__all__ = [
-    "ACTION_KEYS", "ACTION_NAME", "ACTION_SERVER", "ACTION_TYPE", "ALIAS", "DEFAULTS", "DOING",
-    "INPUT", "LIBRARY_KEYS", "MESSAGE_TYPE", "NAMESPACE", "NODE", "NODES", "OUTPUT", "POLICIES",
-    "QOS", "RESULT", "RETRY", "SERVICE_RETRY", "TIMEOUT", "TOPIC", "TOPIC_NAME", "TOP_KEYS",
-    "keyed",
-]  # fmt: skip
-
 
 def keyed(*keys: Key) -> Mapping[str, Key]:
     return MappingProxyType({key.name: key for key in keys})

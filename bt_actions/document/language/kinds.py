@@ -53,8 +53,6 @@ from bt_actions.document.language.shapes import (
     Values,
 )  # fmt: skip
 
-__all__ = ["KINDS", "SERVICE_TIMEOUT", "Group", "Kind"]
-
 _MESSAGE = frozenset({"message"})
 _RUN = frozenset({"result", "outputs"})
 _NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")

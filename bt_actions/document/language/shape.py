@@ -11,16 +11,6 @@ from bt_actions.document.yaml.braces import report_braces
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 
-__all__ = [
-    "Schema",
-    "Shape",
-    "is_computed",
-    "or_variable",
-    "read_computed",
-    "words_for",
-    "wrong_form",
-]
-
 Schema = dict[str, object]
 _ALONE = re.compile(r"\$\(\s*([^()$]*?)\s*\)")
 

@@ -31,27 +31,10 @@ from bt_actions.document.yaml.nodes import (
     span_of,
 )
 from bt_actions.document.yaml.source import SUFFIXES, Source, read_source
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.expressions.values import MAX_ITEMS as MAX_TEXT
 from bt_actions.utilities.plain_data import numbers_only
-
-__all__ = [
-    "BAD",
-    "Computed",
-    "Interpolated",
-    "Lookup",
-    "computed_in",
-    "computes",
-    "constant_of",
-    "locate",
-    "names_file",
-    "names_value",
-    "read_data",
-    "read_expression",
-    "read_value",
-    "resolve",
-    "spoken",
-]
 
 Lookup = Callable[[str], object]
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 
-__all__ = ["a_kind", "around"]
-
 _SETTINGS = {"retry": ("attempts", "3"), "repeat": ("times", "3"), "timeout": ("after", "30 s"),
              "for_each": ("in", "[...]")}  # fmt: skip
 """The key that says how often, or how long, and an example of its value."""

@@ -10,8 +10,6 @@ from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, data_
 from bt_actions.messages.as_fields import as_fields
 from bt_actions.messages.interfaces import Kind
 
-__all__ = ["FIELDS", "fields_for"]
-
 FIELDS: dict[str, tuple[Kind, str]] = {
     "goal": ("action", "Goal"), "request": ("srv", "Request"), "message": ("msg", ""),
 }  # fmt: skip

@@ -28,8 +28,6 @@ from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
 from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
-__all__ = ["NODE_KEYS", "read_root"]
-
 _CHILDREN = ("child", "children")
 NODE_KEYS = frozenset(
     {*ACTION_KEYS, *_CHILDREN, *(key for kind in KINDS.values() for key in kind.keys)}

@@ -7,17 +7,6 @@ from functools import lru_cache
 
 from bt_actions.document.reading.tree import Document, TreeNode
 
-__all__ = [
-    "join_names",
-    "merged",
-    "resources_below",
-    "server_of",
-    "settings_of",
-    "shared_settings",
-    "text_of",
-    "when_of",
-]
-
 
 def text_of(values: Mapping[str, object], key: str) -> str:
     """A text as it is, and anything else as an empty one."""

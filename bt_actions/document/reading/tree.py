@@ -13,8 +13,6 @@ from bt_actions.document.language.kinds import Kind
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["Declared", "Document", "TreeNode"]
-
 
 class TreeNode:
     """A node of the tree.

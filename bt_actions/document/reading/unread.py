@@ -14,8 +14,6 @@ from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["Doubts"]
-
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _NAME = re.compile(r"[A-Za-z0-9_ -]+")
 """What somebody may have written as a name, and no expression."""

@@ -9,9 +9,6 @@ from bt_actions.document.language.values import Computed
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping, Node
 
-__all__ = ["Write", "writes_of"]
-
-
 _ROOTS = {"subtree": None, "wait_for_message": "message"}
 _WRITERS = {"set", "for_each", *(name for name, kind in KINDS.items() if "save" in kind.keys)}
 

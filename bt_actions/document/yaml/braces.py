@@ -5,8 +5,6 @@ from __future__ import annotations
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["report_braces"]
-
 
 def report_braces(node: Node, source: Source) -> bool:
     """Report `{x}` where no mapping is meant: YAML reads it as a mapping of x to nothing."""

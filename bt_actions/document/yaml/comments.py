@@ -13,8 +13,6 @@ from typing import NamedTuple
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["Comment", "block_header", "comments_of", "scalars_of"]
-
 _PROPERTY = re.compile(r"[&!]\S*\s+")
 
 

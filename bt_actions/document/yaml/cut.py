@@ -10,8 +10,6 @@ from bt_actions.document.findings import Span
 from bt_actions.document.yaml.nodes import Scalar, span_of
 from bt_actions.document.yaml.source import Source, unquoted
 
-__all__ = ["cut_hint", "warn_cut", "warn_quotes"]
-
 
 def warn_cut(node: Scalar, source: Source, what: str) -> None:
     """Say so where a comment begins without a space behind its '#'; `what` was cut."""

@@ -15,8 +15,6 @@ from bt_actions.document.yaml.comments import Comment, comments_of, scalars_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = ["apply_ignores", "is_ignore"]
-
 _IGNORE = re.compile(r"(?:^|(?<=\s))#\s*bt:\s*ignore\b(?:\[([^\]]*)\])?")
 _CODE = re.compile(r"[^\s,]+")
 

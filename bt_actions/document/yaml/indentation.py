@@ -11,8 +11,6 @@ from typing import NamedTuple
 
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["column_hint"]
-
 _DASH = re.compile(r"-( +|$)")
 _KEY = re.compile(r"""["']?([\w<][^:'"]{0,40})["']?\s*:(?:\s|$)""")
 

@@ -14,8 +14,6 @@ from bt_actions.document.yaml.comments import block_header
 from bt_actions.document.yaml.nodes import Scalar, span_of
 from bt_actions.document.yaml.source import Char, Source
 
-__all__ = ["inner_span"]
-
 _ESCAPE = re.compile(
     r"\\(?:u([Dd][89ABab]..)\\u([Dd][C-Fc-f]..)"
     r"|x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))"

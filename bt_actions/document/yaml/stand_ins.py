@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["replaced", "restored"]
-
 _SEPARATORS = {"\x85": "\ufdd0", "\u2028": "\ufdd1", "\u2029": "\ufdd2"}
 _BACKSLASH = "\ufdd3"
 _RESTORED = str.maketrans({inside: char for char, inside in _SEPARATORS.items()})

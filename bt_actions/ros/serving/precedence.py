@@ -89,7 +89,7 @@ class Precedence:
         here = [name for name in names if name.startswith(f"{self._action}/_since/")]
         claims = sorted(found[0] for found in map(_CLAIM.search, here) if found)
         for claim in claims[: claims.index(self._mine)] if self._mine in claims else claims:
-            if who := _alive(bytes.fromhex(claim[-32:])):
+            if who := _claimant(bytes.fromhex(claim[-32:])):
                 return f"{who} has served {self._action} for longer"
         if servers <= len(claims):
             self._unclaimed_since = None
@@ -102,9 +102,9 @@ class Precedence:
         return f"another server of {self._action} is in sight, which is no server of trees"
 
 
-def _alive(claimant: bytes) -> str:
+def _claimant(claimed_by: bytes) -> str:
     """Whose id it is, in words; "" for a process that is dead."""
-    author = author_of(claimant)
+    author = author_of(claimed_by)
     if author is None or not author.here:
         return "a process on another machine"
     return f"process {author.pid}" if author.alive else ""
