@@ -1,4 +1,4 @@
-"""Lines about runs on `/rosout`, in the name of their node; those of served runs are in the log, too.
+"""Lines about runs on `/rosout`, in the name of their node; those of served runs are also logged.
 
 rclpy's own loggers would print it all, and hold up the process where nobody reads (log.py).
 """
