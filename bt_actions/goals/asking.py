@@ -59,7 +59,7 @@ class Asking:
         silent, self.unheard = self.unheard > UNHEARD, 0
         return silent
 
-    def answered(self, code: int, now: float) -> None:
+    def cancel_answered(self, code: int, now: float) -> None:
         """Take note of an answer."""
         if self.answer != CANCEL_ACCEPTED:  # after that, rcl calls it TERMINATED
             self.answer = code

@@ -26,7 +26,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bt_actions.traffic.host import Entry, Record
+from bt_actions.traffic.state import Entry, Record
 from bt_actions.utilities.ids import Author, author_of
 
 DIRECTORY = "BT_ACTIONS_LEDGER"

@@ -180,7 +180,7 @@ class RosTransport:
             return
         question.answers.append(answer)
         told = kind, question.goal_id, question.asked, tuple(question.answers)
-        self._inbox.append((self._listener.answered, told, question.asked))
+        self._inbox.append((self._listener.answer_came, told, question.asked))
 
     def deliver(self) -> None:
         """Deliver what has been taken."""
@@ -189,7 +189,7 @@ class RosTransport:
             while self._inbox and not self.closed:
                 tell, what, asked = self._inbox.popleft()
                 if asked is not None:
-                    self.reachability.answered(asked=asked)
+                    self.reachability.answer_came(asked)
                 if self.on_trial and tell != self._listener.statuses_came:
                     continue
                 try:

@@ -20,6 +20,7 @@ from bt_actions.behaviours.places import path_of, told_apart
 from bt_actions.events import Event, GoalChanged, NodeChanged, TreeStarted
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import fit
 
 DONE = "DONE"
 UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
@@ -247,11 +248,12 @@ class Report:
             how, why, row = "failed", culprit.message, culprit.row
             if row is not None and row.outcome is not None:
                 tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
-                how, why = f"{row.outcome} after {tries}", row.reason or why
+                is_told = row.end is End.UNKNOWN  # of the goal that is not accounted for
+                how, why = f"{row.outcome} after {tries}", "" if is_told else row.reason or why
             lines += [" / ".join(culprit.path), f"  {how}{f': {clean(why)}' if why else ''}"]
             if culprit.place:
                 lines.append(f"  {culprit.place}")
-        return lines
+        return [fit(line) for line in lines]
 
     def _culprit(self, node: Behaviour, message: str) -> Culprit:
         return Culprit(node, path_of(node), message, place_of(node), self._rows.get(node))

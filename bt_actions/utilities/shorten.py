@@ -9,6 +9,11 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
+MESSAGE = 300
+"""Characters of a message: three lines of a terminal."""
+LONG = 200
+"""Characters of a value; longer ones are cut."""
+
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
 _FIRST = 3
@@ -17,18 +22,12 @@ Part = tuple[str, object]
 """A text, and a value that stands behind it (or `_NOTHING`)."""
 
 
-LONG = 300
-"""Characters of a value; longer ones are cut."""
-
-
 def brief(value: object) -> str:
     """Return a value as people read it, short however large it is; a text without quotes."""
-    if not isinstance(value, str):
-        return shorten(value)
-    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
+    return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
 
 
-def shorten(value: object, limit: int = LONG) -> str:
+def shorten(value: object, limit: int = MESSAGE) -> str:
     """Return a value as people write it in a tree: ``{x: 1.0, on: true, name: 'a'}``.
 
     A long list is ``[7, 7, 7, … 4000000 items]``; a text of more than `limit` characters is cut,
@@ -59,21 +58,12 @@ def shorten(value: object, limit: int = LONG) -> str:
     return text if len(text) <= limit else f"{text[: limit - 1]}…"
 
 
-def shorten_fields(message: object, limit: int = 80) -> str:
-    """Return the fields of a ROS message as ``remaining 1.2, phase moving``, cut as `shorten` does.
-
-    A field's own value is cut at half of the limit; a number has six digits.
-    """
-    text = ""
-    types = getattr(message, "get_fields_and_field_types", dict[str, str])()
-    for name in types:
-        value = field_of(message, name, types)
-        plain = value[:limit] if isinstance(value, str) else ""
-        number = f"{value:g}" if isinstance(value, float) else ""
-        text += f"{', ' if text else ''}{name} {plain or number or shorten(value, limit // 2)}"
-        if len(text) > limit:
-            return f"{text[: limit - 1]}…"
-    return text
+def fit(text: str, limit: int = MESSAGE) -> str:
+    """Return a message as it is, or without its middle: its end often says what to do."""
+    if len(text) <= limit:
+        return text
+    tail = limit // 3
+    return f"{text[: limit - tail - 3]} … {text[-tail:]}"
 
 
 def given_fields(message: object) -> dict[str, object]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.traffic.predecessors import warn_of_dead
+from bt_actions.traffic.endpoint import warn_of_dead
 from bt_actions.utilities.ids import Author, new_id
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
+from bt_actions.utilities.shorten import MESSAGE
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
 
 
-def table(report: Report, width: int | None = None) -> list[str]:
+def table(report: Report, width: int = MESSAGE) -> list[str]:
     """Return the table of actions as lines; names are cut so that lines fit into `width`."""
     body = [
         (
@@ -43,14 +44,13 @@ def verdict(row: Row) -> str:
     return f"{row.outcome}{told}{', late' if late else ''}"
 
 
-def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
+def columns(body: list[tuple[str, str, str, str, str]], width: int = MESSAGE) -> list[str]:
     """Return name, server, tries, verdict and duration of actions as lines, under a head."""
     head = ("action", "server", "attempts", "outcome", "duration")
     widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
-    if width is not None:
-        for column in (1, 0):  # the server first: it is often a long name
-            excess = sum(widths) + 2 * (len(widths) - 1) - width
-            widths[column] -= max(0, min(excess, widths[column] - 8))
+    for column in (1, 0):  # the server first: it is often a long name
+        excess = sum(widths) + 2 * (len(widths) - 1) - width
+        widths[column] -= max(0, min(excess, widths[column] - 8))
     right = {2, 4}
     return [
         "  ".join(
